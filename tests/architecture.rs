@@ -1,26 +1,77 @@
-//! The map of the code is tested: `docs/ARCHITECTURE.md`, the module docs, the dependency arrows and the citation keys.
+//! The structure of the code is tested: module docs, arrows between crates, promises of absence, names, import cycles, citation keys.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const SOURCE_ROOTS: [&str; 3] = ["agents/src", "budget/src", "src"];
-
-/// Who may know whom: text that starts a path to the room on the right must not stand in the room on the left.
-const FORBIDDEN: [(&str, &[&str]); 9] = [
-    ("agents/src", &["metachron_budget", "metachron::", "std::time", "std::thread", "std::fs", "wgpu", "egui"]),
-    ("budget/src", &["metachron_agents", "metachron::", "std::", "rapier3d", "glam"]),
-    ("src/scene", &["crate::runtime", "crate::control", "crate::compositor", "crate::cli", "crate::frame"]),
-    ("src/runtime", &["crate::scene", "crate::control", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
-    ("src/control", &["crate::scene", "crate::runtime", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
-    ("src/tune", &["crate::scene", "crate::runtime", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
+/// The crates, and the crates of this workspace that each may depend on.
+const ARROWS: [(&str, &[&str]); 13] = [
+    ("agents/core", &[]),
+    ("agents/geometry", &["core"]),
+    ("agents/contact", &["core", "geometry"]),
+    ("agents/models", &["core", "geometry", "contact"]),
+    ("crates/runtime", &["core", "geometry", "contact"]),
+    ("crates/world", &["core", "geometry", "contact", "models", "runtime"]),
+    ("crates/scene", &["core", "geometry", "contact", "models", "world"]),
+    ("crates/lod", &["core"]),
+    ("crates/render", &["core", "geometry"]),
+    ("crates/session", &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render"]),
+    ("crates/viewer", &["core", "contact", "runtime", "world", "scene", "lod", "render", "session"]),
+    ("crates/console", &["runtime", "world", "scene", "lod"]),
     (
-        "src/fit",
-        &["crate::scene", "crate::runtime", "crate::control", "crate::compositor", "crate::cli", "crate::frame"],
+        "crates/lab",
+        &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render", "session", "console"],
     ),
-    ("src/compositor", &["crate::scene", "crate::runtime", "crate::control", "crate::cli", "crate::frame"]),
-    ("src/frame", &["crate::cli"]),
 ];
+
+/// Text on the right must not stand in the code of the folder on the left.
+const ABSENT: [(&str, &[&str]); 6] = [
+    ("agents", &["std::time", "std::thread", "std::fs", "std::net", "wgpu", "egui"]),
+    ("crates/runtime", &["std::fs::", "wgpu", "egui"]),
+    ("crates/world", &["toml::", "std::fs", "std::thread", "wgpu", "egui"]),
+    ("crates/scene", &["std::thread", "wgpu", "egui"]),
+    ("crates/render", &["egui", "winit", "std::thread"]),
+    ("crates/session", &["egui", "std::thread::spawn"]),
+];
+
+/// Modules of the numbers that need neither the standard library nor a type of the engine.
+const NO_STD: [&str; 7] = ["adaptive", "cost", "grisoni", "hysteresis", "log_law", "select", "share"];
+
+/// Words that no file and no type may have in its name: `docs/GLOSSARY.md` has the words to use.
+const DENIED: [&str; 29] = [
+    "hall",
+    "desk",
+    "bell",
+    "staff",
+    "shelf",
+    "berth",
+    "fellow",
+    "fellows",
+    "abreast",
+    "switchboard",
+    "knock",
+    "company",
+    "guest",
+    "guests",
+    "mate",
+    "mates",
+    "leant",
+    "borne",
+    "lies",
+    "presses",
+    "purse",
+    "told",
+    "heed",
+    "hear",
+    "diary",
+    "upheld",
+    "foretold",
+    "whom",
+    "sitting",
+];
+
+/// Most files of one crate that import each other in a ring.
+const CYCLE_MAX: usize = 12;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -44,32 +95,23 @@ fn relative(path: &Path) -> String {
     path.strip_prefix(root()).unwrap().to_string_lossy().replace('\\', "/")
 }
 
+/// Every source file of every crate, with its text.
 fn sources() -> Vec<(String, String)> {
-    SOURCE_ROOTS
-        .iter()
+    let folders = ARROWS.iter().map(|(folder, _)| format!("{folder}/src")).chain(["src".to_owned()]);
+    folders
         .flat_map(|r| files_below(&root().join(r), "rs"))
         .map(|path| (relative(&path), fs::read_to_string(&path).unwrap()))
         .collect()
 }
 
-/// The first cell of every table row that is a path in backquotes.
-fn rows_of_the_map() -> BTreeSet<String> {
-    let map = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).unwrap();
-    map.lines()
-        .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))
-        .map(|(path, _)| path.to_owned())
-        .filter(|path| path.ends_with(".rs"))
-        .collect()
+fn is_test(path: &str) -> bool {
+    path.contains("/tests/") || path.ends_with("tests.rs")
 }
 
-#[test]
-fn every_source_file_has_its_row_in_the_map_and_every_row_its_file() {
-    let rows = rows_of_the_map();
-    let files: BTreeSet<String> = sources().into_iter().map(|(path, _)| path).collect();
-    let missing: Vec<_> = files.difference(&rows).collect();
-    let gone: Vec<_> = rows.difference(&files).collect();
-    assert!(missing.is_empty(), "without a row in docs/ARCHITECTURE.md: {missing:#?}");
-    assert!(gone.is_empty(), "rows in docs/ARCHITECTURE.md without a file: {gone:#?}");
+/// The files that go with contact between clocks as it is today; they may only become fewer.
+fn doomed() -> BTreeSet<String> {
+    let text = fs::read_to_string(root().join("docs/doomed.txt")).unwrap();
+    text.lines().map(str::to_owned).collect()
 }
 
 #[test]
@@ -79,19 +121,53 @@ fn every_source_file_opens_by_saying_what_it_is() {
 }
 
 #[test]
-fn no_room_knows_a_room_it_must_not() {
+fn every_crate_depends_on_those_below_it_alone_and_says_what_it_is() {
+    let folders: BTreeSet<String> = ["agents", "crates"]
+        .iter()
+        .flat_map(|group| fs::read_dir(root().join(group)).unwrap())
+        .map(|entry| relative(&entry.unwrap().path()))
+        .collect();
+    let known: BTreeSet<String> = ARROWS.iter().map(|(folder, _)| (*folder).to_owned()).collect();
+    assert_eq!(folders, known, "crates without a row of arrows, or rows without a crate");
+    let mut wrong = Vec::new();
+    for (folder, allowed) in ARROWS {
+        let text = fs::read_to_string(root().join(folder).join("Cargo.toml")).unwrap();
+        let (_, rest) = text.split_once("\n[dependencies]\n").expect("dependencies");
+        let dependencies = rest.split("\n[").next().unwrap();
+        for line in dependencies.lines() {
+            let Some(name) = line.strip_prefix("metachron-") else { continue };
+            let name = name.split(['.', ' ', '=']).next().unwrap();
+            if !allowed.contains(&name) {
+                wrong.push(format!("{folder} must not depend on metachron-{name}"));
+            }
+        }
+        for key in ["description = ", "keywords = ", "categories = ", "[lints]\nworkspace = true"] {
+            if !text.contains(key) {
+                wrong.push(format!("{folder}/Cargo.toml lacks `{key}`"));
+            }
+        }
+        if !root().join(folder).join("README.md").is_file() {
+            wrong.push(format!("{folder} lacks a README.md"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn crates_keep_their_promises_of_absence() {
     let mut broken = Vec::new();
     for (path, text) in sources() {
-        for (room, strangers) in FORBIDDEN {
-            // tests read reference files; what they stand beside must not
-            let is_test = path.contains("/tests/") || path.ends_with("tests.rs");
-            if is_test || (path != format!("{room}.rs") && !path.starts_with(&format!("{room}/"))) {
-                continue;
-            }
-            for (number, line) in text.lines().enumerate().filter(|(_, l)| !l.trim_start().starts_with("//")) {
-                for stranger in strangers.iter().filter(|s| line.contains(*s)) {
-                    broken.push(format!("{path}:{}: {room} must not know {stranger}", number + 1));
-                }
+        let numbers = NO_STD.iter().any(|m| path.starts_with(&format!("crates/lod/src/{m}")));
+        let of_numbers: &[&str] = if numbers { &["std::", "metachron_core", "glam"] } else { &[] };
+        let absent = ABSENT.iter().filter(|(folder, _)| path.starts_with(&format!("{folder}/")));
+        let absent: Vec<_> = absent.flat_map(|(_, words)| words.iter()).chain(of_numbers).collect();
+        // tests read reference files and start threads; what they test must not
+        let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+        for (number, line) in
+            code.lines().enumerate().filter(|(_, l)| !is_test(&path) && !l.trim_start().starts_with("//"))
+        {
+            for word in absent.iter().filter(|word| line.contains(**word)) {
+                broken.push(format!("{path}:{}: {word}", number + 1));
             }
         }
     }
@@ -110,9 +186,162 @@ fn unsafe_code_and_silenced_lints_stay_out() {
         }
     }
     assert!(found.is_empty(), "{found:#?}");
-    for manifest in ["Cargo.toml", "agents/Cargo.toml", "budget/Cargo.toml"] {
-        let text = fs::read_to_string(root().join(manifest)).unwrap();
-        assert!(text.contains("[lints]\nworkspace = true"), "{manifest} must take the workspace's lints");
+}
+
+/// The words of a name: split at capitals, underscores and digits.
+fn words(name: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut before = '_';
+    for c in name.chars() {
+        let starts = !before.is_alphabetic() || (c.is_uppercase() && !before.is_uppercase());
+        if c.is_alphabetic() {
+            if starts {
+                words.push(String::new());
+            }
+            words.last_mut().unwrap().extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    words
+}
+
+/// The names of the types that a file defines.
+fn types(text: &str) -> Vec<&str> {
+    let kinds = ["struct ", "enum ", "trait ", "type "];
+    let name = |line: &'_ str| {
+        let code = line.trim_start();
+        let code =
+            code.strip_prefix("pub ").or_else(|| Some(code.strip_prefix("pub(")?.split_once(") ")?.1)).unwrap_or(code);
+        let at = kinds.iter().find_map(|kind| code.strip_prefix(kind))?.len();
+        Some(line.len() - at)
+    };
+    text.lines()
+        .filter_map(|line| Some(&line[name(line)?..]))
+        .map(|rest| &rest[..rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len())])
+        .collect()
+}
+
+#[test]
+fn names_of_files_and_types_are_words_of_the_field() {
+    let doomed = doomed();
+    let mut found = Vec::new();
+    for (path, text) in sources().into_iter().filter(|(path, _)| !doomed.contains(path)) {
+        let stem = Path::new(&path).file_stem().unwrap().to_str().unwrap();
+        for name in [stem].into_iter().chain(types(&text)) {
+            for word in words(name).iter().filter(|word| DENIED.contains(&word.as_str())) {
+                found.push(format!("{path}: {name}: {word}"));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}
+
+#[test]
+fn names_are_compared_word_by_word() {
+    assert_eq!(words("TouchRoom2d"), ["touch", "room", "d"]);
+    assert_eq!(words("cast_ray"), ["cast", "ray"]);
+    assert_eq!(types("pub struct Hall {\n    pub(super) enum B;\nfn type_of() {}"), ["Hall", "B"]);
+}
+
+#[test]
+fn every_doomed_file_is_still_there() {
+    let gone: Vec<_> = doomed().into_iter().filter(|path| !root().join(path).is_file()).collect();
+    assert!(gone.is_empty(), "take these lines out of docs/doomed.txt: {gone:#?}");
+}
+
+/// The modules of a crate by path, such as `rod::step`.
+fn modules(folder: &str) -> BTreeMap<Vec<String>, String> {
+    let src = root().join(folder).join("src");
+    let path = |file: &Path| {
+        let mut parts: Vec<String> =
+            file.strip_prefix(&src).unwrap().iter().map(|p| p.to_string_lossy().into_owned()).collect();
+        let last = parts.pop().unwrap();
+        if !["mod.rs", "lib.rs"].contains(&last.as_str()) {
+            parts.push(last.trim_end_matches(".rs").to_owned());
+        }
+        parts
+    };
+    files_below(&src, "rs").iter().map(|file| (path(file), relative(file))).collect()
+}
+
+/// The modules that a file names: the longest prefix of each path of its `use` lines and of its code that is a module.
+fn named(text: &str, here: &[String], modules: &BTreeMap<Vec<String>, String>) -> BTreeSet<String> {
+    let code: String = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    let mut found = BTreeSet::new();
+    for head in ["crate::", "super::"] {
+        for (at, _) in code.match_indices(head) {
+            if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':') {
+                continue;
+            }
+            let rest = &code[at..];
+            let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_' && c != ':').unwrap_or(rest.len());
+            let mut path: Vec<String> = if head == "crate::" { Vec::new() } else { here.to_vec() };
+            for part in rest[..end].split("::") {
+                match part {
+                    "crate" | "" => {}
+                    "super" => drop(path.pop()),
+                    part => path.push(part.to_owned()),
+                }
+            }
+            while !path.is_empty() && !modules.contains_key(&path) {
+                path.pop();
+            }
+            // a path that ends at a folder's own file names what that file re-exports, not the file
+            if let Some(file) = modules.get(&path).filter(|file| !file.ends_with("mod.rs") && !file.ends_with("lib.rs"))
+            {
+                found.insert(file.clone());
+            }
+        }
+    }
+    found
+}
+
+/// The files from which `from` can be reached and that can be reached from it.
+fn ring<'a>(from: &'a str, arrows: &'a BTreeMap<String, BTreeSet<String>>) -> BTreeSet<&'a str> {
+    let reach = |start: &'a str| {
+        let (mut seen, mut open) = (BTreeSet::new(), vec![start]);
+        while let Some(file) = open.pop() {
+            for next in arrows.get(file).into_iter().flatten() {
+                if seen.insert(next.as_str()) {
+                    open.push(next);
+                }
+            }
+        }
+        seen
+    };
+    reach(from).into_iter().filter(|file| reach(file).contains(from)).collect()
+}
+
+#[test]
+fn no_more_than_twelve_files_of_the_physics_import_each_other_in_a_ring() {
+    let doomed = doomed();
+    for (folder, _) in ARROWS.iter().filter(|(folder, _)| folder.starts_with("agents") || *folder == "crates/runtime") {
+        let modules = modules(folder);
+        let kept = |file: &str| !doomed.contains(file) && !is_test(file);
+        let arrows: BTreeMap<_, _> = modules
+            .iter()
+            .filter(|(_, file)| kept(file))
+            .map(|(path, file)| {
+                let text = fs::read_to_string(root().join(file)).unwrap();
+                let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+                let to = named(code, path, &modules).into_iter().filter(|to| kept(to) && to != file).collect();
+                (file.clone(), to)
+            })
+            .collect();
+        for file in arrows.keys() {
+            let ring = ring(file, &arrows);
+            assert!(ring.len() <= CYCLE_MAX, "{} files of {folder}: {ring:#?}", ring.len());
+        }
+    }
+}
+
+#[test]
+fn the_map_fits_on_a_page() {
+    let map = fs::read_to_string(root().join("docs/ARCHITECTURE.md")).unwrap();
+    let lines = map.lines().count();
+    assert!(lines <= 80, "{lines} lines");
+    for (folder, _) in ARROWS {
+        assert!(map.contains(folder), "{folder} is not on the map");
     }
 }
 

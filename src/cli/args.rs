@@ -80,7 +80,7 @@ pub enum Command {
     #[cfg(feature = "lab")]
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
-    /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
+    /// Measure how much load this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
     #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),

@@ -4,9 +4,9 @@ use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgba, RgbaImage};
 use metachron_core::{AgentId, Resolution};
-use metachron_geometry::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
+use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, Texture, Wrap, generate};
 use metachron_render::{
-    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, Style,
+    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, Style,
 };
 use metachron_scene;
 use metachron_scene::Source;
@@ -23,7 +23,8 @@ const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 512, s
 fn draw(gpu: &Gpu, (model, texture): (&Model, &Arc<Texture>), shading: Shading) -> RgbaImage {
     let look = Look { colour: [255; 3], material: Material::Skin };
     let at = Placement { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: 1.0 };
-    let mut stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Scenery(model.clone(), at), look }], vec![]);
+    let mut stage =
+        SceneView::new(vec![Actor { id: AgentId(0), form: Form::Scenery(model.clone(), at), look }], vec![]);
     stage.paint(AgentId(0), texture);
     let camera = Camera::looking(DVec3::NEG_Y * 5.0, DVec3::ZERO, 0.3);
     stage.survey(&camera, SIZE);
@@ -44,7 +45,7 @@ fn middle(picture: &RgbaImage) -> (f64, f64) {
 #[test]
 fn a_pattern_is_seen_where_it_is_drawn_and_only_its_mean_where_it_is_not() {
     let Some(gpu) = gpu() else { return };
-    let model = Model::Mesh(Arc::new(Tom::new(&generate(Generator::Sphere, 0, 5000)).expect("a sphere")));
+    let model = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Sphere, 0, 5000)).expect("a sphere")));
     let texture = Arc::new(Pattern::Checker.texture(0.4));
     let [plain, painted] = [Shading::PerPixel, Shading::Textured].map(|s| middle(&draw(&gpu, (&model, &texture), s)));
     // squares of light 0.73 and 0.08 in turns about their mean; the light on the middle of a ball changes slowly

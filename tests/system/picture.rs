@@ -10,7 +10,8 @@ use glam::DVec3;
 use image::RgbaImage;
 use metachron_core::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
 use metachron_render::{
-    Camera, Colouring, DrawError, Gpu, GpuError, Hand, Level, Offscreen, RendererOptions, Size, Stage, States, Style,
+    Camera, Colouring, DrawError, Gpu, GpuError, Hand, Level, Offscreen, RendererOptions, SceneView, Size, States,
+    Style,
 };
 use std::path::Path;
 use std::sync::Arc;
@@ -30,13 +31,13 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
-fn draw(gpu: &Gpu, stage: &mut Stage, camera: &Camera, levels: &[Level], style: Style) -> RgbaImage {
+fn draw(gpu: &Gpu, stage: &mut SceneView, camera: &Camera, levels: &[Level], style: Style) -> RgbaImage {
     draw_with(gpu, (stage, camera), levels, style, OPTIONS)
 }
 
 fn draw_with(
     gpu: &Gpu,
-    (stage, camera): (&mut Stage, &Camera),
+    (stage, camera): (&mut SceneView, &Camera),
     levels: &[Level],
     style: Style,
     options: RendererOptions,

@@ -4,9 +4,9 @@ use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
-use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
+use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use metachron_render::{
-    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
+    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, States, Style,
 };
 use metachron_scene;
 use metachron_scene::Source;
@@ -115,7 +115,7 @@ impl Studio {
         Some(Self { offscreen, camera: Camera::looking(eye, look_at, FOV_RAD) })
     }
 
-    fn draw(&mut self, stage: &mut Stage, levels: &[Level]) -> RgbaImage {
+    fn draw(&mut self, stage: &mut SceneView, levels: &[Level]) -> RgbaImage {
         stage.survey(&self.camera, SIZE);
         let picture = stage.compose(&self.camera, levels, Style::default(), None);
         self.offscreen.render(picture, &self.camera).expect("a picture");
@@ -123,18 +123,18 @@ impl Studio {
     }
 
     /// The colours of all pixels that the objects cover.
-    fn covered(&mut self, stage: &mut Stage, levels: &[Level]) -> Vec<[u8; 4]> {
+    fn covered(&mut self, stage: &mut SceneView, levels: &[Level]) -> Vec<[u8; 4]> {
         let none: Vec<Level> = levels.iter().map(|level| Level { triangles: 0, ..*level }).collect();
         let (with, without) = (self.draw(stage, levels), self.draw(stage, &none));
         with.pixels().zip(without.pixels()).filter(|(a, b)| a != b).map(|(a, _)| a.0).collect()
     }
 }
 
-fn stage(models: &[Model], scale: f64) -> Stage {
+fn stage(models: &[Model], scale: f64) -> SceneView {
     let look = Look { colour: [230, 60, 40], material: Material::Skin };
     let at = Placement { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale };
     let actor = |(id, model): (u32, &Model)| Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look };
-    Stage::new((0..).zip(models).map(actor).collect(), vec![])
+    SceneView::new((0..).zip(models).map(actor).collect(), vec![])
 }
 
 fn level(triangles: u32, shading: Shading) -> Level {
@@ -142,7 +142,7 @@ fn level(triangles: u32, shading: Shading) -> Level {
 }
 
 fn ball(triangles: u32) -> Model {
-    Model::Mesh(Arc::new(Tom::new(&generate(Generator::Sphere, 0, triangles)).expect("a sphere")))
+    Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Sphere, 0, triangles)).expect("a sphere")))
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn flat_shading_has_at_most_one_colour_a_triangle() {
 fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
     let Some(mut studio) = Studio::new(DVec3::new(0.5, -3.0, 1.0), DVec3::new(0.5, 0.0, 0.0)) else { return };
     let look = Look { colour: [230, 60, 40], material: Material::Tissue };
-    let mut stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
+    let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
     let arc_m: Vec<f64> = (0..=20).map(|i| f64::from(i) * 0.05).collect();
     let body = Body::Curve(CurveState {
         positions: arc_m.iter().map(|&s| DVec3::new(s, 0.0, 0.2 * (5.0 * s).sin())).collect(),
@@ -210,9 +210,9 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
 #[test]
 fn a_change_of_level_that_glides_is_seen_less_from_frame_to_frame_and_ends_at_the_plain_level() {
     let Some(mut studio) = Studio::new(DVec3::new(0.5, -4.0, 1.0), DVec3::ZERO) else { return };
-    let bumps = Model::Mesh(Arc::new(Tom::new(&generate(Generator::Blob, 5, 4000)).expect("a blob")));
+    let bumps = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Blob, 5, 4000)).expect("a blob")));
     // a second mesh that stays: a twentieth of both is what the first may be drawn with beyond what was asked for
-    let crowd = Model::Mesh(Arc::new(Tom::new(&generate(Generator::Terrain, 5, 40_000)).expect("hills")));
+    let crowd = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Terrain, 5, 40_000)).expect("hills")));
     let mut stage = stage(&[bumps, crowd], 0.9);
     let levels = |triangles| [level(triangles, Shading::PerPixel), level(40_000, Shading::PerPixel)];
     for (from, to) in [(120, 900), (900, 120)] {
@@ -272,7 +272,7 @@ fn copies_of_a_mesh_at_one_count_are_one_draw() {
         form: Form::Scenery(it.model.clone(), it.at),
         look,
     });
-    let mut stage = Stage::new(actors.collect(), vec![]);
+    let mut stage = SceneView::new(actors.collect(), vec![]);
     let camera = Camera::looking(DVec3::new(-60.0, -60.0, 60.0), DVec3::new(50.0, 70.0, 0.0), 1.4);
     stage.survey(&camera, SIZE);
     let levels: Vec<Level> = scene.scenery.iter().map(|_| level(100, Shading::PerPixel)).collect();

@@ -4,7 +4,7 @@
 
 use metachron_world::{Scene, Spec};
 
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
@@ -63,7 +63,7 @@ impl Play {
 
     fn step(&mut self, dt: SimSpan) {
         for (id, name, agent) in &mut self.agents {
-            let around = Surroundings { me: *id, time: self.time, neighbours: &self.states, hands: &[], links: &[] };
+            let around = StepContext { me: *id, time: self.time, neighbours: &self.states, hands: &[], links: &[] };
             agent.step(dt, &around).unwrap_or_else(|e| panic!("{name}: {e}"));
         }
         self.time += dt;

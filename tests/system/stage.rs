@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid, ToolShape};
-use metachron_render::{Actor, Camera, Form, Level, Look, Material, Prop, Stage, States};
+use metachron_render::{Actor, Camera, Form, Level, Look, Material, SceneView, States, StaticObject};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub const TUBE: u32 = 0;
 
 /// A stage with everything posed at time zero, and a camera that shows it.
-pub fn still_life() -> (Stage, Camera) {
+pub fn still_life() -> (SceneView, Camera) {
     let look = |colour, material| Look { colour, material };
     let solid = |id, solid, look| Actor { id: AgentId(id), form: Form::Solid(solid), look };
     let tool = |id| Actor {
@@ -27,7 +27,7 @@ pub fn still_life() -> (Stage, Camera) {
         tool(4),
         tool(5),
     ];
-    let mut stage = Stage::new(actors, tray());
+    let mut stage = SceneView::new(actors, tray());
     let rigid = |position, rotation| Body::Rigid(RigidState { position, rotation, ..RigidState::default() });
     let held = folded_tube(150);
     let grip_arc_m = 0.47 * held.arc_m[150];
@@ -71,10 +71,10 @@ pub fn still_life() -> (Stage, Camera) {
 }
 
 /// The tray the tube lies in: a bottom and four walls, and the floor below.
-fn tray() -> Vec<Prop> {
+fn tray() -> Vec<StaticObject> {
     let steel = Look { colour: [74, 88, 94], material: Material::Skin };
     let (x, y, wall, high) = (0.36, 0.22, 0.008, 0.03);
-    let side = |position, half_extents_m| Prop {
+    let side = |position, half_extents_m| StaticObject {
         obstacle: Obstacle {
             name: String::from("tray"),
             solid: Solid::Box { half_extents_m },
@@ -85,7 +85,7 @@ fn tray() -> Vec<Prop> {
         },
         look: steel,
     };
-    let floor = Prop {
+    let floor = StaticObject {
         obstacle: Obstacle { solid: Solid::Plane, ..side(DVec3::new(0.0, 0.0, -0.016), DVec3::ONE).obstacle },
         look: Look { colour: [30, 58, 66], material: Material::Skin },
     };

@@ -1,12 +1,12 @@
 //! The contract of an agent: an object that advances by its own steps.
 //!
-//! In: a step length and what the agent can see of the others ([`Surroundings`]). Out: a new state and what the step took.
+//! In: a step length and what the agent can see of the others ([`StepContext`]). Out: a new state and what the step took.
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`metachron_models::conformance`].
 
 use crate::{Law, Link};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
-use metachron_geometry::Form;
+use metachron_geometry::CollisionShape;
 use std::any::Any;
 use std::sync::Arc;
 
@@ -23,21 +23,21 @@ pub trait Agent: Send {
     /// # Errors
     /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
     /// its last snapshot stays valid.
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError>;
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError>;
 
     /// Reads its surroundings before its first step, which will be one of `dt`, so that its first publication already predicts
     /// its motion for the others. No time passes.
-    fn look(&mut self, _dt: SimSpan, _around: &Surroundings<'_>) {}
+    fn look(&mut self, _dt: SimSpan, _around: &StepContext<'_>) {}
 
     /// The length of the next step where `dt` is requested: shorter next to neighbours whose motion within `dt` cannot be predicted,
     /// never longer. Executors call this before every step.
-    fn longest_step(&self, dt: SimSpan, _around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, _around: &StepContext<'_>) -> SimSpan {
         dt
     }
 
     /// Shifts the agent's own time by `by_s` seconds: later where positive, earlier where negative. Nothing else changes: stored times and
     /// scripts shift along, and no impulse is in flight to or from the agent.
-    fn rename_time(&mut self, _by_s: f64) {}
+    fn shift_clock(&mut self, _by_s: f64) {}
 
     /// The resolution that the simulation runs at; `None` for a model that has none.
     fn resolution(&self) -> Option<Resolution>;
@@ -45,7 +45,7 @@ pub trait Agent: Send {
     /// Takes the resolution nearest to `wanted` that the agent supports.
     ///
     /// Keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
-    fn retune(&mut self, wanted: Resolution);
+    fn set_resolution(&mut self, wanted: Resolution);
 
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
@@ -57,7 +57,7 @@ pub trait Agent: Send {
     fn mass_kg(&self) -> f64;
 
     /// The contact shape, constant over the agent's life; `None` where nothing can touch it.
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         None
     }
 
@@ -76,7 +76,7 @@ pub trait Agent: Send {
     fn lead(
         &mut self,
         dt: SimSpan,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         others: &mut [Companion<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
@@ -92,12 +92,12 @@ pub struct Companion<'a> {
     /// The agent.
     pub agent: &'a mut dyn Agent,
     /// The surroundings of that agent.
-    pub around: Surroundings<'a>,
+    pub around: StepContext<'a>,
 }
 
 /// The other agents and springs that an agent sees while it steps.
 #[derive(Debug, Clone, Copy)]
-pub struct Surroundings<'a> {
+pub struct StepContext<'a> {
     /// The agent that looks.
     pub me: AgentId,
     /// The agent's own time at the start of the step.
@@ -105,7 +105,7 @@ pub struct Surroundings<'a> {
     /// The agents in possible contact or grasp with this one, in either direction, and those with ledger impulses still to settle.
     pub neighbours: &'a [Neighbour],
     /// Springs of the user on this agent.
-    pub hands: &'a [Pull],
+    pub hands: &'a [AnchorSpring],
     /// Bilateral couplings with other agents.
     pub links: &'a [Link],
 }
@@ -118,7 +118,7 @@ pub struct Neighbour {
     /// Its newest published state.
     pub snapshot: Arc<Snapshot>,
     /// Its shape; `None` where the two cannot touch.
-    pub form: Option<Arc<Form>>,
+    pub form: Option<Arc<CollisionShape>>,
     /// How the two act on each other in contact.
     pub law: Law,
     /// Whether the agent that looks owns the pair ([`crate::owns`]).
@@ -139,7 +139,7 @@ impl Neighbour {
 
 /// A spring from a moving point of space to a material point of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pull {
+pub struct AnchorSpring {
     /// The agent that pulls; `None` for the user's spring.
     pub by: Option<AgentId>,
     /// The material point that is pulled.
@@ -162,7 +162,7 @@ pub fn led_s(time: SimTime, seen: SimTime) -> f64 {
     time.secs_after(seen).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> StepContext<'a> {
     /// Empty surroundings at `time`, for tests and for agents without neighbours.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
@@ -170,13 +170,13 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.
-    pub fn pulls(&self) -> impl Iterator<Item = Pull> + 'a {
+    pub fn pulls(&self) -> impl Iterator<Item = AnchorSpring> + 'a {
         let (me, time) = (self.me, self.time);
         let held = self.neighbours.iter().filter_map(move |other| {
             let Body::Tool(tool) = &other.snapshot.body else { return None };
             let grasp = tool.grasp.filter(|g| g.target == me)?;
             let age_s = led_s(time, other.snapshot.time);
-            Some(Pull {
+            Some(AnchorSpring {
                 by: Some(other.id),
                 anchor: grasp.anchor,
                 target: tool.tip + tool.velocity * age_s,

@@ -4,7 +4,7 @@
 //! has to be waited for. Never here: the step itself. Theory: docs/theory/coupling.md, eq. 7g.
 
 use super::Law;
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::Impulse;
 use metachron_core::{AgentId, Body, Bounds, GRASP_BELOW, SimSpan, ToolState};
@@ -41,7 +41,7 @@ pub fn parts(dt_s: f64) -> u32 {
 /// body that looks; what decides is the step that is wanted and not the one that is made, so that the rule stays on.
 pub fn longest_step(
     dt: SimSpan,
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     bounds: impl FnOnce() -> Bounds,
     wild: impl Fn(&Neighbour) -> bool,
 ) -> SimSpan {
@@ -59,7 +59,7 @@ pub fn longest_step(
 /// Who is held up, or makes up for it, does not count: the two are not at one time.
 pub fn no_longer(
     dt: SimSpan,
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     bounds: impl FnOnce() -> Bounds,
     most_s: impl Fn(&Neighbour) -> Option<f64>,
 ) -> SimSpan {
@@ -79,7 +79,7 @@ pub fn no_longer(
 /// at least. `way_m` is `None` of whoever does not matter.
 pub fn unhurried(
     dt: SimSpan,
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     bounds: impl FnOnce() -> Bounds,
     way_m: impl Fn(&Neighbour) -> Option<f64>,
 ) -> SimSpan {
@@ -102,7 +102,7 @@ pub fn unhurried(
 pub fn leaves_behind(
     neighbour: &Neighbour,
     (dt, step_s): (SimSpan, f64),
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     bounds: impl FnOnce() -> Option<Bounds>,
 ) -> bool {
     let behind_s = around.time.secs_after(neighbour.snapshot.time);
@@ -130,7 +130,7 @@ fn told_s(neighbour: &Neighbour) -> Option<f64> {
 pub fn is_beside(
     neighbour: &Neighbour,
     (dt, step_s): (SimSpan, f64),
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     bounds: impl FnOnce() -> Option<Bounds>,
 ) -> bool {
     // who is farther behind is not waited for until it is as near as this
@@ -161,7 +161,7 @@ pub fn carried(owner: &Neighbour, step_s: f64, sum: Impulse, carried: Impulse) -
 
 /// Whether a link by the ledger joins a neighbour to this body.
 #[must_use]
-pub fn is_linked(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub fn is_linked(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     around.links.iter().any(|link| link.other == neighbour.id && link.law == Law::Ledger)
 }
 
@@ -179,7 +179,7 @@ pub fn may_press(neighbour: &Neighbour) -> bool {
 
 /// Whether a neighbour is a tool whose drive has a say in how it moves: to whom is linked to it it is led.
 #[must_use]
-pub fn is_driven(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub fn is_driven(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     matches!(neighbour.snapshot.body, Body::Tool(_)) && !is_linked(neighbour, around)
 }
 
@@ -191,14 +191,14 @@ pub fn is_led_on(neighbour: &Neighbour) -> bool {
 
 /// Whether a neighbour bends, is driven, or moves as somebody else near here pushes it.
 #[must_use]
-pub fn has_a_say(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub fn has_a_say(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let gives = |n: &Neighbour| n.id != neighbour.id && n.snapshot.given.iter().any(|l| l.with == neighbour.id);
     bends(neighbour) || is_driven(neighbour, around) || around.neighbours.iter().any(gives)
 }
 
 /// Whether a neighbour may come near enough to a body within `bounds` to touch it in the next `dt` seconds.
 #[must_use]
-pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
+pub fn may_touch(neighbour: &Neighbour, around: &StepContext<'_>, bounds: &Bounds, dt: f64) -> bool {
     let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
     neighbour.law == Law::Ledger && !is_let_in(neighbour, around.me) && is_near(neighbour, bounds, (dt, ahead))
 }

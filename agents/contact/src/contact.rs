@@ -1,7 +1,7 @@
 //! One contact: which velocities it joins, and the conditions it puts on them (docs/theory/contact.md, eq. 1–4).
 
 use glam::DVec3;
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 
 /// Share of a penetration that a step corrects: 0.2 of the depth. More turns depth into speed: at 1 a body placed 1 cm
 /// deep leaves at 2.5 m/s with steps of 4 ms.
@@ -16,7 +16,7 @@ pub struct Contact {
     /// Its name from step to step, for the warm start; unique, and contacts are listed by rising keys.
     pub key: u64,
     /// The velocities it joins.
-    pub slots: Slots,
+    pub slots: ContactJacobian,
     /// Unit normal: away from the other body, so that a rising gap has a positive normal velocity.
     pub normal: DVec3,
     /// Distance of the surfaces, metres; below zero they overlap.
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     fn at_rest(gap_m: f64, friction: f64) -> Contact {
-        let slots = Slots::default();
+        let slots = ContactJacobian::default();
         Contact {
             key: 0,
             slots,
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn scattering_is_the_transpose_of_gathering() {
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         slots.add_linear(0, 0.25);
         slots.add_linear(2, -0.75);
         slots.add_angular(1, DVec3::new(0.1, -0.2, 0.3));

@@ -4,10 +4,10 @@
 //! step itself, pairs of which nobody else has a say ([`super::beside`]). Theory: docs/theory/coupling.md, eq. 7o.
 
 use super::beside::{SPLIT_SLACK, bends, is_linked, no_longer};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use metachron_core::PairKind;
 use metachron_core::{AgentId, Bounds, SimSpan};
-use metachron_geometry::Form;
+use metachron_geometry::CollisionShape;
 
 /// In a crowd nobody makes longer steps than this, seconds: the parts of a rigid body in contact. In longer ones what two owners give to
 /// one body changes too much from one look to the next: at 60 Hz boxes rolled off tubes and fell through cloths.
@@ -19,7 +19,7 @@ const SAME_NS: u64 = 1_000;
 
 /// A part of a step of `dt` as it may be in a crowd, where `me` and any neighbour that may be touched in it are in one; all of it elsewhere.
 /// `bounds` are those of the body that looks.
-pub fn crowded(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Bounds, me: Member) -> SimSpan {
+pub fn crowded(dt: SimSpan, around: &StepContext<'_>, bounds: impl FnOnce() -> Bounds, me: Member) -> SimSpan {
     if dt.as_secs_f64() <= PART_S * SPLIT_SLACK {
         return dt;
     }
@@ -58,7 +58,7 @@ impl Lately {
 pub struct Member {
     /// Whether it bends.
     pub bends: bool,
-    /// Whether it is thin and held ([`Form::is_hung`]).
+    /// Whether it is thin and held ([`CollisionShape::is_hung`]).
     pub hung: bool,
     /// Whether others share its world.
     pub shares: bool,
@@ -73,14 +73,14 @@ pub struct Member {
 impl Member {
     /// A body of this form that bends, which did so lately: it shares no world, and answers for what it bears by itself.
     #[must_use]
-    pub fn bent(lately: Lately, form: &Form) -> Self {
+    pub fn bent(lately: Lately, form: &CollisionShape) -> Self {
         let (hung, grounded) = (form.is_hung(), lately.is_grounded());
         Self { bends: true, hung, shares: false, lies: false, grounded, lately }
     }
 
     /// What is left of a step of `dt` whose parts it has begun to make, else all of one: who leaves a crowd keeps step with those of its
     /// rate, and what two that step together expect of each other is exact (docs/theory/soft.md, eq. 16h).
-    fn left_of(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+    fn left_of(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
         let parts = (dt.as_secs_f64() / (PART_S * SPLIT_SLACK)).ceil() as u64;
         let (part, gone) = (dt.as_nanos() / parts, around.time.as_nanos() % dt.as_nanos());
         let begun = (gone + SAME_NS) / part;
@@ -93,7 +93,7 @@ impl Member {
 /// Whether the body that looks and a neighbour that it may touch are in a crowd, one of whom at least bends: they touch each other, or have
 /// within a second, and one shares a world with others or both are on the ground, or both bend and one is hung; or they are two of three in
 /// a row.
-fn is_crowded(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> bool {
+fn is_crowded(neighbour: &Neighbour, around: &StepContext<'_>, me: Member) -> bool {
     let snapshot = &neighbour.snapshot;
     let either_bends = me.bends || bends(neighbour);
     let either_hung = me.hung || neighbour.form.as_ref().is_some_and(|form| form.is_hung());
@@ -110,7 +110,7 @@ fn is_crowded(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> b
 
 /// Whether a third one touches the body that looks or the neighbour, and the middle one of the three does not own both of its contacts: who
 /// does solves them in one. The two need not touch yet, unless the third touches both.
-fn makes_three(neighbour: &Neighbour, third: &Neighbour, around: &Surroundings<'_>) -> bool {
+fn makes_three(neighbour: &Neighbour, third: &Neighbour, around: &StepContext<'_>) -> bool {
     let is_owned = touches(neighbour, around.me);
     let around_me = touches(third, around.me) || (is_owned && has_taken(third, around));
     let around_it = touches(third, neighbour.id) || (neighbour.owned && touches(neighbour, third.id));
@@ -118,7 +118,7 @@ fn makes_three(neighbour: &Neighbour, third: &Neighbour, around: &Surroundings<'
 }
 
 /// Whether the body that looks and a neighbour touch each other, or have within a second.
-fn touch(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+fn touch(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     touches(neighbour, around.me) || has_taken(neighbour, around)
 }
 
@@ -128,7 +128,7 @@ pub(super) fn touches(neighbour: &Neighbour, other: AgentId) -> bool {
 }
 
 /// Whether a neighbour has taken what contact with the body that looks, which owns it, gave.
-fn has_taken(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+fn has_taken(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     neighbour.owned
         && !is_linked(neighbour, around)
         && neighbour.snapshot.taken.iter().any(|ledger| ledger.with == around.me)
@@ -140,7 +140,7 @@ mod tests {
     use glam::DVec3;
     use metachron_core::{Body, CurveState, RigidState, SimTime, Snapshot};
     use metachron_core::{Ledger, PairState};
-    use metachron_geometry::FormKind;
+    use metachron_geometry::ShapeKind;
     use std::sync::Arc;
 
     const ME: AgentId = AgentId(0);
@@ -161,8 +161,8 @@ mod tests {
         let taken: Vec<Ledger> = taken.iter().map(|&from| Ledger::new(AgentId(from))).collect();
         let owned = taken.iter().any(|ledger| ledger.with == ME);
         let snapshot = Arc::new(Snapshot { body, bounds, pairs, taken, ..Snapshot::default() });
-        let kind = FormKind::Chain { held_ends: 0, height_j_kg: 0.0 };
-        let form = Some(Arc::new(Form { kind, friction: 0.0, restitution: 0.0 }));
+        let kind = ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 };
+        let form = Some(Arc::new(CollisionShape { kind, friction: 0.0, restitution: 0.0 }));
         Neighbour { form, owned, step_s: 1.0 / 60.0, ..Neighbour::seen(AgentId(id), snapshot) }
     }
 
@@ -176,7 +176,7 @@ mod tests {
 
     /// Into how many parts `me` divides a step of a sixtieth of a second.
     fn parts(me: Member, neighbours: &[Neighbour]) -> u64 {
-        let around = Surroundings { neighbours, ..Surroundings::alone(ME, SimTime::ZERO) };
+        let around = StepContext { neighbours, ..StepContext::alone(ME, SimTime::ZERO) };
         let dt = SimSpan::from_secs_f64(1.0 / 60.0).unwrap();
         let bounds = || Bounds { low: DVec3::NEG_ONE, high: DVec3::ONE, speed_m_s: 0.0 };
         dt.as_nanos() / crowded(dt, &around, bounds, me).as_nanos()
@@ -254,7 +254,7 @@ mod tests {
         let left_after = |parts: u64, last_s: f64| {
             let time = SimTime::ZERO + dt + dt + SimSpan::from_nanos(parts * dt.as_nanos() / 4);
             let me = Member { lately: Lately { grounded_s: None, step_s: last_s }, ..BENT };
-            crowded(dt, &Surroundings::alone(ME, time), || unreachable!("nobody is near"), me).as_nanos() * 4
+            crowded(dt, &StepContext::alone(ME, time), || unreachable!("nobody is near"), me).as_nanos() * 4
                 / dt.as_nanos()
         };
         let left = |parts| left_after(parts, 1.0 / 240.0);

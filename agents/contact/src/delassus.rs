@@ -8,12 +8,12 @@ use glam::{DMat3, DVec3};
 
 /// W = J A⁻¹ Jᵀ (1/kg): the velocity at each contact caused by an impulse at each.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Formed {
+pub(super) struct DelassusMatrix {
     /// One block for each pair of contacts, those of one impulse in a row; empty while W is not formed.
     blocks: Vec<DMat3>,
 }
 
-impl Formed {
+impl DelassusMatrix {
     /// Forms W from three responses for each contact; `room` has one entry for each slot.
     pub fn form(&mut self, contacts: &[Contact], body: &mut impl Response, room: &mut [DVec3]) {
         self.blocks.clear();

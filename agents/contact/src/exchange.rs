@@ -6,7 +6,7 @@
 
 use super::beside::carried;
 use super::taken::Taken;
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, PairKind, PairState, Site};
@@ -54,7 +54,7 @@ impl Exchange {
     }
 
     /// Begins a step: pages turn, and the step's sums start from nothing.
-    pub fn open(&mut self, around: &Surroundings<'_>) {
+    pub fn open(&mut self, around: &StepContext<'_>) {
         self.now = around.time;
         for owned in &mut self.owned {
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
@@ -73,7 +73,7 @@ impl Exchange {
     /// was given at most: what an owner had given by the state that was read last is no news.
     pub fn take(
         &mut self,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         until: SimTime,
         mut apply: impl FnMut(AgentId, Site, Impulse, Impulse),
     ) -> f64 {
@@ -101,7 +101,7 @@ impl Exchange {
 
     /// Takes what owners give to a body as a whole as forces that go on: what each gave in its last step goes on evenly, until
     /// the next reading tells better. `apply` gets who, dJ and t dJ − dS at the step's start, and what acts over its `dt_s` seconds.
-    pub fn follow(&mut self, around: &Surroundings<'_>, dt_s: f64, mut apply: impl FnMut(AgentId, [Impulse; 3])) {
+    pub fn follow(&mut self, around: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(AgentId, [Impulse; 3])) {
         for neighbour in around.neighbours {
             let ledger = neighbour.snapshot.given.iter().find(|l| l.with == around.me && l.is_finite());
             if ledger.is_some() || self.taken.iter().any(|t| t.copy.with == neighbour.id) {
@@ -170,7 +170,7 @@ impl Exchange {
     }
 
     /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
-    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+    pub fn close(&mut self, around: &StepContext<'_>, dt_s: f64) {
         for owned in &mut self.owned {
             if !(owned.state.kind.is_penalty() || owned.state.kind == PairKind::Tlm) {
                 owned.state.force_n = owned.step_impulse.length() / dt_s;

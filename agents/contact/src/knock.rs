@@ -4,10 +4,10 @@
 //! Never here: forces; rigid bodies, who look along their own flight (`rigid/company.rs`), and tubes (`rod/company.rs`).
 
 use super::{Law, Other, WAKE_M_S};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use metachron_core::{AgentId, Bounds};
-use metachron_geometry::Placed;
-use metachron_geometry::narrow_phase::{TouchRoom, gap};
+use metachron_geometry::PlacedShape;
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
 use std::fmt;
 
 /// Who sleeps in a mover's way.
@@ -15,7 +15,7 @@ use std::fmt;
 pub struct Knock {
     on: Vec<AgentId>,
     other: Other,
-    room: TouchRoom,
+    room: NarrowPhaseScratch,
 }
 
 /// How many of its own steps a mover looks ahead: one to be seen, one to be answered.
@@ -23,7 +23,7 @@ const STEPS: f64 = 2.0;
 
 impl Knock {
     /// Finds anew who sleeps within two steps of `dt_s` seconds of one who is at `placed`, inside `bounds`; who is slow wakes nobody.
-    pub fn find(&mut self, placed: &Placed<'_>, bounds: &Bounds, (around, dt_s): (&Surroundings<'_>, f64)) {
+    pub fn find(&mut self, placed: &PlacedShape<'_>, bounds: &Bounds, (around, dt_s): (&StepContext<'_>, f64)) {
         self.on.clear();
         if bounds.speed_m_s <= WAKE_M_S {
             return;

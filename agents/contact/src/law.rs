@@ -3,7 +3,7 @@
 use super::beside::PART_MAX_S;
 use super::crowd::PART_S;
 use metachron_core::{AgentId, Anchor};
-use metachron_geometry::Form;
+use metachron_geometry::CollisionShape;
 use std::cmp::Ordering;
 
 /// How two agents act on each other where they touch.
@@ -62,16 +62,16 @@ pub struct Standing {
     pub rate_hz: f64,
     /// How many ends of a tube are held in place.
     pub held_ends: u8,
-    /// How high it starts, J/kg: see [`Form::height_j_kg`].
+    /// How high it starts, J/kg: see [`CollisionShape::height_j_kg`].
     pub height_j_kg: f32,
 }
 
 impl Standing {
     /// That of the agent `id` of a `model`, whose scene wants `rate_hz`.
     #[must_use]
-    pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&Form>) -> Self {
-        let held_ends = form.map_or(0, Form::held_ends);
-        Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, Form::height_j_kg) }
+    pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&CollisionShape>) -> Self {
+        let held_ends = form.map_or(0, CollisionShape::held_ends);
+        Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, CollisionShape::height_j_kg) }
     }
 
     fn is_led(self) -> bool {

@@ -21,7 +21,7 @@ pub mod solver;
 pub mod taken;
 pub mod tank;
 
-pub use agent::{Agent, Companion, Neighbour, Pull, Surroundings};
+pub use agent::{Agent, AnchorSpring, Companion, Neighbour, StepContext};
 pub use contact::{Contact, PUSH_OUT_SHARE};
 pub use exchange::{Exchange, acknowledged};
 pub use knock::Knock;

@@ -12,12 +12,12 @@ pub use far::Far;
 pub use mate::{Feet, Mate};
 
 use super::{Contact, Exchange, Link, Problem, Solver};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, SimSpan, Snapshot};
 use metachron_core::{Foot, Impulse, PairKind, PairState, Site};
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
-use metachron_geometry::{FormKind, Placed, Touch, View};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{PlacedShape, ShapeKind, ShapePose, Touch};
 use tanks::Tanks;
 
 /// All agents with which one body that bends shares what it owns, and the books of all its couplings.
@@ -75,7 +75,7 @@ impl Mates {
     /// coefficient of its skin.
     pub fn gather(
         &mut self,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         friction: f64,
         near: impl Fn(&Neighbour, Option<&PairState>) -> bool,
     ) {
@@ -121,7 +121,7 @@ impl Mates {
 
     /// Recalls for a step of `dt` seconds how those that are only touched moved otherwise than expected, and what they were given
     /// (docs/theory/soft.md, eq. 16f, 16g).
-    pub fn recall(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn recall(&mut self, around: &StepContext<'_>, dt: f64) {
         self.for_touched(around, |mate, exchange, tanks| {
             mate.divide(exchange, tanks, around);
             mate.recall(tanks, (around.time, dt));
@@ -129,7 +129,7 @@ impl Mates {
     }
 
     /// Recalls for a step of `dt` seconds what those that are only touched were given.
-    pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn regain(&mut self, around: &StepContext<'_>, dt: f64) {
         self.for_touched(around, |mate, exchange, tanks| {
             mate.divide(exchange, tanks, around);
             mate.regain(tanks, dt);
@@ -137,7 +137,7 @@ impl Mates {
     }
 
     /// Does `act` with each to whom no link leads.
-    fn for_touched(&mut self, around: &Surroundings<'_>, mut act: impl FnMut(&mut Mate, &Exchange, &mut Tanks)) {
+    fn for_touched(&mut self, around: &StepContext<'_>, mut act: impl FnMut(&mut Mate, &Exchange, &mut Tanks)) {
         let Self { list, count, exchange, tanks, .. } = self;
         let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));
         list[..*count].iter_mut().filter(touched).for_each(|mate| act(mate, exchange, tanks));
@@ -152,10 +152,10 @@ impl Mates {
     /// Appends the contacts with the others, whose velocities stand behind the owner's own.
     pub fn find(
         &mut self,
-        here: &Placed<'_>,
+        here: &PlacedShape<'_>,
         search: Search,
         velocities: &[DVec3],
-        (room, contacts): (&mut TouchRoom, &mut Vec<Contact>),
+        (room, contacts): (&mut NarrowPhaseScratch, &mut Vec<Contact>),
     ) {
         let Search { h_s, slack_m, speed_m_s } = search;
         for mate in &mut self.list[..self.count] {
@@ -322,7 +322,7 @@ impl Mates {
     }
 
     /// Keeps what [`Self::recall`] and [`Self::regain`] ask for in the step after one of `dt` seconds; comes after [`Self::tell`].
-    pub fn keep(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn keep(&mut self, around: &StepContext<'_>, dt: f64) {
         let end = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { list, count, tanks, .. } = self;
         list[..*count].iter_mut().for_each(|mate| mate.keep(tanks, end));
@@ -335,7 +335,7 @@ impl Mates {
     }
 
     /// Ends a step of `dt` seconds.
-    pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn close(&mut self, around: &StepContext<'_>, dt: f64) {
         self.tanks.close(dt);
         if !self.exchange.is_empty() {
             self.exchange.close(around, dt);
@@ -356,9 +356,9 @@ impl Mates {
 
 /// Drops the places of a closed skin that are more than half way through a solid and lead out of it on the side that is away from the
 /// skin's middle: pushed to both sides, a thin plate in a soft body would be given energy without end.
-fn drop_far_side(here: &Placed<'_>, there: &Placed<'_>, touches: &mut Vec<Touch>) {
-    let (FormKind::Surface(skin), View::Surface(positions)) = (&here.form.kind, here.view) else { return };
-    let (FormKind::Solid(solid), View::Solid { position, .. }) = (&there.form.kind, there.view) else { return };
+fn drop_far_side(here: &PlacedShape<'_>, there: &PlacedShape<'_>, touches: &mut Vec<Touch>) {
+    let (ShapeKind::Surface(skin), ShapePose::Surface(positions)) = (&here.form.kind, here.view) else { return };
+    let (ShapeKind::Solid(solid), ShapePose::Solid { position, .. }) = (&there.form.kind, there.view) else { return };
     let half_m = 0.5 * f64::from(solid.shape.compute_local_aabb().half_extents().min_element());
     if !skin.closed || touches.iter().all(|touch| touch.gap_m > -half_m) {
         return;
@@ -367,6 +367,6 @@ fn drop_far_side(here: &Placed<'_>, there: &Placed<'_>, touches: &mut Vec<Touch>
     touches.retain(|touch| touch.gap_m > -half_m || touch.normal.dot(towards) > 0.0);
 }
 
-fn is_linked(other: AgentId, around: &Surroundings<'_>) -> bool {
+fn is_linked(other: AgentId, around: &StepContext<'_>) -> bool {
     around.links.iter().any(|link| link.other == other)
 }

@@ -16,13 +16,13 @@ mod places;
 pub use astray::Astray;
 
 use super::Exchange;
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::{DQuat, DVec3};
 use lying::Lying;
 use metachron_core::Twist;
 use metachron_core::sprung::Lean;
 use metachron_core::{AgentId, Body, ImpulseResponse, Inertia, ToolState};
-use metachron_geometry::Form;
+use metachron_geometry::CollisionShape;
 pub(super) use motion::turned;
 use std::sync::Arc;
 
@@ -98,7 +98,7 @@ impl Other {
     pub fn meet(
         &mut self,
         neighbour: &Neighbour,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         exchange: &Exchange,
         from: Option<DVec3>,
     ) -> bool {
@@ -187,7 +187,7 @@ impl Other {
 
     /// Its shape.
     #[must_use]
-    pub fn form(&self) -> Option<&Arc<Form>> {
+    pub fn form(&self) -> Option<&Arc<CollisionShape>> {
         self.neighbour.as_ref().and_then(|n| n.form.as_ref())
     }
 
@@ -229,7 +229,7 @@ impl Other {
     }
 
     /// Wakes a body that rests if a blow is on its way to it: it only rests until it reads of that.
-    pub fn stir(&mut self, around: &Surroundings<'_>, exchange: &Exchange) {
+    pub fn stir(&mut self, around: &StepContext<'_>, exchange: &Exchange) {
         let Some(neighbour) = self.neighbour.clone().filter(|n| self.held && n.snapshot.at_rest) else { return };
         self.wake();
         self.deliver(&neighbour, around, exchange, None);
@@ -267,7 +267,7 @@ impl Other {
 }
 
 /// Whether `neighbour` is a tool that holds who looks, or is linked to them.
-fn holds_on(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+fn holds_on(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
     let linked = || around.links.iter().any(|link| link.other == neighbour.id);
     tool.grasp.is_some_and(|grasp| grasp.target == around.me) || linked()

@@ -4,7 +4,7 @@
 //! Each iteration costs one response, for any number of contacts, or none where W is formed. Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::Contact;
-use super::delassus::Formed;
+use super::delassus::DelassusMatrix;
 use glam::DVec3;
 
 /// The response of a body to impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
@@ -69,7 +69,7 @@ pub struct Solver {
     answer: Vec<DVec3>,
     /// Whether W may be formed: for bodies whose response is expensive compared with a product with the W of as many contacts.
     forms: bool,
-    formed: Formed,
+    formed: DelassusMatrix,
     /// Products that the last solve took.
     products: u32,
 }
@@ -319,7 +319,12 @@ pub fn inverse_mass(
 
 impl Iterate {
     /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
-    fn cause(&mut self, contacts: &[Contact], (formed, body): (&Formed, &mut impl Response), answer: &mut [DVec3]) {
+    fn cause(
+        &mut self,
+        contacts: &[Contact],
+        (formed, body): (&DelassusMatrix, &mut impl Response),
+        answer: &mut [DVec3],
+    ) {
         if formed.is_known() {
             return formed.times(&self.lambda, &mut self.caused);
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::DVec3;
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 
 /// Deterministic numbers in −1 … 1.
 struct Noise(u64);
@@ -52,7 +52,7 @@ const PATIENT: Settings = Settings { iterations: 5_000, tolerance_m_s: 1e-11 };
 
 fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> Vec<Contact> {
     let mut contact = |key: u32| {
-        let mut at = Slots::default();
+        let mut at = ContactJacobian::default();
         at.add_linear(key % slots, 0.7);
         at.add_linear((key + 1) % slots, 0.3);
         at.add_angular((key + 2) % slots, noise.vector() * 0.2);
@@ -213,7 +213,7 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
     let mut noise = Noise(5);
     let masses: Vec<f64> = (0..4).map(|_| 1.0 + 0.5 * noise.next()).collect();
     let mut body = Dense::diagonal(&masses.iter().map(|m| 1.0 / m).collect::<Vec<_>>());
-    let mut slots = Slots::default();
+    let mut slots = ContactJacobian::default();
     for (slot, weight) in [(0, 0.3), (1, 0.7), (2, -0.6), (3, -0.4)] {
         slots.add_linear(slot, weight);
     }
@@ -243,7 +243,7 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
     let mut body = Dense::diagonal(&[10.0; N as usize]);
     let contacts: Vec<Contact> = (0..N)
         .map(|i| {
-            let mut slots = Slots::default();
+            let mut slots = ContactJacobian::default();
             slots.add_linear(i, 1.0);
             Contact {
                 key: u64::from(i),
@@ -297,7 +297,7 @@ fn a_warm_start_saves_most_of_the_answers() {
 
 #[test]
 fn contacts_that_stay_open_cost_no_answer() {
-    let mut slots = Slots::default();
+    let mut slots = ContactJacobian::default();
     slots.add_linear(0, 1.0);
     let contacts = [Contact {
         key: 0,
@@ -319,7 +319,7 @@ fn contacts_that_stay_open_cost_no_answer() {
 #[test]
 fn an_impulse_passes_to_the_next_of_kin() {
     let mut body = Dense::diagonal(&[1.0]);
-    let mut slots = Slots::default();
+    let mut slots = ContactJacobian::default();
     slots.add_linear(0, 1.0);
     let mut solver = Solver::default();
     let mut press = |key: u64| {

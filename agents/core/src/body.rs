@@ -32,7 +32,7 @@ pub enum Body {
     Soft(SoftState),
 }
 
-/// The vertices of a soft body. What joins them never changes ([`metachron_geometry::SurfaceForm`]).
+/// The vertices of a soft body. What joins them never changes ([`metachron_geometry::SurfaceShape`]).
 #[derive(Debug, Clone, Default)]
 pub struct SoftState {
     /// Positions, metres, world axes.
@@ -103,7 +103,7 @@ pub struct Grasp {
     /// The material point grasped.
     pub anchor: Anchor,
     /// Rotational attachment between the jaws; `None` where the body may turn freely.
-    pub clasp: Option<Clasp>,
+    pub clasp: Option<GraspOrientation>,
     /// Stiffness of the attachment, N/m, > 0.
     pub stiffness_n_m: f64,
     /// Damping of the attachment, N·s/m, ≥ 0.
@@ -112,7 +112,7 @@ pub struct Grasp {
 
 /// Rotational attachment of a rigid body to jaws of length `arm_m` that press along all of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clasp {
+pub struct GraspOrientation {
     /// Rotation from the body's axes to the tool's at which the attachment exerts no torque.
     pub rotation: DQuat,
     /// The resistance to turning about every axis is that of springs and dampers of the grasp's strength at this distance, metres, ≥ 0.

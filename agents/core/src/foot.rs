@@ -3,7 +3,7 @@
 //! In: where the body was pressed in its last step. Out: whether what pushes it presses it there. Never here: how the body answers them as it lies
 //! there ([`metachron_models::rod`], [`metachron_models::soft`]). Theory: docs/theory/coupling.md, eq. 7k and 7p.
 
-use super::jacobian::Slots;
+use super::jacobian::ContactJacobian;
 use glam::DVec3;
 
 /// A foot is stiffer than the body itself there by this factor at most: it gives way by a thousandth.
@@ -13,7 +13,7 @@ const STIFFER: f64 = 1e3;
 #[derive(Debug, Clone, Copy)]
 pub struct Foot {
     /// The velocities of the body that it joins.
-    pub slots: Slots,
+    pub slots: ContactJacobian,
     /// Out of what carries it.
     pub normal: DVec3,
     /// What it gives against a motion into it or out of it, kg.
@@ -32,7 +32,7 @@ impl Stance {
     /// than what the body resists with itself there, kg.
     pub fn find(
         &mut self,
-        fixed: impl Iterator<Item = (Slots, DVec3)>,
+        fixed: impl Iterator<Item = (ContactJacobian, DVec3)>,
         carry: impl FnOnce(&mut Vec<Foot>),
         inertia: impl Fn(&Foot) -> f64,
     ) {

@@ -7,13 +7,13 @@ use glam::DVec3;
 /// A slot is a place in the array of three-dimensional velocities that the owner of the contact keeps: the velocity of a
 /// node, or the spin of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Slots {
+pub struct ContactJacobian {
     linear: [(u32, f64); 6],
     angular: [(u32, DVec3); 4],
     counts: [u8; 2],
 }
 
-impl Slots {
+impl ContactJacobian {
     /// Adds `weight` times the velocity in `slot`.
     ///
     /// # Panics

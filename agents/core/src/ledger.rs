@@ -58,7 +58,7 @@ pub struct Page {
 
 /// An impulse that acts late in the owner's newest step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coming {
+pub struct Scheduled {
     /// The earliest time at which it may be taken.
     pub due: SimTime,
     /// When it acts.
@@ -98,7 +98,7 @@ pub struct Ledger {
     /// Pages not yet acknowledged and the one in use, by rising numbers: two at most.
     pub pages: Vec<Page>,
     /// In the owner's ledger: the parts of the page in use that act late in its newest step. In a copy: the parts not yet taken.
-    pub coming: Vec<Coming>,
+    pub coming: Vec<Scheduled>,
     /// In a copy: the impulse taken beyond it.
     pub ahead: Option<Ahead>,
     /// In the owner's ledger: the force and torque on a rigid body that it expects to go on giving, N and N·m.
@@ -211,7 +211,7 @@ impl Ledger {
         let grains = SimSpan::from_secs_f64(after_s).map_or(0, |after| after.as_nanos() / GRAIN_NS);
         if grains > 0 {
             let due = time + SimSpan::from_nanos(grains * GRAIN_NS);
-            self.announce(Coming { due, acts: due, page, entry });
+            self.announce(Scheduled { due, acts: due, page, entry });
         }
     }
 
@@ -219,7 +219,7 @@ impl Ledger {
     pub fn give_late(&mut self, site: Site, time: SimTime, [acts_s, due_s]: [f64; 2], impulse: Impulse) {
         let (page, entry) = self.book(site, time, acts_s, impulse);
         let [acts, due] = [acts_s, due_s].map(|s| time + SimSpan::from_secs_f64(s).unwrap_or(SimSpan::ZERO));
-        self.announce(Coming { due, acts, page, entry });
+        self.announce(Scheduled { due, acts, page, entry });
     }
 
     /// Books on the page in use; returns its number and the booked entry.
@@ -236,8 +236,8 @@ impl Ledger {
     }
 
     /// Lists a part of a page that acts late.
-    fn announce(&mut self, part: Coming) {
-        let same = |known: &&mut Coming| {
+    fn announce(&mut self, part: Scheduled) {
+        let same = |known: &&mut Scheduled| {
             (known.due, known.acts, known.page) == (part.due, part.acts, part.page)
                 && known.entry.site == part.entry.site
         };

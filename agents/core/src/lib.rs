@@ -22,18 +22,20 @@ pub mod step_doubling;
 pub mod time;
 pub mod wave;
 
-pub use body::{Anchor, Body, Bounds, Clasp, CurveState, GRASP_BELOW, Grasp, Grip, RigidState, SoftState, ToolState};
+pub use body::{
+    Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
+};
 pub use foot::{Carried, Foot, Lies, Stance};
 pub use id::AgentId;
 pub use impulse_response::{CurveResponse, ImpulseResponse};
-pub use jacobian::Slots;
-pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
+pub use jacobian::ContactJacobian;
+pub use ledger::{Ahead, Entry, Impulse, Ledger, Page, Scheduled, Site};
 pub use pair::{PairKind, PairState};
 pub use rebound::Rebound;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
-pub use reusable_option::Rare;
+pub use reusable_option::ReusableOption;
 pub use snapshot::{HASH_START, Inertia, LiesOn, Snapshot, Stand, Tips, Upheld};
-pub use spatial::{Six, Twist};
+pub use spatial::{Mat6, Twist};
 pub use sprung::Sprung;
 pub use step::{DT_MAX_S, StepError, StepReport, check_span};
 pub use step_doubling::DRIFT_S;

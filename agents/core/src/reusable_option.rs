@@ -5,18 +5,18 @@
 
 /// An optional value. Empty, it takes two words, however large the value would be.
 #[derive(Debug, Clone)]
-pub struct Rare<T> {
+pub struct ReusableOption<T> {
     storage: Option<Box<T>>,
     is_there: bool,
 }
 
-impl<T> Default for Rare<T> {
+impl<T> Default for ReusableOption<T> {
     fn default() -> Self {
         Self { storage: None, is_there: false }
     }
 }
 
-impl<T> Rare<T> {
+impl<T> ReusableOption<T> {
     /// The value, if there is one.
     #[must_use]
     pub fn get(&self) -> Option<&T> {
@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn a_value_that_comes_again_lies_where_it_lay() {
-        let mut rare = Rare::default();
+        let mut rare = ReusableOption::default();
         assert_eq!(rare.get(), None);
         rare.set(Some([1.0; 90]));
         let coming_and_going = allocation_counter::measure(|| {

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 /// The lower half of a matrix with B rows per body.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Envelope<const B: usize> {
+pub struct SkylineCholesky<const B: usize> {
     /// First column of each row.
     first: Vec<usize>,
     /// Where each row starts in `values`.
@@ -15,7 +15,7 @@ pub struct Envelope<const B: usize> {
     values: Vec<f64>,
 }
 
-impl<const B: usize> Envelope<B> {
+impl<const B: usize> SkylineCholesky<B> {
     /// Allocates the envelope, all zero: body i is coupled to no body below `first_body[i]` ≤ i.
     pub fn shape(&mut self, first_body: &[u32]) {
         self.first.clear();
@@ -138,7 +138,7 @@ impl<const B: usize> Envelope<B> {
     }
 }
 
-impl Envelope<3> {
+impl SkylineCholesky<3> {
     /// Replaces the right side `x`, one vector per body, by the solution; the matrix must be factored.
     pub fn solve_vectors(&self, x: &mut [DVec3]) {
         for (body, row) in (0..x.len()).flat_map(|body| (0..3).map(move |axis| (body, 3 * body + axis))) {
@@ -204,7 +204,7 @@ mod tests {
     #[test]
     fn vectors_are_solved_as_numbers_are() {
         let first_body = [0, 0, 1, 0, 3];
-        let mut matrix = Envelope::<3>::default();
+        let mut matrix = SkylineCholesky::<3>::default();
         matrix.shape(&first_body);
         for (row, &first) in first_body.iter().enumerate() {
             for column in first as usize..=row {
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn the_factor_solves_its_system() {
         let first_body = [0, 0, 1, 0, 3];
-        let mut matrix = Envelope::<6>::default();
+        let mut matrix = SkylineCholesky::<6>::default();
         matrix.shape(&first_body);
         let mut full = vec![vec![0.0; 30]; 30];
         let unit = |i: usize| std::array::from_fn(|k| f64::from(u8::from(k == i)));

@@ -12,8 +12,8 @@ pub use stand::Stand;
 pub use stand::{Footprint, STANDING_M_S};
 pub use tips::Tips;
 
-use crate::{AgentId, Body, Bounds, Grip, ImpulseResponse, Rare, Resolution, SimSpan, SimTime};
-use crate::{Ledger, PairState, Rebound, Six, Sprung};
+use crate::{AgentId, Body, Bounds, Grip, ImpulseResponse, Resolution, ReusableOption, SimSpan, SimTime};
+use crate::{Ledger, Mat6, PairState, Rebound, Sprung};
 use glam::{DMat3, DQuat, DVec3};
 use std::any::Any;
 
@@ -57,19 +57,19 @@ pub struct Snapshot {
     /// Its support by a fixed solid; `None` where there is none, or not on a single level.
     pub stand: Option<Stand>,
     /// Its tipping about an edge or a corner that a fixed solid supports; none where it does not tip.
-    pub tips: Rare<Tips>,
+    pub tips: ReusableOption<Tips>,
     /// Seconds of free flight until a fixed solid may be in its way, ≥ 0; `None` where there is none soon, and where it is not
     /// reported: the body is supported, or held by others.
     pub lands_s: Option<f64>,
     /// Forces and stiffness of the springs from driven points on it; none without such springs, or where no other agent needs them.
-    pub sprung: Rare<Sprung>,
+    pub sprung: ReusableOption<Sprung>,
     /// Impulses of fixed solids in its last step: it was not in contact before, and late impulses of others may have averted them.
-    pub rebound: Rare<Rebound>,
+    pub rebound: ReusableOption<Rebound>,
     /// The agent on which it rests, where a fixed solid supports that one.
-    pub lies: Rare<LiesOn>,
+    pub lies: ReusableOption<LiesOn>,
     /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by
     /// impulses (N·s, N·m·s); none where it shares none, or where a fixed solid holds that island.
-    pub within: Rare<Six>,
+    pub within: ReusableOption<Mat6>,
     /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// Impulses given to others, in couplings that it owns.
@@ -161,7 +161,7 @@ impl Snapshot {
             && self.sprung.get().is_none_or(Sprung::is_finite)
             && self.rebound.get().is_none_or(Rebound::is_finite)
             && self.lies.get().is_none_or(LiesOn::is_finite)
-            && self.within.get().is_none_or(Six::is_finite)
+            && self.within.get().is_none_or(Mat6::is_finite)
             && self.tips.get().is_none_or(Tips::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)

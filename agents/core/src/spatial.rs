@@ -10,9 +10,9 @@ pub type Twist = [DVec3; 2];
 
 /// A matrix that maps one [`Twist`] to another, rows first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Six(pub [[f64; 6]; 6]);
+pub struct Mat6(pub [[f64; 6]; 6]);
 
-impl Six {
+impl Mat6 {
     /// The zero matrix.
     pub const ZERO: Self = Self([[0.0; 6]; 6]);
 
@@ -157,8 +157,8 @@ fn of_flat(x: [f64; 6]) -> Twist {
 mod tests {
     use super::*;
 
-    fn held() -> Six {
-        let mut whole = Six::mass(2.0, DMat3::from_diagonal(DVec3::new(0.1, 0.2, 0.3)));
+    fn held() -> Mat6 {
+        let mut whole = Mat6::mass(2.0, DMat3::from_diagonal(DVec3::new(0.1, 0.2, 0.3)));
         whole.add_point(DVec3::new(0.1, -0.2, 0.3), DMat3::IDENTITY * 40.0);
         whole.add_turning(DVec3::new(0.1, -0.2, 0.3), 0.5);
         whole
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn a_force_at_a_point_does_the_work_that_its_twist_does() {
         let (r, k) = (DVec3::new(0.3, -0.1, 0.2), 7.0);
-        let mut whole = Six::ZERO;
+        let mut whole = Mat6::ZERO;
         whole.add_point(r, DMat3::IDENTITY * k);
         let moved = [DVec3::new(1.0, 0.5, -2.0), DVec3::new(0.2, -0.4, 0.1)];
         let force = whole.times(moved);

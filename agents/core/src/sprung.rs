@@ -6,7 +6,7 @@
 //! A constant acceleration carried on through a stiff spring's period would blow up; a linear model taken implicitly over the
 //! horizon cannot, and in a balance of spring and contact it is exact.
 
-use super::spatial::{Six, Twist};
+use super::spatial::{Mat6, Twist};
 use glam::{DMat3, DVec3};
 
 /// What a body on springs publishes beside its mass: forces, and how they change, about its centre of mass in world axes.
@@ -17,9 +17,9 @@ pub struct Sprung {
     /// How fast these change because the springs' far ends are led elsewhere, N/s and N·m/s.
     pub rising: Twist,
     /// Stiffness K of all springs together.
-    pub stiffness: Six,
+    pub stiffness: Mat6,
     /// Damping C of all springs together.
-    pub damping: Six,
+    pub damping: Mat6,
     /// The acceleration of the step that led to this state, what couplings gave left out, m/s² and rad/s².
     pub past: Twist,
     /// The step by which the body goes on, seconds: it takes impulses as (M + h C + h² K)⁻¹ of that step.
@@ -31,13 +31,13 @@ pub struct Sprung {
 impl Sprung {
     /// (M + h C + h² K)⁻¹: the answer to an impulse of a body whose springs are implicit over `h` seconds (eq. 7b).
     #[must_use]
-    pub fn answer(&self, inertia: (f64, DMat3), h: f64) -> Six {
+    pub fn answer(&self, inertia: (f64, DMat3), h: f64) -> Mat6 {
         self.resistance(inertia, h).inverse()
     }
 
     /// M + h C + h² K.
-    fn resistance(&self, (inverse_mass, inverse_inertia): (f64, DMat3), h: f64) -> Six {
-        let mut whole = Six::mass(inverse_mass.recip(), inverse_inertia.inverse());
+    fn resistance(&self, (inverse_mass, inverse_inertia): (f64, DMat3), h: f64) -> Mat6 {
+        let mut whole = Mat6::mass(inverse_mass.recip(), inverse_inertia.inverse());
         whole.add(&self.damping, h);
         whole.add(&self.stiffness, h * h);
         whole
@@ -72,7 +72,7 @@ pub struct Lean {
     inertia: (f64, DMat3),
     /// The horizon of `answer`, seconds.
     horizon_s: f64,
-    answer: Six,
+    answer: Mat6,
     /// How long until the published state, seconds; below zero it is past.
     left_s: f64,
     velocity: Twist,
@@ -131,7 +131,7 @@ impl Lean {
         }
         let none = [DVec3::ZERO; 2];
         self.sprung.force = [pull.clamp_length_max(limit_n), DVec3::ZERO];
-        (self.sprung.rising, self.sprung.stiffness) = (none, Six::ZERO);
+        (self.sprung.rising, self.sprung.stiffness) = (none, Mat6::ZERO);
         (self.off, self.faster, self.fresh, self.steady) = (none, none, none, None);
         (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
     }

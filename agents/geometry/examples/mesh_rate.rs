@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p metachron-agents --example tom_rate [triangles]`
 
-use metachron_geometry::{Generator, Tom, generate};
+use metachron_geometry::{Generator, ProgressiveMesh, generate};
 use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for kind in Generator::ALL {
         let mesh = generate(kind, 1, full);
         let start = Instant::now();
-        let tom = Tom::new(&mesh)?;
+        let tom = ProgressiveMesh::new(&mesh)?;
         let build_s = start.elapsed().as_secs_f64();
         let (own, plain) = tom.bytes();
         let (least, most) = tom.range();

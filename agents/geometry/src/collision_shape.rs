@@ -1,46 +1,46 @@
 //! The shape of an agent as its peers need it for contact, and its placement.
 //!
-//! In: solids, tubes, tools, soft surfaces. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
+//! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, fixed for an agent's life and shared, and [`PlacedShape`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
 
-use super::narrow_phase::Fans;
+use super::narrow_phase::VoronoiRegions;
 use crate::{ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
 
 /// An agent's shape and skin.
 #[derive(Debug, Clone)]
-pub struct Form {
+pub struct CollisionShape {
     /// Its shape.
-    pub kind: FormKind,
+    pub kind: ShapeKind,
     /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger.
     pub restitution: f64,
 }
 
-impl Form {
+impl CollisionShape {
     /// How many ends of a tube are held in place; zero for anything else.
     #[must_use]
     pub const fn held_ends(&self) -> u8 {
-        if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
+        if let ShapeKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
     }
 
     /// Whether it is a thin soft body that is held somewhere: a hanging or stretched sheet or rope.
     #[must_use]
     pub const fn is_hung(&self) -> bool {
-        matches!(&self.kind, FormKind::Surface(SurfaceForm { held: true, closed: false, .. }))
+        matches!(&self.kind, ShapeKind::Surface(SurfaceShape { held: true, closed: false, .. }))
     }
 
     /// Whether it is deformable and held somewhere.
     #[must_use]
     pub const fn is_held(&self) -> bool {
         match &self.kind {
-            FormKind::Chain { held_ends, .. } => *held_ends > 0,
-            FormKind::Surface(surface) => surface.held,
-            FormKind::Solid(_) | FormKind::Tool(_) => false,
+            ShapeKind::Chain { held_ends, .. } => *held_ends > 0,
+            ShapeKind::Surface(surface) => surface.held,
+            ShapeKind::Solid(_) | ShapeKind::Tool(_) => false,
         }
     }
 
@@ -49,14 +49,14 @@ impl Form {
     #[must_use]
     pub const fn height_j_kg(&self) -> f32 {
         match &self.kind {
-            FormKind::Chain { height_j_kg, .. } => *height_j_kg,
-            FormKind::Surface(surface) => surface.height_j_kg,
-            FormKind::Solid(_) | FormKind::Tool(_) => 0.0,
+            ShapeKind::Chain { height_j_kg, .. } => *height_j_kg,
+            ShapeKind::Surface(surface) => surface.height_j_kg,
+            ShapeKind::Solid(_) | ShapeKind::Tool(_) => 0.0,
         }
     }
 }
 
-/// The height of a deformable at its start, J/kg ([`Form::height_j_kg`]). One that is `held` counts as high as its lowest point: a body
+/// The height of a deformable at its start, J/kg ([`CollisionShape::height_j_kg`]). One that is `held` counts as high as its lowest point: a body
 /// that it would support starts there.
 pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
     let heights = || positions.iter().map(|position| -gravity.dot(*position));
@@ -67,25 +67,25 @@ pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
 
 /// The kinds of shapes.
 #[derive(Debug, Clone)]
-pub enum FormKind {
+pub enum ShapeKind {
     /// A rigid solid.
-    Solid(SolidForm),
+    Solid(SolidShape),
     /// A tube: cone-capsules between nodes, at its own radius.
     Chain {
         /// How many of its ends are held in place, 0 … 2.
         held_ends: u8,
-        /// See [`Form::height_j_kg`].
+        /// See [`CollisionShape::height_j_kg`].
         height_j_kg: f32,
     },
     /// A tool: the placement of its parts depends on the jaw opening.
     Tool(ToolShape),
     /// The skin of a soft body: triangles and edges between vertices that move.
-    Surface(SurfaceForm),
+    Surface(SurfaceShape),
 }
 
 /// The topology of a soft body's skin; it never changes.
 #[derive(Debug, Clone)]
-pub struct SurfaceForm {
+pub struct SurfaceShape {
     /// The vertices of the skin, by rising numbers.
     pub vertices: Arc<[u32]>,
     /// Pairs of vertices of the skin.
@@ -96,19 +96,19 @@ pub struct SurfaceForm {
     pub radius_m: f64,
     /// Mean length of its edges at rest, metres.
     pub edge_m: f64,
-    /// See [`Form::height_j_kg`].
+    /// See [`CollisionShape::height_j_kg`].
     pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
     /// Whether it is held somewhere.
     pub held: bool,
     /// The neighbours of each vertex and edge.
-    pub fans: Arc<Fans>,
+    pub fans: Arc<VoronoiRegions>,
 }
 
 /// A solid as peers touch it.
 #[derive(Clone)]
-pub struct SolidForm {
+pub struct SolidShape {
     /// The solid.
     pub solid: Solid,
     /// The same for collision queries.
@@ -121,7 +121,7 @@ pub struct SolidForm {
 
 /// Placement of a form.
 #[derive(Debug, Clone, Copy)]
-pub enum View<'a> {
+pub enum ShapePose<'a> {
     /// A solid: its centre of mass and its rotation.
     Solid {
         /// Centre of mass, metres.
@@ -151,11 +151,11 @@ pub enum View<'a> {
 
 /// A form at its place.
 #[derive(Debug, Clone, Copy)]
-pub struct Placed<'a> {
+pub struct PlacedShape<'a> {
     /// The form.
-    pub form: &'a Form,
+    pub form: &'a CollisionShape,
     /// Its placement.
-    pub view: View<'a>,
+    pub view: ShapePose<'a>,
 }
 
 /// A point of a body's skin.
@@ -196,13 +196,13 @@ pub struct Touch {
     pub on_b: Place,
 }
 
-impl std::fmt::Debug for SolidForm {
+impl std::fmt::Debug for SolidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("SolidForm").field("solid", &self.solid).finish_non_exhaustive()
     }
 }
 
-impl SolidForm {
+impl SolidShape {
     /// The form of a solid with its centre of mass at `com_local`.
     ///
     /// # Errors
@@ -218,7 +218,7 @@ impl SolidForm {
 impl Place {
     /// Adds `sign` times the velocity of this point to the sum in `slots`. The body's slots begin at `base`: the velocity of its centre
     /// and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
-    pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
+    pub fn join(&self, slots: &mut ContactJacobian, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
         match *self {
             Self::Point(point) => {
                 slots.add_linear(base, sign);

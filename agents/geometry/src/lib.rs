@@ -24,7 +24,9 @@ pub mod tool;
 pub mod topology;
 
 pub use closest_points::{near_segments, near_triangle};
-pub use collision_shape::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View, height_j_kg};
+pub use collision_shape::{
+    CollisionShape, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch, height_j_kg,
+};
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
 pub use geodesic::geodesic_edges;
@@ -33,7 +35,7 @@ pub use model::{Extent, Model, Placement, proxy};
 pub use parry_shapes::ShapeError;
 pub use parry_shapes::{Triangles, bounds, hull_triangles, mesh_triangles};
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
-pub use progressive_mesh::{Cut, Tom, TomError};
+pub use progressive_mesh::{Cut, ProgressiveMesh, ProgressiveMeshError};
 pub use render_curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
 pub use solid::{Obstacle, Solid};
 pub use spatial_hash::Grid;

@@ -3,7 +3,7 @@
 //! In: meshes and foliage with their placements. Out: counts, a bounding ball of each, a coarse mesh of all. Never here: appearance, the
 //! GPU.
 
-use super::{Foliage, PrimitiveMesh, PrimitiveVertex, Rung, Tom, TomError, hull_mesh};
+use super::{Foliage, PrimitiveMesh, PrimitiveVertex, ProgressiveMesh, ProgressiveMeshError, Rung, hull_mesh};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone)]
 pub enum Model {
     /// A mesh of any number of triangles.
-    Mesh(Arc<Tom>),
+    Mesh(Arc<ProgressiveMesh>),
     /// Foliage: pieces in rungs.
     Foliage(Arc<Foliage>),
 }
@@ -117,8 +117,12 @@ const RICHER: u32 = 8;
 /// One mesh of at most `triangles` triangles for all `parts`, made of coarse meshes of each, in coordinates about `origin`.
 ///
 /// # Errors
-/// [`TomError`] where the parts have no triangle that can be drawn.
-pub fn proxy(parts: &[(Model, Placement)], origin: DVec3, triangles: u32) -> Result<Tom, TomError> {
+/// [`ProgressiveMeshError`] where the parts have no triangle that can be drawn.
+pub fn proxy(
+    parts: &[(Model, Placement)],
+    origin: DVec3,
+    triangles: u32,
+) -> Result<ProgressiveMesh, ProgressiveMeshError> {
     let share = (RICHER * triangles).div_ceil(parts.len().max(1) as u32).max(4);
     let mut mesh = PrimitiveMesh::default();
     for (model, at) in parts {
@@ -131,7 +135,7 @@ pub fn proxy(parts: &[(Model, Placement)], origin: DVec3, triangles: u32) -> Res
         }));
         mesh.triangles.extend(own.triangles.iter().map(|t| t.map(|i| first + i)));
     }
-    Ok(Tom::new(&mesh)?.truncated(triangles))
+    Ok(ProgressiveMesh::new(&mesh)?.truncated(triangles))
 }
 
 #[cfg(test)]
@@ -140,7 +144,7 @@ mod tests {
     use crate::{Generator, TreeSpec, generate, tree};
 
     fn ball() -> Model {
-        Model::Mesh(Arc::new(Tom::new(&generate(Generator::Sphere, 0, 500)).unwrap()))
+        Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Sphere, 0, 500)).unwrap()))
     }
 
     #[test]

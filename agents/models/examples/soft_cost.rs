@@ -1,7 +1,7 @@
 //! What does a step of a soft body cost, by its vertices and the work it reports? CSV on standard output.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
@@ -37,7 +37,7 @@ fn measure(shape: SoftShape) {
     })
     .expect("sound numbers");
     let dt = SimSpan::from_nanos(4_000_000);
-    let mut step = || body.step(dt, &Surroundings::alone(AgentId(0), SimTime::ZERO)).expect("a step");
+    let mut step = || body.step(dt, &StepContext::alone(AgentId(0), SimTime::ZERO)).expect("a step");
     let (mut count, mut work) = (0, step().work);
     let start = Instant::now();
     while start.elapsed().as_secs_f64() < SECONDS || count < 3 {

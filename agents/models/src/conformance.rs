@@ -21,7 +21,7 @@
 //! ```
 
 use glam::DVec3;
-use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, DT_MAX_S, HASH_START, Resolution, SimSpan, SimTime, Snapshot, StepError};
 
 mod bits;
@@ -50,9 +50,9 @@ pub struct Suite<'a> {
     /// The agent's neighbours.
     pub neighbours: Vec<Neighbour>,
     /// A moderate pull, if the agent can be pulled.
-    pub pull: Option<Pull>,
+    pub pull: Option<AnchorSpring>,
     /// Pulls so large that the state may stop being finite.
-    pub absurd: Vec<Pull>,
+    pub absurd: Vec<AnchorSpring>,
     /// A closed form: the agent's deviation from it after t seconds, and the deviation allowed.
     pub closed_form: Option<(Deviation<'a>, f64)>,
     /// Resolutions to retune through, from coarse to fine and back. Where none are given, a request for the present resolution (or for
@@ -71,7 +71,7 @@ pub enum Promise {
     ExactTime,
     /// A refused step leaves the state bit for bit.
     RefusedSpan,
-    /// `retune` keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
+    /// `set_resolution` keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
     Retune,
     /// At a converged state a finer ε does not leave a larger residual (within 10 %).
     Residual,
@@ -122,7 +122,7 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     let promises = [
         (Promise::ExactTime, form::exact_time as fn(&Suite<'_>) -> Result<(), String>),
         (Promise::RefusedSpan, bits::refused_span),
-        (Promise::Retune, form::retune),
+        (Promise::Retune, form::set_resolution),
         (Promise::Residual, form::residual),
         (Promise::SameBits, bits::same_bits),
         (Promise::Allocation, bits::allocation),
@@ -143,15 +143,15 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn step(&mut self, dt: SimSpan, hands: &[Pull]) -> Result<(), StepError> {
-        let around = Surroundings { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
+    fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
+        let around = StepContext { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
         self.agent.step(dt, &around)?;
         self.time += dt;
         Ok(())
     }
 
     /// A step that must succeed.
-    fn must_step(&mut self, dt: SimSpan, hands: &[Pull]) -> Result<(), String> {
+    fn must_step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), String> {
         self.step(dt, hands).map_err(|error| format!("a good step at {} s failed: {error}", self.time.as_secs_f64()))
     }
 

@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec3};
 use metachron_contact::audit::{Member, settled};
-use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Law, Link, Standing, acknowledged, keep_step, owns};
 use metachron_core::Impulse;
 use metachron_core::{AgentId, Inertia, RigidState, SimSpan, SimTime, Snapshot};
@@ -44,7 +44,7 @@ struct Actor {
     published: Vec<Arc<Snapshot>>,
     /// When the step to the newest of these began.
     begun: Option<SimTime>,
-    hands: Vec<Pull>,
+    hands: Vec<AnchorSpring>,
     links: Vec<Link>,
 }
 
@@ -103,7 +103,7 @@ impl Stage {
         self.laws.push((a, b, law));
     }
 
-    pub(crate) fn hold(&mut self, id: AgentId, hand: Pull) {
+    pub(crate) fn hold(&mut self, id: AgentId, hand: AnchorSpring) {
         self.actors[id.0 as usize].hands.push(hand);
     }
 
@@ -170,7 +170,7 @@ impl Stage {
             let neighbours: Vec<_> =
                 (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(me, AgentId(j as u32))).collect();
             let Actor { agent, time, hands, links, published, .. } = &mut self.actors[i];
-            agent.look(dt, &Surroundings { me, time: *time, neighbours: &neighbours, hands, links });
+            agent.look(dt, &StepContext { me, time: *time, neighbours: &neighbours, hands, links });
             let mut snapshot = Snapshot::default();
             agent.write_snapshot(&mut snapshot);
             published.push(Arc::new(snapshot));
@@ -186,7 +186,7 @@ impl Stage {
         let lost = self.random() < self.faults.loss;
         let actor = &mut self.actors[i];
         let around =
-            Surroundings { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+            StepContext { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
         let wanted = dt;
         let dt = actor.agent.longest_step(wanted, &around);
         actor.agent.step(dt, &around).expect("a step that succeeds");

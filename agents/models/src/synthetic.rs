@@ -4,7 +4,7 @@
 //! Never here: a clock. A step burns its cost in arithmetic, so its microseconds are nominal: see [`Synthetic`].
 
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, check_span};
 
 /// A synthetic agent: cost per step = `cost_us · (eps_ref / ε)^cost_order`, error = `error_m · (ε / eps_ref)^error_order`,
@@ -120,7 +120,7 @@ impl Agent for Synthetic {
     }
 
     /// Burns its cost and counts the step.
-    fn step(&mut self, dt: SimSpan, _around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, _around: &StepContext<'_>) -> Result<StepReport, StepError> {
         check_span(dt)?;
         if self.burns {
             self.burn();
@@ -133,7 +133,7 @@ impl Agent for Synthetic {
         Some(self.held)
     }
 
-    fn retune(&mut self, wanted: Resolution) {
+    fn set_resolution(&mut self, wanted: Resolution) {
         self.held = self.range.clamp(wanted);
     }
 
@@ -172,8 +172,8 @@ mod tests {
     fn refining_fourfold_costs_fourfold_and_errs_a_sixteenth() {
         let mut agent = Synthetic::new(SPEC, RANGE, at(1.0)).unwrap();
         assert_eq!((agent.cost_us(), agent.error_m()), (10.0, 1e-3));
-        agent.retune(at(0.01));
-        let report = agent.step(SimSpan::from_nanos(1), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+        agent.set_resolution(at(0.01));
+        let report = agent.step(SimSpan::from_nanos(1), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
         assert_eq!((report.work, agent.error_m()), (40.0, 1e-3 / 16.0));
         assert_eq!(agent.resolution(), Some(at(0.01)));
     }

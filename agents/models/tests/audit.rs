@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_contact::audit::*;
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Ledger, RigidState, SimSpan, SimTime, Site, Snapshot};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 
@@ -73,7 +73,7 @@ fn swung() -> Tube {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let section = Section::hollow(0.015, 0.002, material);
     let mut tube = Tube::new(TubeSpec::free(vec![DVec3::ZERO, DVec3::X], section, 12)).unwrap();
-    let hand = Pull {
+    let hand = AnchorSpring {
         by: None,
         anchor: Anchor::Arc(0.8),
         target: DVec3::new(1.0, 0.7, 0.4),
@@ -82,7 +82,7 @@ fn swung() -> Tube {
         damping_n_s_m: 0.0,
     };
     for k in 0..40 {
-        let around = Surroundings { hands: &[hand], ..Surroundings::alone(AgentId(0), at(0.004 * f64::from(k))) };
+        let around = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), at(0.004 * f64::from(k))) };
         tube.step(SimSpan::from_secs_f64(0.004).unwrap(), &around).unwrap();
     }
     tube

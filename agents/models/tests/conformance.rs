@@ -1,7 +1,7 @@
 //! Every model against the promises of an agent (`metachron_models::conformance`).
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, Pull};
+use metachron_contact::{Agent, AnchorSpring, Neighbour};
 use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange, SimSpan, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::conformance::fall_deviation;
@@ -23,12 +23,12 @@ fn count(work: &mut dyn FnMut()) -> u64 {
     allocation_counter::measure(work).count_total
 }
 
-fn hand(anchor: Anchor, target: DVec3) -> Pull {
-    Pull { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m: 50.0, damping_n_s_m: 0.5 }
+fn hand(anchor: Anchor, target: DVec3) -> AnchorSpring {
+    AnchorSpring { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m: 50.0, damping_n_s_m: 0.5 }
 }
 
 /// Hands that no state survives.
-fn absurd(anchor: Anchor) -> Vec<Pull> {
+fn absurd(anchor: Anchor) -> Vec<AnchorSpring> {
     [DVec3::NAN, DVec3::INFINITY, DVec3::splat(1e300), DVec3::splat(-f64::MAX)]
         .map(|target| hand(anchor, target))
         .to_vec()

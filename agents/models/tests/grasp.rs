@@ -1,7 +1,7 @@
 //! A tool and a tube, each seeing only what the other last published: grasp, drag, feel, let go.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, ToolState};
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
@@ -61,7 +61,7 @@ impl Pair {
         for _ in 0..(seconds / DT.as_secs_f64()).round() as u32 {
             let tube = [Neighbour::seen(TUBE, Self::published(&self.tube, self.time))];
             let tool = [Neighbour::seen(TOOL, Self::published(&self.tool, self.time))];
-            let around = |me, neighbours| Surroundings { neighbours, ..Surroundings::alone(me, self.time) };
+            let around = |me, neighbours| StepContext { neighbours, ..StepContext::alone(me, self.time) };
             self.rested = self.tube.step(DT, &around(TUBE, &tool)).unwrap().at_rest;
             self.tool.step(DT, &around(TOOL, &tube)).unwrap();
             self.time += DT;

@@ -5,7 +5,7 @@
 use super::output::BadInput;
 use anyhow::Context;
 use metachron_lod::control::Law;
-use metachron_lod::tune::Contender;
+use metachron_lod::tune::Candidate;
 use std::path::Path;
 
 /// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
@@ -37,7 +37,7 @@ const LAWS: [(&str, &[&str]); 5] = [
 ];
 
 /// The contender given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
-pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
+pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
     let (mut law, mut given) = (None, Vec::new());
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
         let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain is NAME=NUMBER"))?;
@@ -66,7 +66,7 @@ pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
     contender(law, &|name| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v), target_hz)
 }
 
-fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Contender> {
+fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Candidate> {
     let gain = |shown: &str, name: &str, own: f64, range: (f64, f64)| {
         let gain = value(name).unwrap_or(own);
         inside(shown, gain, range).map(|()| gain)
@@ -79,7 +79,7 @@ fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> 
             let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
             Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
         }
-        "adaptive" => Contender::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
+        "adaptive" => Candidate::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
         _ => Law::Corrected {
             kappa: gain("κ", "kappa", 0.5, Law::KAPPA)?,
             lead: gain("λ", "lead", lead, Law::LEAD)?,
@@ -117,16 +117,16 @@ fn refused(text: &str, why: &str) -> anyhow::Error {
 }
 
 /// The gains in one line.
-pub fn told(contender: Contender) -> String {
+pub fn told(contender: Candidate) -> String {
     match contender {
-        Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
-        Contender::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
+        Candidate::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
+        Candidate::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
             format!("κ = {kappa:.3}, margin = {margin:.3}")
         }
-        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+        Candidate::Feedback(Law::Corrected { kappa, lead, margin }) => {
             format!("κ = {kappa:.3}, λ = {lead:.3}, margin = {margin:.3}")
         }
-        Contender::Adaptive { margin } => format!("margin = {margin:.3}"),
+        Candidate::Adaptive { margin } => format!("margin = {margin:.3}"),
     }
 }
 
@@ -201,7 +201,7 @@ mod tests {
         assert_eq!(read("k=0.06"), Law::Printed { alpha: 0.002, beta: 5.0 }.into());
         assert_eq!(read("kappa=0.25"), Law::Corrected { kappa: 0.25, lead: 0.0, margin: 0.1 }.into());
         assert_eq!(read("law=pi,κ=0.25"), Law::Corrected { kappa: 0.25, lead: 0.2, margin: 0.1 }.into());
-        assert_eq!(read("law=adaptive,margin=0.05"), Contender::Adaptive { margin: 0.05 });
+        assert_eq!(read("law=adaptive,margin=0.05"), Candidate::Adaptive { margin: 0.05 });
         assert_eq!(read("law=printed"), Law::PRINTED.into());
         assert_eq!(read("law=corrected"), Law::CORRECTED.into());
     }

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, SimTime};
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
@@ -26,7 +26,7 @@ fn tube(segments: usize) -> Tube {
 fn step_tube(c: &mut Criterion) {
     let mut group = c.benchmark_group("rod/step");
     let dt = SimSpan::from_nanos(5_000_000);
-    let around = Surroundings { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    let around = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
     for segments in [16_usize, 64, 256] {
         let mut tube = tube(segments);
         group.throughput(Throughput::Elements(segments as u64));

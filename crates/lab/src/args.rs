@@ -114,7 +114,7 @@ pub struct FitArgs {
 /// `chart`.
 #[derive(Debug, Args)]
 pub struct ChartArgs {
-    /// What to chart
+    /// Subject to chart
     pub subject: Subject,
     /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
@@ -139,7 +139,7 @@ pub struct ChartArgs {
 /// `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// What to measure
+    /// Subject to measure
     pub subject: BenchSubject,
     /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "bench", value_hint = ValueHint::DirPath)]
@@ -187,7 +187,7 @@ pub enum BenchSubject {
 pub enum Subject {
     /// Error of each method against an independent answer, and its cost, next to the points of other engines
     Accuracy,
-    /// How cost grows with segments, contacts and agents, and how far it is from what the machine could do
+    /// How cost grows with segments, contacts and agents, and how far it is from the limit of the machine
     Scaling,
     /// Where integrators and couplings blow up, and where they are bounded but wrong
     Stability,

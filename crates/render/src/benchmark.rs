@@ -8,11 +8,11 @@ use super::draw::RendererOptions;
 use super::level::{Level, Shading};
 use super::offscreen::{Gpu, GpuError, Offscreen};
 use super::picture::Style;
-use super::scene_view::{Actor, Form, Look, Material, Stage, States};
+use super::scene_view::{Actor, Form, Look, Material, SceneView, States};
 use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Resolution, SimTime};
-use metachron_geometry::{Generator, Model, Pattern, Placement, Tom, generate};
+use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, generate};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -84,7 +84,7 @@ pub fn benchmark_left(areas_px: &[f64], known: usize) -> f64 {
 /// # Errors
 /// As [`Offscreen::new`] and [`Offscreen::render`].
 pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: usize) -> Result<Vec<Drawn>, GpuError> {
-    let Ok(ball) = Tom::new(&generate(Generator::Sphere, 0, TRIANGLES[TRIANGLES.len() - 1])) else {
+    let Ok(ball) = ProgressiveMesh::new(&generate(Generator::Sphere, 0, TRIANGLES[TRIANGLES.len() - 1])) else {
         return Ok(Vec::new());
     };
     let ball = Arc::new(ball);
@@ -113,7 +113,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
 
 /// A picture without an object.
 fn empty(screen: &mut Offscreen) -> Result<Drawn, GpuError> {
-    let seconds = median(screen, &mut Stage::new(Vec::new(), Vec::new()), 1.0, &[])?;
+    let seconds = median(screen, &mut SceneView::new(Vec::new(), Vec::new()), 1.0, &[])?;
     let (picture_px, shading) = (screen.size().pixels(), Shading::PerPixel);
     Ok(Drawn { picture_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
 }
@@ -132,7 +132,7 @@ fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
 
 fn measure(
     screen: &mut Offscreen,
-    ball: &Arc<Tom>,
+    ball: &Arc<ProgressiveMesh>,
     (shading, triangles, pixels): (Shading, u32, f64),
 ) -> Result<Drawn, GpuError> {
     let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
@@ -148,12 +148,12 @@ fn measure(
 }
 
 /// Pixels that the first ball covers.
-fn seen_pixels(stage: &mut Stage, distance_m: f64) -> f64 {
+fn seen_pixels(stage: &mut SceneView, distance_m: f64) -> f64 {
     stage.survey(&camera(distance_m), SIZE);
     stage.seen().first().map_or(0.0, |seen| seen.pixels)
 }
 
-fn median(screen: &mut Offscreen, stage: &mut Stage, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
+fn median(screen: &mut Offscreen, stage: &mut SceneView, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
     let (camera, mut times) = (camera(distance_m), Vec::with_capacity(DRAWINGS));
     let mut draw = || -> Result<f64, GpuError> {
         let started = Instant::now();
@@ -175,14 +175,14 @@ fn camera(distance_m: f64) -> Camera {
 }
 
 /// A square of balls across the view, with or without a pattern on them.
-fn balls(ball: &Arc<Tom>, side: u32, painted: bool) -> Stage {
+fn balls(ball: &Arc<ProgressiveMesh>, side: u32, painted: bool) -> SceneView {
     let look = Look { colour: [200, 120, 100], material: Material::Plastic };
     let model = Model::Mesh(Arc::clone(ball));
     let actor = |id| {
         let at = Placement { position: place(id, side), rotation: DQuat::IDENTITY, scale: RADIUS_M };
         Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look }
     };
-    let mut stage = Stage::new((0..side * side).map(actor).collect(), Vec::new());
+    let mut stage = SceneView::new((0..side * side).map(actor).collect(), Vec::new());
     if painted {
         let texture = Arc::new(Pattern::Checker.texture(RADIUS_M as f32));
         (0..side * side).for_each(|id| stage.paint(AgentId(id), &texture));

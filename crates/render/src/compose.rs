@@ -1,6 +1,6 @@
 //! Composes the picture: every visible object at its requested level, as flat arrays.
 //!
-//! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
+//! In: a posed and surveyed [`SceneView`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
 //! An object outside the view is in the picture where it may shade a visible one: for its shadow only.
 
 use super::instances::{Solids, add_prop, add_solid, kind, sort_solids};
@@ -10,7 +10,7 @@ use super::picture::{
     Colouring, MeshKey, Picture, SkinSample, SolidInstance, Style, TubeRun, age_colour, detail_colour,
     resolution_colour,
 };
-use super::scene_view::{Form, Look, Material, Stage, Track};
+use super::scene_view::{Form, Look, Material, SceneView, Track};
 use super::skin::{ROPE_LEVEL, SkinRoom, SkinWish, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
@@ -50,7 +50,7 @@ pub(super) struct Scratch {
     skins: SkinRoom,
 }
 
-impl Stage {
+impl SceneView {
     /// The picture of the last composition.
     #[must_use]
     pub fn picture(&self) -> &Picture {
@@ -331,9 +331,9 @@ mod tests {
         Arc::new(Snapshot { time: SimTime::from_nanos(ms * 1_000_000), steps: ms, body, ..Snapshot::default() })
     }
 
-    fn stage() -> (Stage, Camera) {
+    fn stage() -> (SceneView, Camera) {
         let look = Look { colour: [220, 120, 110], material: Material::Tissue };
-        let stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
+        let stage = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
         (stage, Camera::looking(DVec3::new(0.2, -1.0, 0.5), DVec3::new(0.2, 0.0, 0.0), 0.7))
     }
 

@@ -6,7 +6,7 @@ use super::compose::{Paint, instance, level, tint};
 use super::level::{Level, Shading};
 use super::lod_transition::{Allowance, Glide};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
-use super::scene_view::{Actor, Form, Material, PropShape, Stage, Track};
+use super::scene_view::{Actor, Form, Material, PropShape, SceneView, Track};
 use glam::{DVec3, Vec3};
 use metachron_core::{Body, ToolState};
 use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
@@ -23,7 +23,7 @@ const GLIDE_SHARE: f64 = 0.05;
 /// Solids by kind, before sorting.
 pub(super) type Solids = Vec<(SolidKind, SolidInstance)>;
 
-impl Stage {
+impl SceneView {
     /// Lets meshes change their cut over this many frames from now on; 0 (the initial value) and 1 are immediate.
     ///
     /// A coarsening mesh then has more triangles than requested until its morph ends; the excess is at most a twentieth of all meshes'

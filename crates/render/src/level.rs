@@ -1,6 +1,6 @@
 //! The level of detail of one actor and its shading.
 //!
-//! In: a policy's decision. Out: numbers at which [`crate::Stage::compose`] draws. Never here: the choice of the level.
+//! In: a policy's decision. Out: numbers at which [`crate::SceneView::compose`] draws. Never here: the choice of the level.
 
 use metachron_core::{N_MAX, Resolution};
 

@@ -1,8 +1,8 @@
 //! Draws the newest states (wgpu) and the panels around them (egui). Reads snapshots, never the runtime.
 //!
-//! A frame: [`Stage::see`] receives the newest snapshots, [`Stage::pose`] poses them at the frame's time, [`Stage::survey`] finds which
-//! actors are visible and how large, [`Stage::compose`] makes the [`Picture`] at the requested levels, [`Renderer::render`] draws it.
-//! [`Stage`] needs no GPU; [`Offscreen`] needs no window.
+//! A frame: [`SceneView::see`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`] finds which
+//! actors are visible and how large, [`SceneView::compose`] makes the [`Picture`] at the requested levels, [`Renderer::render`] draws it.
+//! [`SceneView`] needs no GPU; [`Offscreen`] needs no window.
 #[cfg(feature = "gpu")]
 mod benchmark;
 mod compose;
@@ -37,7 +37,7 @@ pub use level::{Level, Shading};
 pub use offscreen::{Gpu, GpuError, Lost, Offscreen, PictureFile};
 pub use pick::Hit;
 pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
-pub use scene_view::{Actor, Form, Look, Material, Prop, Stage, States};
+pub use scene_view::{Actor, Form, Look, Material, SceneView, States, StaticObject};
 pub use skin::{ROPE_LEVEL, SkinRun, Skins};
 pub use view::{Camera, Frustum, Ray, Size};
 pub use visibility::Seen;

@@ -7,7 +7,7 @@
 //! more triangles than requested until its morph ends, as long as the frame's allowance lasts; without allowance it jumps.
 
 use super::picture::MeshKey;
-use metachron_geometry::{Cut, Tom};
+use metachron_geometry::{Cut, ProgressiveMesh};
 
 /// Limits on morphs in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ pub(super) struct Glide {
 
 impl Glide {
     /// At rest at the cut for `triangles`.
-    pub fn at(tom: &Tom, triangles: u32) -> Self {
+    pub fn at(tom: &ProgressiveMesh, triangles: u32) -> Self {
         Self::resting(triangles, tom.cut(triangles))
     }
 
@@ -43,7 +43,7 @@ impl Glide {
     }
 
     /// Advances by one frame towards the cut for `triangles`.
-    pub fn advance(&mut self, tom: &Tom, triangles: u32, allowance: &mut Allowance) {
+    pub fn advance(&mut self, tom: &ProgressiveMesh, triangles: u32, allowance: &mut Allowance) {
         if triangles != self.asked {
             self.asked = triangles;
             self.aim(tom.cut(triangles));
@@ -89,8 +89,8 @@ mod tests {
     use super::*;
     use metachron_geometry::{Generator, generate};
 
-    fn tom() -> Tom {
-        Tom::new(&generate(Generator::Blob, 1, 2000)).unwrap()
+    fn tom() -> ProgressiveMesh {
+        ProgressiveMesh::new(&generate(Generator::Blob, 1, 2000)).unwrap()
     }
 
     fn drawn(glide: &Glide) -> (u32, f32) {
@@ -101,7 +101,7 @@ mod tests {
     }
 
     /// The cuts drawn frame by frame while `asked` is constant, with an allowance of `triangles` per frame.
-    fn frames(glide: &mut Glide, tom: &Tom, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
+    fn frames(glide: &mut Glide, tom: &ProgressiveMesh, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
         let frame = |_| {
             glide.advance(tom, asked, &mut Allowance { step: 0.25, triangles });
             drawn(glide)

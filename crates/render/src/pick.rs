@@ -2,11 +2,11 @@
 //!
 //! In: a ray. Out: an object and its material point. Never here: the action on it.
 
-use super::scene_view::{Form, Stage, Track};
+use super::scene_view::{Form, SceneView, Track};
 use super::view::Ray;
 use glam::{DQuat, DVec3, Vec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, SoftState, ToolState};
-use metachron_geometry::SurfaceForm;
+use metachron_geometry::SurfaceShape;
 use metachron_geometry::{Primitive, PrimitiveMesh, Rounding, Solid, ToolShape};
 
 /// The hit of a ray.
@@ -27,7 +27,7 @@ const PICK_LEVEL: u8 = 3;
 /// Radius for picking a tool, as a multiple of its shaft's: tools are thin.
 const TOOL_GRIP: f64 = 3.0;
 
-impl Stage {
+impl SceneView {
     /// The nearest object along `ray`, if there is one. Props are not picked.
     #[must_use]
     pub fn pick(&self, ray: Ray) -> Option<Hit> {
@@ -94,7 +94,7 @@ fn hit_curve(curve: &CurveState, ray: Ray) -> Option<(Anchor, f64)> {
 }
 
 /// The nearest triangle of a skin along the ray, hit from either side, and its vertex nearest to the hit.
-fn hit_skin(form: &SurfaceForm, soft: &SoftState, ray: Ray) -> Option<(Anchor, f64)> {
+fn hit_skin(form: &SurfaceShape, soft: &SoftState, ray: Ray) -> Option<(Anchor, f64)> {
     let hits = form.triangles.iter().filter_map(|triangle| {
         let corners = triangle.map(|vertex| soft.positions[vertex as usize]);
         let [a, b, c] = corners;
@@ -159,12 +159,12 @@ mod tests {
     use metachron_core::{RigidState, SimTime, Snapshot};
     use std::sync::Arc;
 
-    fn stage(forms: Vec<(Form, Body)>) -> Stage {
+    fn stage(forms: Vec<(Form, Body)>) -> SceneView {
         let look = Look { colour: [200; 3], material: Material::Plastic };
         let ids = 0..forms.len() as u32;
         let actors =
             forms.iter().zip(ids).map(|((form, _), id)| Actor { id: AgentId(id), form: form.clone(), look }).collect();
-        let mut stage = Stage::new(actors, vec![]);
+        let mut stage = SceneView::new(actors, vec![]);
         for (id, (_, body)) in forms.into_iter().enumerate() {
             stage.see(AgentId(id as u32), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
         }

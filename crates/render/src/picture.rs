@@ -1,6 +1,6 @@
 //! A picture before drawing: flat arrays that a renderer uploads unchanged.
 //!
-//! In: the output of [`crate::Stage`]. Out: the input of [`crate::Renderer`]. Never here: snapshots, the GPU.
+//! In: the output of [`crate::SceneView`]. Out: the input of [`crate::Renderer`]. Never here: snapshots, the GPU.
 //! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its precision.
 
 use super::level::Shading;

@@ -11,7 +11,7 @@ use super::view::{Camera, Size};
 use super::visibility::Seen;
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
-use metachron_geometry::SurfaceForm;
+use metachron_geometry::SurfaceShape;
 use metachron_geometry::{
     Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
 };
@@ -66,7 +66,7 @@ pub enum Form {
     /// Static geometry without snapshots; its level gives the number of triangles.
     Scenery(Model, Placement),
     /// The skin of a sheet or soft solid.
-    Skin(SurfaceForm),
+    Skin(SurfaceShape),
     /// A rope.
     Rope {
         /// Its radius, metres.
@@ -87,7 +87,7 @@ pub struct Actor {
 
 /// A visible static solid. The first plane among the props is the floor.
 #[derive(Debug, Clone)]
-pub struct Prop {
+pub struct StaticObject {
     /// Shape and pose.
     pub obstacle: Obstacle,
     /// Its colour and material.
@@ -96,7 +96,7 @@ pub struct Prop {
 
 /// All objects that can be drawn, and their states at the time of a frame.
 #[derive(Debug, Default)]
-pub struct Stage {
+pub struct SceneView {
     pub(super) tracks: Vec<Track>,
     pub(super) props: Vec<PropShape>,
     pub(super) picture: Picture,
@@ -185,10 +185,10 @@ impl Bounds {
     }
 }
 
-impl Stage {
+impl SceneView {
     /// A stage with these actors and props.
     #[must_use]
-    pub fn new(actors: Vec<Actor>, props: Vec<Prop>) -> Self {
+    pub fn new(actors: Vec<Actor>, props: Vec<StaticObject>) -> Self {
         let (mut meshes, mut models) = (Vec::new(), Models::default());
         let props = props.into_iter().map(|prop| PropShape::new(prop, &mut meshes)).collect();
         let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
@@ -323,7 +323,7 @@ impl Track {
 }
 
 impl PropShape {
-    fn new(prop: Prop, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+    fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
         Self { solid, look: prop.look, position, rotation, body }

@@ -7,7 +7,7 @@ use super::level::Shading;
 use super::picture::MeshCorner;
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
-use metachron_geometry::SurfaceForm;
+use metachron_geometry::SurfaceShape;
 
 /// Level of the patches of a rope.
 pub const ROPE_LEVEL: u8 = 2;
@@ -94,7 +94,7 @@ impl Skins {
     }
 
     /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
-    pub(super) fn add(&mut self, form: &SurfaceForm, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
+    pub(super) fn add(&mut self, form: &SurfaceShape, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
         let SkinWish { origin, instance, shading, edges } = wish;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         let corner = |x: &DVec3, n: DVec3| MeshCorner {
@@ -130,7 +130,7 @@ impl Skins {
 }
 
 impl Faces {
-    fn find(&mut self, form: &SurfaceForm, soft: &SoftState) {
+    fn find(&mut self, form: &SurfaceShape, soft: &SoftState) {
         let empty = |vertex| Face { vertex, first: DVec3::ZERO, sum: DVec3::ZERO, next: None };
         self.all.clear();
         self.all.extend((0..soft.positions.len() as u32).map(empty));
@@ -168,7 +168,7 @@ impl Faces {
 }
 
 impl SkinRoom {
-    fn find_normals(&mut self, form: &SurfaceForm, soft: &SoftState) {
+    fn find_normals(&mut self, form: &SurfaceShape, soft: &SoftState) {
         self.normals.clear();
         self.normals.resize(soft.positions.len(), DVec3::ZERO);
         for triangle in form.triangles.iter() {
@@ -180,7 +180,7 @@ impl SkinRoom {
     }
 
     /// Finds the sides of triangles without a neighbour, each in the direction of its triangle.
-    fn find_rim(&mut self, form: &SurfaceForm) {
+    fn find_rim(&mut self, form: &SurfaceShape) {
         self.rim.clear();
         self.rim.extend(form.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
         self.rim.sort_unstable_by_key(|[a, b]| [*a.min(b), *a.max(b)]);
@@ -200,7 +200,7 @@ impl SkinRoom {
 }
 
 /// Drawn half thickness of a skin about its vertices, metres.
-pub(super) fn drawn_radius_m(form: &SurfaceForm) -> f64 {
+pub(super) fn drawn_radius_m(form: &SurfaceShape) -> f64 {
     if form.closed { 0.0 } else { form.radius_m.max(THIN_SHARE * form.edge_m) }
 }
 
@@ -229,8 +229,8 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    fn square() -> (SurfaceForm, SoftState) {
-        let form = SurfaceForm {
+    fn square() -> (SurfaceShape, SoftState) {
+        let form = SurfaceShape {
             vertices: [0, 1, 2, 3].into(),
             edges: [[0, 1], [1, 2], [2, 3], [0, 3], [0, 2]].into(),
             triangles: [[0, 1, 2], [0, 2, 3]].into(),
@@ -265,10 +265,10 @@ mod tests {
     }
 
     /// A cube of one cell, each side of two triangles, whose top side is turned about the y axis.
-    fn cube(turn_rad: f64) -> (SurfaceForm, SoftState) {
+    fn cube(turn_rad: f64) -> (SurfaceShape, SoftState) {
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let form = SurfaceForm {
+        let form = SurfaceShape {
             vertices: (0..8).collect(),
             edges: [].into(),
             triangles: triangles.into(),

@@ -4,7 +4,7 @@
 
 use super::compose::Paint;
 use super::level::Shading;
-use super::scene_view::Stage;
+use super::scene_view::SceneView;
 use metachron_core::AgentId;
 use metachron_geometry::{Texture, Wrap};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ pub(super) struct Painting {
     mean: [u8; 3],
 }
 
-impl Stage {
+impl SceneView {
     /// Sets the texture of an actor that is scenery: from [`Shading::Textured`] on, texture times the actor's colour is drawn; cheaper
     /// shadings use the texture's mean. An unknown actor is ignored.
     pub fn paint(&mut self, id: AgentId, texture: &Arc<Texture>) {

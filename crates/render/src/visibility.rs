@@ -2,7 +2,7 @@
 //!
 //! In: posed objects and a camera. Out: one [`Seen`] per actor. Never here: levels.
 
-use super::scene_view::{Form, Stage, Track};
+use super::scene_view::{Form, SceneView, Track};
 use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState};
@@ -32,9 +32,9 @@ pub struct Seen {
     pub radius_m: f64,
 }
 
-impl Stage {
-    /// Updates [`Stage::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`Stage::looked`] lists
-    /// the updated ones). Stores the visibility for [`Stage::compose`].
+impl SceneView {
+    /// Updates [`SceneView::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`SceneView::looked`] lists
+    /// the updated ones). Stores the visibility for [`SceneView::compose`].
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
@@ -55,13 +55,13 @@ impl Stage {
         }
     }
 
-    /// The indices of the actors that the last [`Stage::survey`] updated, ascending.
+    /// The indices of the actors that the last [`SceneView::survey`] updated, ascending.
     #[must_use]
     pub fn looked(&self) -> &[usize] {
         &self.looked
     }
 
-    /// Results of the last [`Stage::survey`], one entry per actor in their order.
+    /// Results of the last [`SceneView::survey`], one entry per actor in their order.
     #[must_use]
     pub fn seen(&self) -> &[Seen] {
         &self.found
@@ -161,7 +161,7 @@ mod tests {
     fn ball_at(position: DVec3, velocity: DVec3) -> Seen {
         let look = Look { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
-        let mut stage = Stage::new(vec![Actor { id: AgentId(0), form, look }], vec![]);
+        let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form, look }], vec![]);
         let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
         stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
         stage.pose(SimTime::ZERO, States::Latest);
@@ -174,7 +174,7 @@ mod tests {
         let look = Look { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
         let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
-        let mut stage = Stage::new((0..1010).map(actor).collect(), vec![]);
+        let mut stage = SceneView::new((0..1010).map(actor).collect(), vec![]);
         let state = |id: u32, ms: u64| {
             let position = DVec3::new(f64::from(id), 1e-3 * ms as f64, 0.0);
             let body = Body::Rigid(RigidState { position, ..RigidState::default() });
@@ -182,7 +182,7 @@ mod tests {
             Arc::new(Snapshot { time, steps: ms / 10, body, ..Snapshot::default() })
         };
         let camera = |x: f64| Camera::looking(DVec3::new(x, -4.0, 0.0), DVec3::new(x, 0.0, 0.0), 0.8);
-        let mut plain = Stage::new((0..1010).map(actor).collect(), vec![]);
+        let mut plain = SceneView::new((0..1010).map(actor).collect(), vec![]);
         (0..1010).for_each(|id| plain.see(AgentId(id), &state(id, 0), true));
         plain.pose(SimTime::ZERO, States::Latest);
         // ten keep moving, a thousand have come to rest

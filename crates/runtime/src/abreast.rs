@@ -4,11 +4,11 @@
 //! newcomer takes the time of those it comes near for its own, and who is alone again that of the scene.
 //! Never here: how late an agent is ([`crate::agent_clock`]), steps. Theory: docs/theory/coupling.md, section 3.
 
-use super::agent_runner::Actor;
+use super::agent_runner::AgentRunner;
 use super::fellows::Fellows;
 use super::observation::newest;
 use metachron_contact::beside::{is_beside, leaves_behind};
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use std::time::Duration;
 /// Whose time is farther behind than this is not only late, seconds: a newcomer takes it for its own.
 const FAR_BEHIND_S: f64 = 0.1;
 
-impl Actor {
+impl AgentRunner {
     /// Whether it waits for others that are behind, with all it leads.
     pub fn waits(&mut self, wall: Duration) -> bool {
         // what it saw last was behind by more than it is now: who was not is not
@@ -50,11 +50,11 @@ impl Actor {
     fn met(
         &self,
         dt: SimSpan,
-        which: impl Fn(&Neighbour, (SimSpan, f64), &Surroundings<'_>, &dyn Fn() -> Option<Bounds>) -> bool,
+        which: impl Fn(&Neighbour, (SimSpan, f64), &StepContext<'_>, &dyn Fn() -> Option<Bounds>) -> bool,
     ) -> impl Iterator<Item = &Neighbour> {
         let Self { eyes, hands, links, writer, pace, .. } = self;
         let (me, time) = (self.shared.id, pace.time());
-        let around = Surroundings { me, time, neighbours: eyes.neighbours(), hands, links };
+        let around = StepContext { me, time, neighbours: eyes.neighbours(), hands, links };
         let bounds = move || newest(writer, |state| state.bounds);
         let steps = move |n: &Neighbour| (dt, n.step_s.max(self.step_of(n.id)));
         around.neighbours.iter().filter(move |n| which(n, steps(n), &around, &bounds))
@@ -91,8 +91,8 @@ impl Actor {
             _ => return,
         };
         if put_off != self.pace.put_off() {
-            self.rename_time(put_off);
-            self.company.each(|seat| seat.rename_time(put_off));
+            self.shift_clock(put_off);
+            self.company.each(|seat| seat.shift_clock(put_off));
         }
     }
 
@@ -119,9 +119,9 @@ impl Actor {
         last.map(|n| n.snapshot.time).min().map_or(self.pace.put_off(), |time| moment.since(time))
     }
 
-    fn rename_time(&mut self, put_off: SimSpan) {
+    fn shift_clock(&mut self, put_off: SimSpan) {
         let by_s = self.pace.rename(put_off);
-        self.agent.rename_time(by_s);
+        self.agent.shift_clock(by_s);
     }
 
     /// Looks around for itself and for those it leads.

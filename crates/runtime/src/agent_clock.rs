@@ -52,7 +52,7 @@ const WAIT_MS: u32 = 2;
 
 /// An agent's own time and the length of its next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pace {
+pub struct AgentClock {
     time: SimTime,
     dt: SimSpan,
     /// The step it makes instead of `dt` if that is shorter, nanoseconds; else longer than any step.
@@ -84,7 +84,7 @@ pub struct Start {
     pub dropped: SimSpan,
 }
 
-impl Pace {
+impl AgentClock {
     /// A pace from `time` in steps of `dt` (above zero).
     #[must_use]
     pub const fn new(time: SimTime, dt: SimSpan) -> Self {
@@ -314,8 +314,8 @@ mod tests {
         SimSpan::from_nanos(n * 1_000_000)
     }
 
-    const fn pace(dt_ms: u64) -> Pace {
-        Pace::new(SimTime::ZERO, span_ms(dt_ms))
+    const fn pace(dt_ms: u64) -> AgentClock {
+        AgentClock::new(SimTime::ZERO, span_ms(dt_ms))
     }
 
     #[test]
@@ -438,7 +438,7 @@ mod tests {
         ) {
             let line = Timeline::new();
             let dt = SimSpan::from_nanos(dt_us * 1000);
-            let mut pace = Pace::new(SimTime::ZERO, dt);
+            let mut pace = AgentClock::new(SimTime::ZERO, dt);
             let cap = LAG_CAP.max(Duration::from_micros(2 * dt_us));
             let (mut wall, mut steps) = (Duration::ZERO, 0);
             for cost in costs_us.iter().copied().map(Duration::from_micros) {
@@ -485,7 +485,7 @@ mod tests {
     #[test]
     fn waking_never_turns_an_agent_back() {
         let line = Timeline::new();
-        let mut pace = Pace::new(SimTime::from_nanos(7_000_000), span_ms(4));
+        let mut pace = AgentClock::new(SimTime::from_nanos(7_000_000), span_ms(4));
         pace.wake(&line, ms(5));
         assert_eq!(pace.time(), SimTime::from_nanos(7_000_000));
     }

@@ -9,17 +9,17 @@
 //! ([`super::island`]).
 
 use super::agent_clock::Timeline;
-use super::agent_clock::{LAG_CAP, Pace, Start};
+use super::agent_clock::{AgentClock, LAG_CAP, Start};
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::island::Company;
-use super::metrics::{Diary, SMOOTHING};
-use super::observation::{Eyes, Peers};
+use super::metrics::{MetricsWriter, SMOOTHING};
+use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
 use metachron_contact::Link;
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -27,24 +27,24 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 /// An agent with its runtime state.
-pub(super) struct Actor {
+pub(super) struct AgentRunner {
     pub shared: Arc<Shared>,
     pub peers: Arc<Peers>,
     pub agent: Box<dyn Agent>,
-    pub pace: Pace,
+    pub pace: AgentClock,
     pub dt_range: (SimSpan, SimSpan),
     pub range: Option<ResolutionRange>,
     pub governor: Option<Box<dyn Governor>>,
     pub faults: Faults,
     pub writer: SlotWriter<Snapshot>,
-    pub eyes: Eyes,
+    pub eyes: Observer,
     pub links: Vec<Link>,
-    pub hands: Vec<Pull>,
+    pub hands: Vec<AnchorSpring>,
     /// The agents it leads.
     pub company: Company,
-    pub diary: Diary,
-    pub rhythm: Rhythm,
-    pub open: Option<Open>,
+    pub diary: MetricsWriter,
+    pub rhythm: TurnPeriod,
+    pub open: Option<PendingTurn>,
     /// Whether an agent that does not step with it was next to it in its previous turn, if that was checked.
     pub beside: Option<bool>,
     /// The state that was written last is withheld.
@@ -61,7 +61,7 @@ pub(super) struct Actor {
 
 /// A turn between its begin and its finish.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Open {
+pub(super) struct PendingTurn {
     pub start: Start,
     pub dt: SimSpan,
     /// The resolution of the step, if a governor needs it.
@@ -104,12 +104,12 @@ pub(super) enum Next {
 
 /// Measures the interval between the starts of an agent's turns.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Rhythm {
+pub(super) struct TurnPeriod {
     last: Option<(Duration, u64)>,
     period_s: Option<f32>,
 }
 
-impl Rhythm {
+impl TurnPeriod {
     fn beat(&mut self, timeline: &Timeline, wall: Duration) {
         let piece = timeline.piece();
         match self.last.filter(|&(_, p)| p == piece) {
@@ -123,7 +123,7 @@ impl Rhythm {
     }
 }
 
-impl Actor {
+impl AgentRunner {
     pub fn id(&self) -> AgentId {
         self.shared.id
     }
@@ -154,7 +154,7 @@ impl Actor {
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
         self.eyes.look(&self.peers, &self.writer, (me, self.pace.scene_time(), dt), &Fellows::default());
         let neighbours = self.eyes.neighbours();
-        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
         let looked = contained(|| {
             agent.look(dt, &around);
@@ -255,7 +255,7 @@ impl Actor {
     }
 
     /// Returns no open turn if it waits instead, or hands its turns over before it steps.
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<Open>, Effort), String> {
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<PendingTurn>, Effort), String> {
         self.take_commands();
         let now = timeline.sim_at(wall);
         let near = self.keeps_company(now, self.pace.is_late(timeline, wall));
@@ -283,7 +283,7 @@ impl Actor {
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work * f64::from(1 + led));
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
-        let mut open = Open { start, dt, resolution, errors_m: [0.0; 2], rests };
+        let mut open = PendingTurn { start, dt, resolution, errors_m: [0.0; 2], rests };
         self.write_led(&open);
         self.write_snapshot(self.pace.time() + dt, rests)?;
         open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
@@ -311,7 +311,7 @@ impl Actor {
             &Fellows::default(),
         );
         let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
-        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let dt = self.agent.longest_step(wanted, &around).min(wanted);
         let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
         Ok(Made { report, dt })
@@ -319,8 +319,8 @@ impl Actor {
 
     pub fn take_commands(&mut self) {
         let letters = self.shared.mail.take();
-        if let Some(wanted) = letters.retune {
-            self.retune(wanted);
+        if let Some(wanted) = letters.set_resolution {
+            self.set_resolution(wanted);
         }
         if let Some(dt) = letters.dt {
             self.set_dt(dt);
@@ -336,7 +336,7 @@ impl Actor {
         self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
     }
 
-    fn consult(&mut self, timeline: &Timeline, open: &Open, work_s: f64) -> Result<(), String> {
+    fn consult(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
         let Some(governor) = &mut self.governor else { return Ok(()) };
         let wanted_period_s = 1.0 / (self.shared.wanted_hz * timeline.speed());
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
@@ -351,7 +351,7 @@ impl Actor {
             drift_m: open.errors_m[1],
         });
         dt.into_iter().for_each(|dt| self.set_dt(dt));
-        resolution.into_iter().for_each(|wanted| self.retune(wanted));
+        resolution.into_iter().for_each(|wanted| self.set_resolution(wanted));
         Ok(())
     }
 
@@ -359,11 +359,11 @@ impl Actor {
         self.pace.set_dt(dt.clamp(self.dt_range.0, self.dt_range.1));
     }
 
-    fn retune(&mut self, wanted: Resolution) {
+    fn set_resolution(&mut self, wanted: Resolution) {
         let Some(range) = &self.range else { return };
         let wanted = range.clamp(wanted);
         if self.agent.resolution().is_some_and(|held| held != wanted) {
-            self.agent.retune(wanted);
+            self.agent.set_resolution(wanted);
         }
     }
 
@@ -384,7 +384,7 @@ impl Actor {
         if let Some(crowd) = &self.peers.crowd {
             crowd.stay(self.id());
         }
-        self.company.each(Actor::rest_now);
+        self.company.each(AgentRunner::rest_now);
     }
 
     /// Continues after a rest, at the timeline's present, with all agents it leads.
@@ -393,7 +393,7 @@ impl Actor {
         self.pace.wake(timeline, wall);
         // as an agent that newly comes near its peers: while it slept their time went on
         self.beside = Some(false);
-        self.rhythm = Rhythm::default();
+        self.rhythm = TurnPeriod::default();
         self.diary.restart(timeline.sim_at(wall));
         self.diary.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.set_resting(false);

@@ -1,7 +1,7 @@
 //! Broad phase between agents: which agents may touch each other.
 //!
 //! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near enough to touch within
-//! its next turns, and of those that have given impulses to it ([`Sight`]). Agents exchange atomic words only: no agent waits for another.
+//! its next turns, and of those that have given impulses to it ([`NeighbourList`]). Agents exchange atomic words only: no agent waits for another.
 //! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
 //! published speed enters itself in a common log, and is checked again.
 //! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no crowd.
@@ -9,17 +9,17 @@
 mod neighbour_list;
 mod published_bounds;
 
-pub(super) use neighbour_list::Sight;
+pub(super) use neighbour_list::NeighbourList;
 
 use metachron_core::{AgentId, Bounds, SimTime};
-use published_bounds::{Berth, Reach, Seen};
+use published_bounds::{PublishedBounds, Reach, Seen};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
 
 /// Shared data by which the agents of a run find each other.
 #[derive(Debug)]
-pub(super) struct Crowd {
-    berths: Vec<Berth>,
+pub(super) struct BroadPhase {
+    berths: Vec<PublishedBounds>,
     /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
     /// Number of entries ever written.
@@ -50,11 +50,11 @@ const SPEED_LEAST_M_S: f64 = 0.0625;
 /// The published speed is this factor above the measured one, so that speed may grow a little before a log entry is needed.
 const SPEED_ROOM: f64 = 1.25;
 
-impl Crowd {
+impl BroadPhase {
     /// A crowd of that many agents, none of which has published a box.
     pub fn new(agents: usize) -> Self {
         Self {
-            berths: std::iter::repeat_with(Berth::default).take(agents).collect(),
+            berths: std::iter::repeat_with(PublishedBounds::default).take(agents).collect(),
             log: zeros(LOG_LENGTH as usize),
             noted: AtomicU64::new(0),
             calls: std::iter::repeat_with(Calls::default).take(agents).collect(),
@@ -76,7 +76,7 @@ impl Crowd {
 
     /// The last published box of `id`.
     fn seen(&self, id: AgentId) -> Seen {
-        self.berths.get(id.0 as usize).map_or(Seen::Nowhere, Berth::read)
+        self.berths.get(id.0 as usize).map_or(Seen::Nowhere, PublishedBounds::read)
     }
 
     /// Publishes speed zero for `id`: it stays in place until it publishes a box again.

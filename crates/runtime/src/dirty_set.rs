@@ -9,9 +9,9 @@ use metachron_core::AgentId;
 
 /// One bit per agent. Words are padded: agents of one word mostly share a worker, and workers must not disturb each other.
 #[derive(Debug)]
-pub(super) struct News(Vec<CachePadded<AtomicU64>>);
+pub(super) struct DirtySet(Vec<CachePadded<AtomicU64>>);
 
-impl News {
+impl DirtySet {
     pub fn new(agents: usize) -> Self {
         Self(std::iter::repeat_with(CachePadded::default).take(agents.div_ceil(64)).collect())
     }
@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn news_are_heard_once() {
-        let news = News::new(130);
+        let news = DirtySet::new(130);
         let heard = || {
             let mut heard = Vec::new();
             news.take(|id| heard.push(id.0));
@@ -61,7 +61,7 @@ mod tests {
 
     #[test]
     fn what_is_published_before_the_telling_is_seen_with_it() {
-        let (news, value) = (News::new(1), AtomicU64::new(0));
+        let (news, value) = (DirtySet::new(1), AtomicU64::new(0));
         let last = 100_000;
         std::thread::scope(|scope| {
             scope.spawn(|| {

@@ -2,12 +2,12 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
-use super::histogram::Times;
+use super::histogram::Histogram;
 use super::island::Seating;
 use super::mailbox::{Command, Mailbox, SendError};
-use super::metrics::{AgentState, AgentStats, Gauges};
+use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
-use super::sleep::Switchboard;
+use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::Ordering::Relaxed;
@@ -21,14 +21,14 @@ pub(super) struct Shared {
     pub name: Arc<str>,
     pub model: &'static str,
     pub wanted_hz: f64,
-    pub gauges: Gauges,
+    pub gauges: Metrics,
     pub mail: Mailbox,
     pub slot: Arc<LatestSlot<Snapshot>>,
-    pub board: Arc<Switchboard>,
+    pub board: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
     pub seating: Option<Seating>,
     /// Used by readers only: the agent never waits for this lock.
-    pub ages: Mutex<Times>,
+    pub ages: Mutex<Histogram>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Vec<Mutex<Trace>>,
 }
@@ -90,7 +90,7 @@ impl AgentHandle {
         self.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
     }
 
-    fn ages(&self) -> MutexGuard<'_, Times> {
+    fn ages(&self) -> MutexGuard<'_, Histogram> {
         self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -22,7 +22,7 @@ const PAGES_AT_ONCE: usize = 2;
 
 /// Times of up to [`LONGEST_US`], counted to 2 %.
 #[derive(Debug, Default)]
-pub(super) struct Times {
+pub(super) struct Histogram {
     /// Index of each page in `pages`, plus one; zero for a page that does not exist.
     index: [u8; PAGES],
     pages: Vec<[u16; COUNTERS]>,
@@ -30,7 +30,7 @@ pub(super) struct Times {
     longest_us: u64,
 }
 
-impl Times {
+impl Histogram {
     /// Counts `time`.
     pub fn record(&mut self, time: Duration) {
         self.record_often(time, 1);
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn percentiles_are_those_of_the_public_histogram() {
         let mut theirs = hdrhistogram::Histogram::<u32>::new_with_bounds(1, 20_000_000, 3).unwrap();
-        let mut times = Times::default();
+        let mut times = Histogram::default();
         // 0.6 µs … 6 s, uniform in the logarithm
         for k in 0..7000_u32 {
             let us = libm::exp10(f64::from(k) * 1e-3 - 0.2);
@@ -142,19 +142,19 @@ mod tests {
 
     #[test]
     fn percentiles_are_right_to_two_hundredths() {
-        let mut times = Times::default();
+        let mut times = Histogram::default();
         (1..=1000).for_each(|us| times.record(Duration::from_micros(us * 10)));
         let spread = times.spread();
         assert!((spread.p50_s - 5e-3).abs() < 1e-4, "{spread:?}");
         assert!((spread.p99_s - 9.9e-3).abs() < 2e-4, "{spread:?}");
         assert_eq!(spread.max_s, 10e-3);
-        assert_eq!(Times::default().spread(), Spread::default());
+        assert_eq!(Histogram::default().spread(), Spread::default());
     }
 
     proptest::proptest! {
         #[test]
         fn whatever_is_counted_percentiles_agree_with_sorting(us in proptest::collection::vec(0_u64..20_000_000, 1..400)) {
-            let mut times = Times::default();
+            let mut times = Histogram::default();
             us.iter().for_each(|us| times.record(Duration::from_micros(*us)));
             let exact = sorted(us.iter().map(|us| (*us).min(LONGEST_US)).collect(), &[0.5, 0.99]);
             for (found, exact) in times.percentiles([0.5, 0.99]).iter().zip(exact) {
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn shares_stay_right_when_counters_have_been_full() {
-        let mut times = Times::default();
+        let mut times = Histogram::default();
         for _ in 0..1000 {
             times.record_often(Duration::from_micros(10), 900);
             times.record_often(Duration::from_micros(20), 60);
@@ -193,15 +193,15 @@ mod tests {
 
     #[test]
     fn a_time_beyond_the_scale_counts_as_the_longest() {
-        let mut times = Times::default();
+        let mut times = Histogram::default();
         times.record(Duration::from_secs(1000));
         assert!(times.spread().max_s >= 10.0);
     }
 
     #[test]
     fn a_steady_agent_keeps_few_pages_and_allocates_no_more() {
-        let mut times = Times::default();
-        let day = |times: &mut Times| (0..100_000_u64).for_each(|k| times.record(Duration::from_micros(k % 500)));
+        let mut times = Histogram::default();
+        let day = |times: &mut Histogram| (0..100_000_u64).for_each(|k| times.record(Duration::from_micros(k % 500)));
         day(&mut times);
         assert_eq!(times.pages.len(), 5, "0 … 31, … 63, … 127, … 255, … 511 µs");
         assert_eq!(allocation_counter::measure(|| day(&mut times)).count_total, 0);

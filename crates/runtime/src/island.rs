@@ -17,14 +17,14 @@ pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_i
 
 use super::agent_clock::Start;
 use super::agent_clock::Timeline;
-use super::agent_runner::{Actor, Made, Open, contained};
+use super::agent_runner::{AgentRunner, Made, PendingTurn, contained};
 use super::fellows::Fellows;
 use super::metrics::Entry;
-use metachron_contact::{Companion, Surroundings};
+use metachron_contact::{Companion, StepContext};
 use metachron_core::{DT_MAX_S, SimSpan, SimTime, StepReport};
 use std::time::Duration;
 
-impl Actor {
+impl AgentRunner {
     /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that
     /// time.
     pub fn gather(&mut self, timeline: &Timeline, wall: Duration, (start, leapt): (&Start, SimSpan)) -> u32 {
@@ -100,7 +100,7 @@ impl Actor {
         self.company.gather_fellows(me, time);
         let Self { agent, eyes, hands, links, company, peers, writer, pace, .. } = self;
         eyes.look(peers, writer, (me, pace.scene_time(), dt), &company.fellows);
-        let around = Surroundings { me, time, neighbours: eyes.neighbours(), hands, links };
+        let around = StepContext { me, time, neighbours: eyes.neighbours(), hands, links };
         let mut others = emptied(std::mem::take(&mut company.companions));
         for seat in company.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time) {
             others.push(seat.actor.companion((time, dt), &company.fellows));
@@ -120,7 +120,7 @@ impl Actor {
         let id = self.shared.id;
         self.eyes.look(&self.peers, &self.writer, (id, self.pace.scene_time(), dt), fellows);
         let neighbours = self.eyes.neighbours();
-        let around = Surroundings { me: id, time, neighbours, hands: &self.hands, links: &self.links };
+        let around = StepContext { me: id, time, neighbours, hands: &self.hands, links: &self.links };
         Companion { id, agent: &mut *self.agent, around }
     }
 
@@ -132,7 +132,7 @@ impl Actor {
     }
 
     /// Writes the states of those that have just stepped with it. One that is broken is parked alone.
-    pub fn write_led(&mut self, open: &Open) {
+    pub fn write_led(&mut self, open: &PendingTurn) {
         if self.company.is_empty() {
             return;
         }

@@ -42,8 +42,8 @@ mod testing;
 mod threads;
 mod worker_wakeup;
 
+pub use agent_clock::{AgentClock, LAG_CAP, Start};
 pub use agent_clock::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
-pub use agent_clock::{LAG_CAP, Pace, Start};
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};

@@ -8,14 +8,14 @@ mod cores;
 
 use super::Run;
 use super::agent_clock::{Drive, Timeline};
-use super::agent_runner::{Actor, Effort, Next};
+use super::agent_runner::{AgentRunner, Effort, Next};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::island::{Seating, empty_rooms, move_in};
 use super::machine::{Machine, duration};
 use super::metrics::AgentStats;
-use super::sleep::Switchboard;
-use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use super::sleep::SleepRegistry;
+use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
 use cores::Cores;
 use metachron_core::AgentId;
 use std::cmp::Reverse;
@@ -33,7 +33,7 @@ pub struct Lockstep {
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
     handles: Vec<AgentHandle>,
-    board: Arc<Switchboard>,
+    board: Arc<SleepRegistry>,
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
@@ -42,7 +42,7 @@ pub struct Lockstep {
 /// An agent and the phase of its turns.
 struct Life {
     /// `None` while another agent leads it.
-    actor: Option<Box<Actor>>,
+    actor: Option<Box<AgentRunner>>,
     phase: Phase,
     turns: u64,
 }
@@ -66,8 +66,8 @@ impl Lockstep {
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
-        let Company { actors, handles, board } = assemble(spawns)?;
-        let phase = |actor: &Option<Box<Actor>>| match actor {
+        let AssembledRun { actors, handles, board } = assemble(spawns)?;
+        let phase = |actor: &Option<Box<AgentRunner>>| match actor {
             None => Phase::Led,
             Some(actor) if actor.is_parked() => Phase::Parked,
             Some(_) => Phase::Waiting,

@@ -3,7 +3,7 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
@@ -19,7 +19,7 @@ pub enum Command {
     /// Step by this span; clamped to the agent's range.
     SetDt(SimSpan),
     /// The user spring pulls at the agent until the next such command; `None` releases it.
-    Hand(Option<Pull>),
+    Hand(Option<AnchorSpring>),
     /// Wake up from rest.
     Wake,
 }
@@ -42,18 +42,18 @@ pub(super) struct Mailbox {
     /// Whether there is any command: an agent without commands reads only this.
     full: AtomicBool,
     /// Allocated by the first command: most agents never get one.
-    letters: OnceLock<Box<Mutex<Letters>>>,
+    letters: OnceLock<Box<Mutex<PendingCommands>>>,
 }
 
 /// Contents of a mailbox.
 #[derive(Debug, Default)]
-pub(super) struct Letters {
+pub(super) struct PendingCommands {
     /// The newest requested resolution.
-    pub retune: Option<Resolution>,
+    pub set_resolution: Option<Resolution>,
     /// The newest requested step length.
     pub dt: Option<SimSpan>,
     /// The newest state of the user spring.
-    pub hand: Option<Option<Pull>>,
+    pub hand: Option<Option<AnchorSpring>>,
 }
 
 impl Mailbox {
@@ -71,7 +71,7 @@ impl Mailbox {
         let letters = self.letters.get_or_init(Box::default);
         let mut letters = letters.lock().unwrap_or_else(PoisonError::into_inner);
         match command {
-            Command::Retune(resolution) => letters.retune = Some(resolution),
+            Command::Retune(resolution) => letters.set_resolution = Some(resolution),
             Command::SetDt(dt) => letters.dt = Some(dt),
             Command::Hand(pull) => letters.hand = Some(pull),
             Command::Wake => {}
@@ -86,12 +86,12 @@ impl Mailbox {
     }
 
     /// All commands since the last call. Never blocks: while another thread is writing it returns nothing yet.
-    pub fn take(&self) -> Letters {
+    pub fn take(&self) -> PendingCommands {
         if !self.has_letters() {
-            return Letters::default();
+            return PendingCommands::default();
         }
         let Some(Ok(mut letters)) = self.letters.get().map(|letters| letters.try_lock()) else {
-            return Letters::default();
+            return PendingCommands::default();
         };
         self.full.store(false, Release);
         std::mem::take(&mut *letters)
@@ -122,9 +122,9 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    fn pull(target: DVec3) -> Pull {
+    fn pull(target: DVec3) -> AnchorSpring {
         let anchor = Anchor::Local(DVec3::ZERO);
-        Pull { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m: 1.0, damping_n_s_m: 0.0 }
+        AnchorSpring { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m: 1.0, damping_n_s_m: 0.0 }
     }
 
     #[test]
@@ -135,9 +135,9 @@ mod tests {
         }
         mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
         let taken = mail.take();
-        assert_eq!((taken.retune.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
+        assert_eq!((taken.set_resolution.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
         let taken = mail.take();
-        assert_eq!((taken.retune, taken.dt, taken.hand), (None, None, None), "once");
+        assert_eq!((taken.set_resolution, taken.dt, taken.hand), (None, None, None), "once");
     }
 
     #[test]
@@ -164,7 +164,7 @@ mod tests {
         let mail = Mailbox::default();
         let bad = Command::Hand(Some(pull(DVec3::NAN)));
         assert!(matches!(mail.post(bad), Err(SendError::BadNumber(_))));
-        let negative = Pull { stiffness_n_m: -1.0, ..pull(DVec3::X) };
+        let negative = AnchorSpring { stiffness_n_m: -1.0, ..pull(DVec3::X) };
         assert!(mail.post(Command::Hand(Some(negative))).is_err());
         assert!(mail.post(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
         assert_eq!(mail.take().hand, None);

@@ -3,8 +3,8 @@
 //! In: turns, from the thread that makes them. Out: [`AgentStats`]. Each number is one atomic word: consistent in itself, and as new as the
 //! last turn. Never here: locks on the agent's side, printing.
 
-use super::agent_clock::Pace;
-use super::histogram::Times;
+use super::agent_clock::AgentClock;
+use super::histogram::Histogram;
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
@@ -101,7 +101,7 @@ const PARKED: u8 = 2;
 
 /// The readable side of an agent's metrics.
 #[derive(Debug, Default)]
-pub(super) struct Gauges {
+pub(super) struct Metrics {
     pub steps: AtomicU64,
     pub misses: AtomicU64,
     pub dt: AtomicU64,
@@ -117,7 +117,7 @@ pub(super) struct Gauges {
     reason: OnceLock<String>,
 }
 
-impl Gauges {
+impl Metrics {
     pub fn state(&self) -> AgentState {
         match self.state.load(Relaxed) {
             RUNNING => AgentState::Running,
@@ -164,10 +164,10 @@ pub(super) const SMOOTHING: f64 = 0.125;
 
 /// The writing side of an agent's metrics, owned by the thread that makes its turns.
 #[derive(Debug)]
-pub(super) struct Diary {
+pub(super) struct MetricsWriter {
     steps: u64,
     misses: u64,
-    late: Times,
+    late: Histogram,
     work_s: Option<f64>,
     window: (SimTime, u64),
     first_window: bool,
@@ -186,10 +186,10 @@ pub(super) struct Entry {
     pub work_s: f64,
 }
 
-impl Diary {
+impl MetricsWriter {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
-        Self { steps: 0, misses: 0, late: Times::default(), work_s: None, window, first_window: true }
+        Self { steps: 0, misses: 0, late: Histogram::default(), work_s: None, window, first_window: true }
     }
 
     /// Steps recorded so far.
@@ -203,7 +203,7 @@ impl Diary {
     }
 
     /// Records a turn.
-    pub fn write(&mut self, gauges: &Gauges, pace: &Pace, entry: Entry) {
+    pub fn write(&mut self, gauges: &Metrics, pace: &AgentClock, entry: Entry) {
         self.steps += 1;
         self.misses += u64::from(entry.missed);
         self.late.record(entry.late);
@@ -220,7 +220,7 @@ impl Diary {
     }
 
     /// Publishes the values of the pace.
-    pub fn pace(&self, gauges: &Gauges, pace: &Pace) {
+    pub fn pace(&self, gauges: &Metrics, pace: &AgentClock) {
         gauges.dt.store(pace.dt().as_nanos(), Relaxed);
         gauges.dropped.store(pace.dropped().as_nanos(), Relaxed);
         gauges.rested.store(pace.rested().as_nanos(), Relaxed);
@@ -232,11 +232,11 @@ impl Diary {
     }
 
     /// Updates the percentiles: too expensive for every turn.
-    pub fn flush(&self, gauges: &Gauges) {
+    pub fn flush(&self, gauges: &Metrics) {
         gauges.set_late(self.late.spread());
     }
 
-    fn count_rate(&mut self, gauges: &Gauges, now: SimTime) {
+    fn count_rate(&mut self, gauges: &Metrics, now: SimTime) {
         let (since, steps) = self.window;
         let span = now.since(since);
         let full = span >= RATE_WINDOW;
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_first_reason_to_park_stands() {
-        let gauges = Gauges::default();
+        let gauges = Metrics::default();
         gauges.park("first".into());
         gauges.park("second".into());
         assert_eq!(gauges.state(), AgentState::Parked("first".into()));

@@ -4,15 +4,15 @@
 //! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
 //! settle. Never here: when an agent looks.
 
-use super::broad_phase::Crowd;
-use super::broad_phase::Sight;
+use super::broad_phase::BroadPhase;
+use super::broad_phase::NeighbourList;
 use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
 use metachron_contact::{Law, Standing, acknowledged, keep_step, owns};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{Form, FormKind};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// Data of all agents of a run, fixed at the start.
@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub(super) struct Peers {
     pub all: Vec<Peer>,
     /// `None` if no two agents could touch: then no agent searches for peers.
-    pub crowd: Option<Crowd>,
+    pub crowd: Option<BroadPhase>,
     /// Pairs joined by links with the ledger law, each in both orders, sorted.
     pub linked: Vec<[AgentId; 2]>,
 }
@@ -28,21 +28,21 @@ pub(super) struct Peers {
 /// Data of one agent for its peers.
 pub(super) struct Peer {
     pub shared: Arc<Shared>,
-    pub form: Option<Arc<Form>>,
+    pub form: Option<Arc<CollisionShape>>,
     /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the peers.
     pub laws: Vec<(AgentId, Law)>,
 }
 
 /// The list of peers that an agent sees.
 #[derive(Debug, Default)]
-pub(super) struct Eyes {
+pub(super) struct Observer {
     neighbours: Vec<Neighbour>,
     /// One for each neighbour, in their order.
     looks: Vec<Look>,
     /// The first `links` neighbours are the linked ones.
     links: usize,
     /// Only in a crowd.
-    sight: Option<Box<Sight>>,
+    sight: Option<Box<NeighbourList>>,
     /// Agents to be seen in addition to the linked ones.
     wanted: Vec<AgentId>,
 }
@@ -106,16 +106,16 @@ impl Peers {
     }
 
     /// The view of `me`, which is linked to `links`.
-    pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Eyes {
-        let sight = self.crowd.is_some().then(|| Box::new(Sight::new(me)));
-        let mut eyes = Eyes { sight, ..Eyes::default() };
+    pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Observer {
+        let sight = self.crowd.is_some().then(|| Box::new(NeighbourList::new(me)));
+        let mut eyes = Observer { sight, ..Observer::default() };
         links.iter().for_each(|id| eyes.list(self, me, *id));
         eyes.links = eyes.neighbours.len();
         eyes
     }
 }
 
-impl Eyes {
+impl Observer {
     /// Its neighbours, as they were at the last look.
     pub fn neighbours(&self) -> &[Neighbour] {
         &self.neighbours
@@ -169,7 +169,7 @@ impl Eyes {
 
     /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
     /// body to which this agent also gives.
-    fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
+    fn want(&mut self, crowd: &BroadPhase, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
         let Self { neighbours, links, sight, wanted, looks } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
@@ -220,8 +220,8 @@ impl Eyes {
 }
 
 /// Whether the form is a tool's.
-const fn is_led(form: &Form) -> bool {
-    matches!(form.kind, FormKind::Tool(_))
+const fn is_led(form: &CollisionShape) -> bool {
+    matches!(form.kind, ShapeKind::Tool(_))
 }
 
 /// Treats `neighbour` as a member of the same island, or again as a peer outside it.

@@ -17,21 +17,21 @@ use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::metrics::AgentStats;
 use super::priority::Priority;
-use super::spawn::{AgentSpawn, Company, RunError, assemble};
-use shared::Hall;
+use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
+use shared::PoolState;
 use std::num::NonZero;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
-use supervisor::{Note, Staff};
+use supervisor::{Note, Supervisor};
 
 /// A step that takes longer is given up: its agent is parked, its worker replaced.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Agents that share workers.
 pub struct Pool {
-    hall: Arc<Hall>,
+    hall: Arc<PoolState>,
     notes: Sender<Note>,
     watch: Option<JoinHandle<()>>,
 }
@@ -54,13 +54,13 @@ impl Pool {
         workers: usize,
         (patience, priority): (Duration, Priority),
     ) -> Result<Self, RunError> {
-        let Company { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, board } = assemble(spawns)?;
         let workers = workers.clamp(1, handles.len().max(1));
         board.hire(workers);
-        let hall = Arc::new(Hall::new(clock, board, handles, actors, workers));
+        let hall = Arc::new(PoolState::new(clock, board, handles, actors, workers));
         hall.timeline.drive(Duration::ZERO, Drive::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
-        let staff = Staff::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
+        let staff = Supervisor::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
         let notes = staff.notes();
         let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
             hall.board.stop();

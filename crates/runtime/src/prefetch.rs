@@ -4,13 +4,13 @@
 //! one word of each line was read. Loaded one after the other during the turn, the lines take longer than a cheap step; loaded together,
 //! they arrive while the step computes. Never here: anything that depends on the values read.
 
-use super::agent_runner::Actor;
+use super::agent_runner::AgentRunner;
 use super::handle::Shared;
 use metachron_core::{Body, Inertia, Snapshot};
 use std::hint::black_box;
 use std::sync::atomic::Ordering::Relaxed;
 
-impl Actor {
+impl AgentRunner {
     /// Reads one word of each block of memory that a turn of this agent reads or writes.
     pub fn fetch(&self) {
         black_box(self.agent.resolution());

@@ -3,15 +3,15 @@
 //! In: a step that has been made. Out: a state, written and later published or withheld ([`super::faults`]); the agents it acts on are
 //! notified once the state is visible. Never here: the step, the agent's own view.
 
-use super::agent_runner::{Actor, Open};
+use super::agent_runner::{AgentRunner, PendingTurn};
 use super::metrics::Entry;
 use super::probe::Trace;
 use metachron_core::SimTime;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-impl Actor {
+impl AgentRunner {
     /// Records a step in the metrics and publishes its state; whether the state is visible.
-    pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
+    pub fn conclude(&mut self, open: &PendingTurn, now: SimTime, work_s: f64) -> bool {
         let missed = now > self.pace.scene_time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
         // metrics first: a state that is visible is accounted for

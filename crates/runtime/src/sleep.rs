@@ -8,14 +8,14 @@
 //! No wake is lost: an agent that goes to rest raises `resting` first and reads `woken` and `touched` after; a caller that wakes it writes
 //! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 
-use super::dirty_set::News;
+use super::dirty_set::DirtySet;
 use super::sync::atomic::{
     AtomicBool, AtomicU32, AtomicU64,
     Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
     fence,
 };
 use super::sync::thread::Thread;
-use super::worker_wakeup::Bell;
+use super::worker_wakeup::WorkerWakeup;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
 
@@ -59,7 +59,7 @@ impl Default for Signal {
 
 /// The flags of all agents of a run.
 #[derive(Debug)]
-pub(super) struct Switchboard {
+pub(super) struct SleepRegistry {
     signals: Vec<Signal>,
     /// An agent was summoned: the lockstep loop serves it.
     rung: AtomicBool,
@@ -67,12 +67,12 @@ pub(super) struct Switchboard {
     /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
     far_behind: AtomicU64,
     /// Wake-up of the workers, where agents have no threads of their own.
-    bell: OnceLock<Bell>,
+    bell: OnceLock<WorkerWakeup>,
     /// Agents with new states, for the reader of the run.
-    pub news: News,
+    pub news: DirtySet,
 }
 
-impl Switchboard {
+impl SleepRegistry {
     pub fn new(agents: usize) -> Self {
         let signals = std::iter::repeat_with(Signal::default).take(agents).collect();
         Self {
@@ -81,17 +81,17 @@ impl Switchboard {
             stop: AtomicBool::new(false),
             far_behind: AtomicU64::new(0),
             bell: OnceLock::new(),
-            news: News::new(agents),
+            news: DirtySet::new(agents),
         }
     }
 
     /// From now on summons go to this many workers of a pool.
     pub fn hire(&self, workers: usize) {
-        self.bell.get_or_init(|| Bell::new(self.signals.len(), workers));
+        self.bell.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
     }
 
     /// Wake-up of the workers; `None` where every agent has its own thread.
-    pub fn bell(&self) -> Option<&Bell> {
+    pub fn bell(&self) -> Option<&WorkerWakeup> {
         self.bell.get()
     }
 
@@ -282,13 +282,13 @@ mod tests {
 
     const ME: AgentId = AgentId(0);
 
-    fn try_rest(board: &Switchboard, now: SimTime) -> bool {
+    fn try_rest(board: &SleepRegistry, now: SimTime) -> bool {
         board.try_rest(ME, std::iter::empty(), now)
     }
 
     #[test]
     fn a_wake_before_the_rest_is_not_lost() {
-        let board = Switchboard::new(1);
+        let board = SleepRegistry::new(1);
         board.wake(ME);
         assert!(!try_rest(&board, SimTime::ZERO), "woken before it lay down");
         assert!(try_rest(&board, SimTime::ZERO), "that wake is used up");
@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn a_touched_agent_stays_awake_for_the_hold() {
-        let board = Switchboard::new(1);
+        let board = SleepRegistry::new(1);
         board.touch(ME, SimTime::ZERO);
         assert!(!try_rest(&board, SimTime::from_nanos(99_999_999)));
         assert!(try_rest(&board, SimTime::from_nanos(100_000_000)));
@@ -310,7 +310,7 @@ mod tests {
 
     #[test]
     fn who_is_led_wakes_its_leader_and_the_leaders_leader() {
-        let board = Switchboard::new(3);
+        let board = SleepRegistry::new(3);
         board.follow(AgentId(2), Some(AgentId(1)));
         board.follow(AgentId(1), Some(ME));
         assert_eq!(board.leader(AgentId(2)), ME);
@@ -328,7 +328,7 @@ mod tests {
 
     #[test]
     fn who_was_far_behind_is_forgotten_after_a_while() {
-        let (board, at) = (Switchboard::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
+        let (board, at) = (SleepRegistry::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
         assert!(!board.is_anybody_far_behind(SimTime::ZERO));
         board.note_far_behind(SimTime::ZERO);
         assert!(board.is_anybody_far_behind(at(1999)) && !board.is_anybody_far_behind(at(2000)));
@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn strangers_are_nobody() {
-        let board = Switchboard::new(1);
+        let board = SleepRegistry::new(1);
         board.wake(AgentId(7));
         board.touch(AgentId(7), SimTime::ZERO);
         assert!(!board.take_rung());

@@ -3,24 +3,24 @@
 //! In: [`AgentSpawn`]s; an agent's number is its place in their list. Out: actors and handles, or a [`RunError`].
 //! Never here: threads, time passing.
 
-use super::agent_clock::Pace;
-use super::agent_runner::{Actor, Rhythm};
-use super::broad_phase::Crowd;
+use super::agent_clock::AgentClock;
+use super::agent_runner::{AgentRunner, TurnPeriod};
+use super::broad_phase::BroadPhase;
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
-use super::histogram::Times;
+use super::histogram::Histogram;
 use super::island::{Company as Led, Seating, assign};
 use super::mailbox::Mailbox;
-use super::metrics::{Diary, Gauges};
+use super::metrics::{Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
 use super::probe::{Trace, Watch};
-use super::sleep::Switchboard;
+use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use metachron_contact::Agent;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{Form, FormKind};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::{Arc, Mutex};
 
 /// Description of an agent to be started.
@@ -143,29 +143,29 @@ pub enum RunError {
 }
 
 /// The agents of a run, before their first turn.
-pub(super) struct Company {
+pub(super) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
-    pub actors: Vec<Option<Box<Actor>>>,
+    pub actors: Vec<Option<Box<AgentRunner>>>,
     pub handles: Vec<AgentHandle>,
-    pub board: Arc<Switchboard>,
+    pub board: Arc<SleepRegistry>,
 }
 
 /// Assembles all agents; each has published its initial state, at simulated time zero.
-pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<Company, RunError> {
+pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<AssembledRun, RunError> {
     let count = spawns.len();
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
-    let board = Arc::new(Switchboard::new(count));
+    let board = Arc::new(SleepRegistry::new(count));
     let (peers, writers) = peers(&mut spawns, &board);
     let peers = Arc::new(peers);
     let together: Vec<_> = spawns.iter().map(|spawn| spawn.together).collect();
     let ids = (0..).map(AgentId);
     let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
     let mut actors: Vec<_> = actors.collect();
-    actors.iter_mut().for_each(Actor::introduce);
-    actors.iter_mut().for_each(Actor::look);
+    actors.iter_mut().for_each(AgentRunner::introduce);
+    actors.iter_mut().for_each(AgentRunner::look);
     let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(Company { actors: assign(actors, &together), handles, board })
+    Ok(AssembledRun { actors: assign(actors, &together), handles, board })
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -208,10 +208,11 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 }
 
 /// The data fixed at the start, and the writer of each agent.
-fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+fn peers(spawns: &mut [AgentSpawn], board: &Arc<SleepRegistry>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
     // only rigid bodies can lead and be led
-    let rigid = |form: &Option<Arc<Form>>| form.as_ref().is_some_and(|form| matches!(form.kind, FormKind::Solid(_)));
+    let rigid =
+        |form: &Option<Arc<CollisionShape>>| form.as_ref().is_some_and(|form| matches!(form.kind, ShapeKind::Solid(_)));
     let led = forms.iter().filter(|form| rigid(form)).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
@@ -223,7 +224,7 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
         all.push(Peer { shared, form, laws: Vec::new() });
     }
     settle_laws(spawns, &mut all);
-    let crowd = meet_at_all(&all).then(|| Crowd::new(all.len()));
+    let crowd = meet_at_all(&all).then(|| BroadPhase::new(all.len()));
     let linked = linked(spawns);
     (Peers { all, crowd, linked }, writers)
 }
@@ -262,7 +263,7 @@ fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
 fn shared(
     id: AgentId,
     spawn: &mut AgentSpawn,
-    (board, writer): (&Arc<Switchboard>, &SlotWriter<Snapshot>),
+    (board, writer): (&Arc<SleepRegistry>, &SlotWriter<Snapshot>),
     seated: bool,
 ) -> Shared {
     Shared {
@@ -270,17 +271,17 @@ fn shared(
         name: std::mem::take(&mut spawn.name).into(),
         model: spawn.agent.model(),
         wanted_hz: spawn.rate_hz,
-        gauges: Gauges::default(),
+        gauges: Metrics::default(),
         mail: Mailbox::default(),
         slot: writer.slot(),
         board: Arc::clone(board),
         seating: seated.then(Seating::default),
-        ages: Mutex::new(Times::default()),
+        ages: Mutex::new(Histogram::default()),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
 }
 
-fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> Actor {
+fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> AgentRunner {
     let me = &peers.all[id.0 as usize];
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
@@ -288,11 +289,11 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
             links.push(link);
         }
     }
-    Actor {
+    AgentRunner {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
         agent: spawn.agent,
-        pace: Pace::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
+        pace: AgentClock::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
         dt_range: spawn.dt_range,
         range: spawn.range,
         governor: spawn.governor,
@@ -302,8 +303,8 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         links: spawn.attached,
         hands: Vec::with_capacity(1),
         company: Led::default(),
-        diary: Diary::new(),
-        rhythm: Rhythm::default(),
+        diary: MetricsWriter::new(),
+        rhythm: TurnPeriod::default(),
         open: None,
         beside: None,
         withheld: false,
@@ -337,7 +338,7 @@ mod tests {
 
     /// Whether a crowd is set up, and how many agents can lead or be led.
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
-        let board = Arc::new(Switchboard::new(spawns.len()));
+        let board = Arc::new(SleepRegistry::new(spawns.len()));
         let (peers, _) = peers(&mut spawns, &board);
         (peers.crowd.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
     }

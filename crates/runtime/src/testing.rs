@@ -5,14 +5,14 @@ use super::spawn::AgentSpawn;
 use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
 use metachron_contact::Exchange;
-use metachron_contact::{Agent, Companion, Surroundings};
+use metachron_contact::{Agent, Companion, StepContext};
 use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport,
 };
 use metachron_core::{Impulse, Site};
 use metachron_geometry::Solid;
-use metachron_geometry::{Form, FormKind, SolidForm};
+use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use rapier3d::geometry::SharedShape;
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -162,14 +162,14 @@ impl Dummy {
         AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
     }
 
-    fn write_down(&self, to: SimTime, around: &Surroundings<'_>) {
+    fn write_down(&self, to: SimTime, around: &StepContext<'_>) {
         let Some(log) = &self.log else { return };
         let thread = thread::current().name().unwrap_or_default().to_owned();
         let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
         log.lock().unwrap().push(Made { id: around.me, from: around.time, to, thread, saw });
     }
 
-    fn trade(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+    fn trade(&mut self, around: &StepContext<'_>, dt_s: f64) {
         let taken = &mut self.taken;
         self.exchange.open(around);
         self.exchange.take(around, around.time, |_, _, impulse, _| *taken += impulse.linear.x);
@@ -204,7 +204,7 @@ impl Agent for Dummy {
         "synthetic"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = dt.as_secs_f64();
         match self.fault.filter(|(step, _)| *step == self.steps + 1) {
             Some((_, Fault::NotFinite)) => self.x = f64::NAN,
@@ -232,7 +232,7 @@ impl Agent for Dummy {
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
     }
 
-    fn longest_step(&self, dt: SimSpan, _around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, _around: &StepContext<'_>) -> SimSpan {
         let shorter = self.short.filter(|(until, _)| self.steps < *until);
         shorter.map_or(dt, |(_, span)| dt.min(span))
     }
@@ -241,7 +241,7 @@ impl Agent for Dummy {
         Some(self.resolution)
     }
 
-    fn retune(&mut self, wanted: Resolution) {
+    fn set_resolution(&mut self, wanted: Resolution) {
         self.resolution = wanted;
     }
 
@@ -272,19 +272,19 @@ impl Agent for Dummy {
         0.0
     }
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         self.ball.map(|(radius_m, _)| {
             let solid = Solid::Ball { radius_m };
             let shape = SharedShape::ball(radius_m as f32);
-            let kind = FormKind::Solid(SolidForm { solid, shape, com_local: DVec3::ZERO, radius_m });
-            Arc::new(Form { kind, friction: 0.0, restitution: 0.0 })
+            let kind = ShapeKind::Solid(SolidShape { solid, shape, com_local: DVec3::ZERO, radius_m });
+            Arc::new(CollisionShape { kind, friction: 0.0, restitution: 0.0 })
         })
     }
 
     fn lead(
         &mut self,
         dt: SimSpan,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         others: &mut [Companion<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {

@@ -6,15 +6,15 @@
 
 use super::Run;
 use super::agent_clock::{Drive, SharedTimeline, Timeline};
-use super::agent_runner::{Actor, Next};
+use super::agent_runner::{AgentRunner, Next};
 use super::clock::{Clock, wait_until};
 use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
 use super::island::{Seating, empty_rooms, move_in};
 use super::metrics::AgentStats;
 use super::priority::Priority;
-use super::sleep::Switchboard;
-use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use super::sleep::SleepRegistry;
+use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_millis(400);
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
-    board: Arc<Switchboard>,
+    board: Arc<SleepRegistry>,
     handles: Vec<AgentHandle>,
     threads: Vec<Option<JoinHandle<()>>>,
     ended: Receiver<AgentId>,
@@ -52,7 +52,7 @@ impl Threads {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
         }
-        let Company { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, board } = assemble(spawns)?;
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, Drive::Pause);
         let (sender, ended) = channel();
@@ -69,14 +69,14 @@ impl Threads {
 
     fn spawn(
         &self,
-        actor: Option<Box<Actor>>,
+        actor: Option<Box<AgentRunner>>,
         shared: Arc<Shared>,
         ended: Sender<AgentId>,
     ) -> Result<JoinHandle<()>, RunError> {
         let name = format!("agent:{}", shared.name.replace('\0', ""));
         let stage =
             Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
-        let farewell = Farewell { id: shared.id, ended };
+        let farewell = EndNotice { id: shared.id, ended };
         let builder = thread::Builder::new().name(name.clone());
         let priority = self.priority;
         let body = move || {
@@ -145,12 +145,12 @@ impl Run for Threads {
 }
 
 /// Reports that a thread has ended, for whatever reason.
-struct Farewell {
+struct EndNotice {
     id: AgentId,
     ended: Sender<AgentId>,
 }
 
-impl Drop for Farewell {
+impl Drop for EndNotice {
     fn drop(&mut self) {
         // the send fails only after the final timeout, when the report is no longer needed
         let _ = self.ended.send(self.id);
@@ -166,7 +166,7 @@ struct Stage {
 
 impl Stage {
     /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
-    fn live(mut self, mut here: Option<Box<Actor>>, shared: &Shared) {
+    fn live(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) {
         while !shared.board.stopping() {
             here = match here {
                 Some(actor) => match self.live_alone(actor) {
@@ -183,7 +183,7 @@ impl Stage {
     }
 
     /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
-    fn live_alone(&mut self, mut actor: Box<Actor>) -> Option<Box<Actor>> {
+    fn live_alone(&mut self, mut actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let board = Arc::clone(&actor.shared.board);
         let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
         while !board.stopping() {
@@ -205,7 +205,7 @@ impl Stage {
     }
 
     /// Waits until the agent returns from its leader.
-    fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<Actor>> {
+    fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<AgentRunner>> {
         let home = seating.and_then(Seating::come_home);
         if home.is_none() {
             thread::park();
@@ -214,7 +214,7 @@ impl Stage {
     }
 
     /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which is harmless.
-    fn wait_or_turn(&mut self, actor: &mut Actor) -> Next {
+    fn wait_or_turn(&mut self, actor: &mut AgentRunner) -> Next {
         let timeline = self.timeline.read();
         let now = self.clock.now();
         match actor.pace.due(&timeline) {
@@ -231,7 +231,7 @@ impl Stage {
         }
     }
 
-    fn doze(&mut self, actor: &mut Actor) -> Next {
+    fn doze(&mut self, actor: &mut AgentRunner) -> Next {
         if actor.wakes(&self.timeline.read(), self.clock.now()) {
             return Next::Due;
         }
@@ -240,7 +240,7 @@ impl Stage {
         Next::Rest
     }
 
-    fn turn(&mut self, actor: &mut Actor, timeline: &Timeline, began: Duration) -> Next {
+    fn turn(&mut self, actor: &mut AgentRunner, timeline: &Timeline, began: Duration) -> Next {
         self.batch.open();
         let started = Instant::now();
         let next = match actor.begin(timeline, began) {
@@ -258,7 +258,7 @@ impl Stage {
         next
     }
 
-    fn settle(&mut self, actor: &mut Actor) {
+    fn settle(&mut self, actor: &mut AgentRunner) {
         if !self.batch.is_empty() {
             actor.settle(self.batch.close());
         }

@@ -19,27 +19,27 @@ use std::time::Duration;
 
 /// The marks of all agents and the sleep states of all workers.
 #[derive(Debug)]
-pub(super) struct Bell {
+pub(super) struct WorkerWakeup {
     /// One bit per agent.
     marks: Vec<AtomicU64>,
     rung: AtomicBool,
-    beds: Vec<Bed>,
+    beds: Vec<Parker>,
 }
 
 /// Sleep state of one worker.
 #[derive(Debug, Default)]
-struct Bed {
+struct Parker {
     asleep: AtomicBool,
     /// Changes only when a worker is replaced.
     thread: Mutex<Option<Thread>>,
 }
 
-impl Bell {
+impl WorkerWakeup {
     pub fn new(agents: usize, workers: usize) -> Self {
         Self {
             marks: std::iter::repeat_with(AtomicU64::default).take(agents.div_ceil(64)).collect(),
             rung: AtomicBool::new(false),
-            beds: std::iter::repeat_with(Bed::default).take(workers).collect(),
+            beds: std::iter::repeat_with(Parker::default).take(workers).collect(),
         }
     }
 
@@ -69,7 +69,7 @@ impl Bell {
 
     /// Makes every worker check for work, whether it sleeps or is about to.
     pub fn rouse_all(&self) {
-        self.beds.iter().for_each(Bed::wake);
+        self.beds.iter().for_each(Parker::wake);
     }
 
     /// Whether any agent was summoned since the last [`Self::answer`].
@@ -109,7 +109,7 @@ impl Bell {
     }
 }
 
-impl Bed {
+impl Parker {
     fn wake(&self) {
         if let Some(thread) = &*self.thread.lock().unwrap_or_else(PoisonError::into_inner) {
             thread.unpark();
@@ -121,7 +121,7 @@ impl Bed {
 mod tests {
     use super::*;
 
-    fn answered(bell: &Bell) -> Vec<u32> {
+    fn answered(bell: &WorkerWakeup) -> Vec<u32> {
         let mut seen = Vec::new();
         let count = bell.answer(|id| seen.push(id.0));
         assert_eq!(count, seen.len());
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn who_was_summoned_is_found_once() {
-        let bell = Bell::new(200, 1);
+        let bell = WorkerWakeup::new(200, 1);
         assert!(answered(&bell).is_empty());
         [199, 3, 64, 3, 0].iter().for_each(|id| bell.ring(AgentId(*id)));
         assert!(bell.has_rung());
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn nobody_sleeps_through_a_summons() {
-        let bell = Bell::new(1, 1);
+        let bell = WorkerWakeup::new(1, 1);
         let (rings, done) = (20_000, AtomicBool::new(false));
         let answered = AtomicU64::new(0);
         std::thread::scope(|scope| {

@@ -3,13 +3,13 @@
 //! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
 //! Never here: time passing.
 
-use super::cpu_budget::Tally;
-use super::error_control::Holding;
+use super::cpu_budget::AgentBudget;
+use super::error_control::ErrorStatus;
 use super::governor::{ErrorGovernor, RateGovernor};
 use glam::DVec3;
 use metachron_contact::Agent;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
-use metachron_geometry::FormKind;
+use metachron_geometry::ShapeKind;
 use metachron_geometry::{Primitive, Solid, ToolShape, patch};
 use metachron_lod::control;
 use metachron_lod::control::{
@@ -19,7 +19,7 @@ use metachron_lod::control::{
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftShape, SoftSpec};
 use metachron_render;
-use metachron_render::{Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
+use metachron_render::{Actor, Camera, Form, Level, Look, Material, ROPE_LEVEL, SceneView, Seen, StaticObject};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world;
 use metachron_world::kinds;
@@ -51,9 +51,9 @@ impl Governors {
 #[derive(Debug, Default)]
 pub(super) struct Steered {
     /// Controllers that keep a rate.
-    pub tallies: Vec<Arc<Tally>>,
+    pub tallies: Vec<Arc<AgentBudget>>,
     /// Controllers that hold an error.
-    pub holdings: Vec<Arc<Holding>>,
+    pub holdings: Vec<Arc<ErrorStatus>>,
 }
 
 /// The share of its period that one agent's work may take, so that all agents fit on `cores` next to the frame loop.
@@ -83,7 +83,7 @@ fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dy
         return None;
     }
     let limits = (control.least_part(), control.share());
-    let tally = Arc::new(Tally::new(member.id, member.pace.rate_hz, limits));
+    let tally = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, limits));
     steered.tallies.push(Arc::clone(&tally));
     Some(Box::new(RateGovernor(control, tally)))
 }
@@ -102,13 +102,13 @@ fn error_governor(
     if !control.steers() {
         return None;
     }
-    let holding = Holding::new(member.id, tolerance_m);
+    let holding = ErrorStatus::new(member.id, tolerance_m);
     steered.holdings.push(Arc::clone(&holding));
     Some(Box::new(ErrorGovernor(control, holding)))
 }
 
 /// All drawable objects: agents, then scenery, then the proxies of groups.
-pub fn stage(scene: &Scene) -> Stage {
+pub fn stage(scene: &Scene) -> SceneView {
     let agents =
         scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
     let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
@@ -117,8 +117,8 @@ pub fn stage(scene: &Scene) -> Stage {
     });
     let actors = agents.chain(still);
     let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
-    let props = props.map(|(obstacle, wish)| Prop { obstacle: obstacle.clone(), look: look(wish) });
-    let mut stage = Stage::new(actors.collect(), props.collect());
+    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), look: look(wish) });
+    let mut stage = SceneView::new(actors.collect(), props.collect());
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
             stage.paint(AgentId(id), texture);
@@ -149,7 +149,7 @@ fn soft_form(spec: &SoftSpec) -> Form {
     }
     let form = SoftBody::new(spec.clone()).ok().and_then(|body| body.form());
     match form.as_deref().map(|form| &form.kind) {
-        Some(FormKind::Surface(skin)) => Form::Skin(skin.clone()),
+        Some(ShapeKind::Surface(skin)) => Form::Skin(skin.clone()),
         _ => Form::Unseen,
     }
 }
@@ -352,7 +352,7 @@ fn solid_triangles(solid: &Solid, n: u8) -> u32 {
 }
 
 /// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
-pub fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
+pub fn camera(scene: &Scene, stage: &SceneView, seconds: f64) -> Camera {
     match &scene.camera {
         Some(camera) => {
             let view = camera.view_at(seconds);
@@ -365,7 +365,7 @@ pub fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
 /// Vertical angle of view of the default camera, radians.
 const OVERVIEW_FOV_RAD: f64 = 0.7;
 
-fn overview(stage: &Stage) -> Camera {
+fn overview(stage: &SceneView) -> Camera {
     let (centre, radius_m) = stage.bounds(None).unwrap_or((DVec3::ZERO, 1.0));
     let distance = 1.1 * radius_m / libm::sin(0.5 * OVERVIEW_FOV_RAD);
     let towards = DVec3::new(0.35, -1.0, 0.55).normalize();

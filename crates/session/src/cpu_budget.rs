@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Numbers exchanged between a steered agent and the frame loop.
 #[derive(Debug)]
-pub(super) struct Tally {
+pub(super) struct AgentBudget {
     /// The agent.
     id: AgentId,
     /// Its requested step rate, Hz.
@@ -30,7 +30,7 @@ pub(super) struct Tally {
     plain: AtomicU64,
 }
 
-impl Tally {
+impl AgentBudget {
     /// Nothing is reported yet.
     pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
         let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
@@ -73,8 +73,8 @@ impl Tally {
 
 /// The processor shared by agents and pictures.
 #[derive(Debug, Default)]
-pub(super) struct Purse {
-    tallies: Vec<Arc<Tally>>,
+pub(super) struct CpuBudget {
+    tallies: Vec<Arc<AgentBudget>>,
     workers: Vec<Worker>,
     market: Market,
     open: bool,
@@ -85,9 +85,9 @@ const UNSEEN_PX: f64 = 100.0;
 /// Fraction of its pixels that an agent at its finest draws wrong, however slowly it moves.
 const ERROR_LEAST: f64 = 0.01;
 
-impl Purse {
+impl CpuBudget {
     /// The CPU budget of these agents.
-    pub fn new(tallies: Vec<Arc<Tally>>) -> Self {
+    pub fn new(tallies: Vec<Arc<AgentBudget>>) -> Self {
         Self { tallies, ..Self::default() }
     }
 

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Published state of one agent's controller; lock-free.
 #[derive(Debug)]
-pub(super) struct Holding {
+pub(super) struct ErrorStatus {
     agent: AgentId,
     tolerance_m: f64,
     rests: AtomicU8,
@@ -25,7 +25,7 @@ pub struct Held {
     pub rests: Option<Bound>,
 }
 
-impl Holding {
+impl ErrorStatus {
     /// Of an agent whose controller rests at neither end yet.
     pub fn new(agent: AgentId, tolerance_m: f64) -> Arc<Self> {
         Arc::new(Self { agent, tolerance_m, rests: AtomicU8::new(0) })
@@ -52,6 +52,6 @@ impl Holding {
 }
 
 /// Whether this agent meets its tolerance; `None` for an agent without one.
-pub(super) fn held(all: &[Arc<Holding>], agent: AgentId) -> Option<Held> {
+pub(super) fn held(all: &[Arc<ErrorStatus>], agent: AgentId) -> Option<Held> {
     all.iter().find(|one| one.agent == agent).map(|one| one.held())
 }

@@ -2,8 +2,8 @@
 //!
 //! In: a turn's measure. Out: a demand on dt and on the simulation's ε. Never here: the law.
 
-use super::cpu_budget::Tally;
-use super::error_control::Holding;
+use super::cpu_budget::AgentBudget;
+use super::error_control::ErrorStatus;
 use metachron_core::{Resolution, SimSpan};
 use metachron_lod::control;
 use metachron_lod::control::{ErrorControl, ErrorMeasure, RateControl, RateDemand};
@@ -11,7 +11,7 @@ use metachron_runtime::{Demand, Governor, TurnMeasure};
 use std::sync::Arc;
 
 /// An agent's rate control as a governor of the runtime, and the data it shares with the frame loop.
-pub(super) struct RateGovernor(pub RateControl, pub Arc<Tally>);
+pub(super) struct RateGovernor(pub RateControl, pub Arc<AgentBudget>);
 
 impl Governor for RateGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
@@ -33,7 +33,7 @@ impl Governor for RateGovernor {
 }
 
 /// An agent's error control as a governor of the runtime, and the data it publishes for the frame loop.
-pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<Holding>);
+pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<ErrorStatus>);
 
 impl Governor for ErrorGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {

@@ -4,7 +4,7 @@
 
 use cpu_time::ThreadTime;
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
@@ -49,7 +49,7 @@ fn swinging(integrator: Integrator) -> Option<Tube> {
 fn batch_s(tube: &mut Tube) -> Option<f64> {
     let (start, mut work) = (ThreadTime::now(), 0.0);
     for _ in 0..STEPS {
-        work += tube.step(DT, &Surroundings::alone(AgentId(0), SimTime::ZERO)).ok()?.work;
+        work += tube.step(DT, &StepContext::alone(AgentId(0), SimTime::ZERO)).ok()?.work;
     }
     Some(start.elapsed().as_secs_f64() / work)
 }

@@ -11,19 +11,19 @@ use super::assemble;
 #[cfg(feature = "picture")]
 use super::calibrate;
 use super::coupling_record::{Coupling, Couplings};
-use super::cpu_budget::Purse;
+use super::cpu_budget::CpuBudget;
 use super::error::SessionError;
 use super::error_control;
-use super::error_control::Holding;
+use super::error_control::ErrorStatus;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::trace::Trace;
-use super::visible_resolution::Sight;
-use metachron_contact::Pull;
+use super::visible_resolution::VisibleResolution;
+use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Body, SimTime};
 use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
-use metachron_render::{Camera, Level, Picture, Stage, States};
+use metachron_render::{Camera, Level, Picture, SceneView, States};
 use metachron_runtime;
 use metachron_runtime::{AgentHandle, Command, Drive, Machine, Reader};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
@@ -38,13 +38,13 @@ pub struct Session {
     /// Drawing costs on the declared machine.
     declared: Prices,
     world: World,
-    stage: Stage,
+    stage: SceneView,
     control: PictureControl,
     /// Whether pictures are drawn on the processor that agents step on.
     shares_processor: bool,
-    purse: Purse,
-    holdings: Vec<Arc<Holding>>,
-    sight: Sight,
+    purse: CpuBudget,
+    holdings: Vec<Arc<ErrorStatus>>,
+    sight: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
     levels: Vec<Level>,
@@ -131,8 +131,8 @@ impl Session {
         Ok(Self {
             control: assemble::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep,
-            sight: Sight::new(&steered.tallies),
-            purse: Purse::new(steered.tallies),
+            sight: VisibleResolution::new(&steered.tallies),
+            purse: CpuBudget::new(steered.tallies),
             holdings: steered.holdings,
             reader: Reader::new(world.agents()),
             stage,
@@ -281,7 +281,7 @@ impl Session {
 
     /// All drawable objects.
     #[must_use]
-    pub const fn stage(&self) -> &Stage {
+    pub const fn stage(&self) -> &SceneView {
         &self.stage
     }
 
@@ -341,7 +341,7 @@ impl Session {
     }
 
     /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
-    pub fn hand(&self, to: AgentId, pull: Option<Pull>) -> Result<(), metachron_runtime::SendError> {
+    pub fn hand(&self, to: AgentId, pull: Option<AnchorSpring>) -> Result<(), metachron_runtime::SendError> {
         self.world.send(to, Command::Hand(pull))
     }
 

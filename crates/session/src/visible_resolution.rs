@@ -3,31 +3,31 @@
 //! In: what the camera sees of every actor. Out: for each steered agent, the ε below which no difference is visible. Never here: the
 //! agent's reaction to it ([`metachron_lod::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
 
-use super::cpu_budget::Tally;
+use super::cpu_budget::AgentBudget;
 use metachron_render::{Camera, Seen, Size};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Visibility of the steered agents.
 #[derive(Debug)]
-pub(super) struct Sight {
+pub(super) struct VisibleResolution {
     watched: Vec<Watched>,
 }
 
 /// A steered agent, and when it was last in view.
 #[derive(Debug)]
 struct Watched {
-    tally: Arc<Tally>,
+    tally: Arc<AgentBudget>,
     seen_at: Duration,
 }
 
 /// An object counts as out of sight after it has not been in view for this long: cameras turn back.
 const GONE: Duration = Duration::from_secs(1);
 
-impl Sight {
+impl VisibleResolution {
     /// No agent has been in view yet.
-    pub fn new(tallies: &[Arc<Tally>]) -> Self {
-        let watch = |tally: &Arc<Tally>| Watched { tally: Arc::clone(tally), seen_at: Duration::ZERO };
+    pub fn new(tallies: &[Arc<AgentBudget>]) -> Self {
+        let watch = |tally: &Arc<AgentBudget>| Watched { tally: Arc::clone(tally), seen_at: Duration::ZERO };
         Self { watched: tallies.iter().map(watch).collect() }
     }
 

@@ -4,7 +4,7 @@
 //! session stays as it was, except during the experiment's frames. Never here: a window, what good gains are ([`metachron_lod::tune`] says).
 
 use metachron_lod::control::{Law, PictureControl, Policy};
-use metachron_lod::tune::{Contender, Extent, Family, Observed, Plant, Search, Verdict, refusal, search};
+use metachron_lod::tune::{Candidate, Extent, Family, Observed, Plant, Search, Verdict, refusal, search};
 use metachron_session::Design;
 use metachron_session::Session;
 use std::num::NonZero;
@@ -162,12 +162,12 @@ pub(super) fn told(verdict: &Verdict) -> String {
     let settles = verdict.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
     let late = 100.0 * verdict.miss_share;
     match verdict.contender {
-        Contender::Feedback(Law::Corrected { kappa, margin, .. }) => {
+        Candidate::Feedback(Law::Corrected { kappa, margin, .. }) => {
             format!("κ {kappa:.2}, margin {:.0} %: {settles}, {late:.1} % late", 100.0 * margin)
         }
-        Contender::Feedback(Law::Printed { alpha, beta }) => {
+        Candidate::Feedback(Law::Printed { alpha, beta }) => {
             format!("α {alpha:.1e}, β {beta:.2}: {settles}, {late:.1} % late")
         }
-        Contender::Adaptive { margin } => format!("margin {:.0} %: {settles}, {late:.1} % late", 100.0 * margin),
+        Candidate::Adaptive { margin } => format!("margin {:.0} %: {settles}, {late:.1} % late", 100.0 * margin),
     }
 }

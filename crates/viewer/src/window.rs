@@ -12,7 +12,7 @@ use crate::ui::{
     run_window,
 };
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimSpan};
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
@@ -233,7 +233,7 @@ impl<'a> WindowShow<'a> {
         self.hand = hand;
         if let Some(hand) = hand {
             let mass_kg = view_model::mass_kg(&self.session.scene().agents[hand.object.0 as usize].spec);
-            let pull = Pull {
+            let pull = AnchorSpring {
                 by: None,
                 anchor: hand.anchor,
                 target: hand.target,
@@ -245,7 +245,7 @@ impl<'a> WindowShow<'a> {
         }
     }
 
-    fn tell(&mut self, to: AgentId, pull: Option<Pull>) {
+    fn tell(&mut self, to: AgentId, pull: Option<AnchorSpring>) {
         if let Err(error) = self.session.hand(to, pull) {
             self.say(Weight::Warning, error.to_string());
         }
@@ -268,7 +268,7 @@ impl<'a> WindowShow<'a> {
         let Some(tuning) = self.tuning.take_if(|tuning| tuning.is_over()) else { return };
         match tuning.end() {
             Tuned::Found(verdict) => {
-                if let metachron_lod::tune::Contender::Feedback(law) = verdict.contender {
+                if let metachron_lod::tune::Candidate::Feedback(law) = verdict.contender {
                     self.session.control().set_policy(Policy::Feedback);
                     self.session.control().set_law(law);
                 }

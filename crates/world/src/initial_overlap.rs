@@ -10,13 +10,13 @@
 //! back along its shaft, the tool enters as it would from outside.
 
 use super::couplings::{Coupling, CouplingKind};
-use super::initial_shape::{Figure, figure};
+use super::initial_shape::{StartShape, figure};
 use super::overlap::{Inside, OVERLAP_MIN_M};
 use super::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_geometry::Touch;
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use std::collections::BTreeSet;
 
 /// An agent that starts elsewhere than the scene puts it, because there it would be inside another object.
@@ -55,7 +55,7 @@ impl Scene {
         if pairs.is_empty() {
             return;
         }
-        let mut figures: Vec<Figure> = self.agents.iter().filter_map(figure).collect();
+        let mut figures: Vec<StartShape> = self.agents.iter().filter_map(figure).collect();
         let movers: BTreeSet<AgentId> = pairs.iter().filter_map(|all| self.nearer_out(all, &figures)).collect();
         for mover in movers {
             let Some(at) = figures.iter().position(|figure| figure.id == mover) else { continue };
@@ -93,7 +93,7 @@ impl Scene {
     }
 
     /// The agent of `all` with the shortest way out of everything.
-    fn nearer_out(&self, all: &[AgentId], figures: &[Figure]) -> Option<AgentId> {
+    fn nearer_out(&self, all: &[AgentId], figures: &[StartShape]) -> Option<AgentId> {
         if let [one] = all {
             return Some(*one);
         }
@@ -131,8 +131,9 @@ impl Scene {
     }
 
     /// The shortest displacement that takes `figure` clear of everything it touches; for a tool, back along its shaft if that leads out.
-    fn way_out(&self, figure: &Figure, figures: &[Figure]) -> Option<DVec3> {
-        let mut around = Around { scene: self, figures, apart: self.pairs_apart(), room: TouchRoom::default() };
+    fn way_out(&self, figure: &StartShape, figures: &[StartShape]) -> Option<DVec3> {
+        let mut around =
+            Around { scene: self, figures, apart: self.pairs_apart(), room: NarrowPhaseScratch::default() };
         let back = figure.back();
         if let Some(way) = back
             && let Some(far_m) = around.clear(figure, way, f64::INFINITY)
@@ -157,16 +158,16 @@ impl Scene {
 /// The objects that an agent may be inside of.
 struct Around<'a> {
     scene: &'a Scene,
-    figures: &'a [Figure],
+    figures: &'a [StartShape],
     apart: BTreeSet<(AgentId, AgentId)>,
-    room: TouchRoom,
+    room: NarrowPhaseScratch,
 }
 
 impl Around<'_> {
     /// How far `figure` has to move along `way` to be clear, metres; `None` if that is `most_m` or more.
     ///
     /// It cannot be clear before it has moved as far as it is deep, so it moves by its depth and is tested again.
-    fn clear(&mut self, figure: &Figure, way: DVec3, most_m: f64) -> Option<f64> {
+    fn clear(&mut self, figure: &StartShape, way: DVec3, most_m: f64) -> Option<f64> {
         let mut far_m = 0.0;
         for _ in 0..PLACES {
             let deep_m = self.deepest(&figure.shifted(way * far_m), |_| {});
@@ -182,9 +183,9 @@ impl Around<'_> {
     }
 
     /// Depth of `figure` in any other object, metres, ≥ 0; calls `visit` with every touch.
-    fn deepest(&mut self, figure: &Figure, mut visit: impl FnMut(&Touch)) -> f64 {
+    fn deepest(&mut self, figure: &StartShape, mut visit: impl FnMut(&Touch)) -> f64 {
         let (mut found, mut deep_m) = (Vec::new(), 0.0_f64);
-        let mut look = |other: &Figure, room: &mut TouchRoom| {
+        let mut look = |other: &StartShape, room: &mut NarrowPhaseScratch| {
             touches(&figure.placed(), &other.placed(), 0.0, room, &mut found);
             for touch in &found {
                 deep_m = deep_m.max(-touch.gap_m);

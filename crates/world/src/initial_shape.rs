@@ -7,7 +7,7 @@ use super::scene::{Member, Spec};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{AgentId, Body, CurveState, Snapshot, SoftState};
-use metachron_geometry::{Form, FormKind, Placed, SolidForm, View};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use metachron_geometry::{Obstacle, Solid, ToolShape};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -18,9 +18,9 @@ const SLAB_SHARE: f64 = 4.0;
 const TOOL_TIP_RADII: f64 = 12.0;
 
 /// An agent's shape in its starting pose.
-pub(super) struct Figure {
+pub(super) struct StartShape {
     pub id: AgentId,
-    pub form: Form,
+    pub form: CollisionShape,
     place: Pose,
     pub low: DVec3,
     pub high: DVec3,
@@ -34,7 +34,7 @@ enum Pose {
     Tool(DVec3, DQuat, f64),
 }
 
-impl Figure {
+impl StartShape {
     pub fn meets(&self, other: &Self, reach_m: f64) -> bool {
         self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
     }
@@ -75,33 +75,33 @@ impl Figure {
         } else {
             (obstacle.solid.clone(), obstacle.position)
         };
-        let form = SolidForm::new(solid, DVec3::ZERO).ok()?;
+        let form = SolidShape::new(solid, DVec3::ZERO).ok()?;
         let radius = DVec3::splat(form.radius_m);
-        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0 };
+        let form = CollisionShape { kind: ShapeKind::Solid(form), friction: 0.0, restitution: 0.0 };
         let fixed =
             Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
         self.meets(&fixed, 0.0).then_some(fixed)
     }
 
-    pub fn placed(&self) -> Placed<'_> {
+    pub fn placed(&self) -> PlacedShape<'_> {
         let view = match &self.place {
-            Pose::Solid(position, rotation) => View::Solid { position: *position, rotation: *rotation },
-            Pose::Chain(curve) => View::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
-            Pose::Soft(soft) => View::Surface(&soft.positions),
-            Pose::Tool(tip, rotation, jaw) => View::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
+            Pose::Solid(position, rotation) => ShapePose::Solid { position: *position, rotation: *rotation },
+            Pose::Chain(curve) => ShapePose::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
+            Pose::Soft(soft) => ShapePose::Surface(&soft.positions),
+            Pose::Tool(tip, rotation, jaw) => ShapePose::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
         };
-        Placed { form: &self.form, view }
+        PlacedShape { form: &self.form, view }
     }
 }
 
 /// The shape of an agent at its start; `None` for one without contact.
-pub(super) fn figure(member: &Member) -> Option<Figure> {
-    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
+pub(super) fn figure(member: &Member) -> Option<StartShape> {
+    let form = |kind| CollisionShape { kind, friction: 0.0, restitution: 0.0 };
     let (kind, place, low, high) = match &member.spec {
         Spec::Rigid(spec) => {
-            let solid = SolidForm::new(spec.solid.clone(), DVec3::ZERO).ok()?;
+            let solid = SolidShape::new(spec.solid.clone(), DVec3::ZERO).ok()?;
             let (radius, at) = (DVec3::splat(solid.radius_m), spec.position);
-            (FormKind::Solid(solid), Pose::Solid(at, spec.rotation.normalize()), at - radius, at + radius)
+            (ShapeKind::Solid(solid), Pose::Solid(at, spec.rotation.normalize()), at - radius, at + radius)
         }
         Spec::Tube(spec) => {
             let mut start = Snapshot::default();
@@ -111,7 +111,7 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
             // held ends have no effect on overlap
-            (FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
+            (ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {
             let body = SoftBody::new(spec.clone()).ok()?;
@@ -125,9 +125,9 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
             let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
             let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
             let tip = key.tip_m + spec.starts_off_m;
-            (FormKind::Tool(shape), Pose::Tool(tip, key.rotation.normalize(), key.jaw), tip - reach, tip + reach)
+            (ShapeKind::Tool(shape), Pose::Tool(tip, key.rotation.normalize(), key.jaw), tip - reach, tip + reach)
         }
         Spec::Synthetic(_) => return None,
     };
-    Some(Figure { id: member.id, form: form(kind), place, low, high })
+    Some(StartShape { id: member.id, form: form(kind), place, low, high })
 }

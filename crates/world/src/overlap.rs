@@ -5,13 +5,13 @@
 //! Never here: the response to it.
 
 use super::couplings::{Coupling, CouplingKind};
-use super::initial_shape::{Figure, figure};
+use super::initial_shape::{StartShape, figure};
 use super::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::AgentId;
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
-use metachron_geometry::{FormKind, Place, Touch};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{Place, ShapeKind, Touch};
 use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
@@ -67,7 +67,7 @@ impl Scene {
     /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
     /// its axis is inside.
     fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
-        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Instrument(_)));
         for figure in unled.filter_map(figure) {
             let held = !(self.is_loose(figure.id) || matches!(self.agents[figure.id.0 as usize].spec, Spec::Rigid(_)));
@@ -131,8 +131,8 @@ impl Scene {
     }
 
     /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
-    fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure, f64)) {
-        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+    fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape, f64)) {
+        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         self.met(self.agents.iter().filter_map(figure).collect(), reach_m, |one, two| {
             touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
             if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
@@ -142,7 +142,7 @@ impl Scene {
     }
 
     /// Calls `visit` with every pair of `figures` that can collide and whose boxes are no farther apart than `reach_m`.
-    fn met(&self, mut figures: Vec<Figure>, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure)) {
+    fn met(&self, mut figures: Vec<StartShape>, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape)) {
         figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         let apart = self.pairs_apart();
         for (at, one) in figures.iter().enumerate() {
@@ -164,8 +164,8 @@ impl Scene {
     }
 
     /// Whether two agents collide; two tools never do.
-    pub(super) fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
-        let led = |figure: &Figure| matches!(figure.form.kind, FormKind::Tool(_));
+    pub(super) fn touch(&self, one: &StartShape, two: &StartShape, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
+        let led = |figure: &StartShape| matches!(figure.form.kind, ShapeKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
         named != self.contacts && !(led(one) && led(two))
     }

@@ -4,7 +4,7 @@
 //! holds; a claim that does not ends the program with the steps that break it. Never here: other copies of what is checked.
 //! With the feature `threads` the same claims are held against real threads, thousands of times, for ThreadSanitizer to watch.
 
-extern crate self as metachron_agents;
+extern crate self as metachron_core;
 
 /// What the files know as the runtime's `sync`.
 #[cfg(not(feature = "threads"))]
@@ -23,29 +23,29 @@ mod sync {
 
 /// The runtime's own.
 #[cfg(feature = "threads")]
-#[path = "../../src/runtime/sync.rs"]
+#[path = "../../../crates/runtime/src/sync.rs"]
 mod sync;
 
-#[path = "../../src/runtime/bell.rs"]
-mod bell;
-#[path = "../../src/runtime/news.rs"]
-mod news;
-#[path = "../../src/runtime/seqlock.rs"]
+#[path = "../../../crates/runtime/src/worker_wakeup.rs"]
+mod worker_wakeup;
+#[path = "../../../crates/runtime/src/dirty_set.rs"]
+mod dirty_set;
+#[path = "../../../crates/runtime/src/seqlock.rs"]
 mod seqlock;
-#[path = "../../src/runtime/slot.rs"]
+#[path = "../../../crates/runtime/src/slot.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod slot;
-#[path = "../../src/runtime/switchboard.rs"]
+#[path = "../../../crates/runtime/src/sleep.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
-mod switchboard;
-#[path = "../../agents/src/time.rs"]
+mod sleep;
+#[path = "../../../agents/core/src/time.rs"]
 mod time;
 
-use bell::Bell;
-use news::News;
+use worker_wakeup::WorkerWakeup;
+use dirty_set::DirtySet;
 use seqlock::{Glance, Seqlock};
 use slot::SlotWriter;
-use switchboard::Switchboard;
+use sleep::SleepRegistry;
 use sync::atomic::{AtomicU32, Ordering};
 use sync::{Arc, thread};
 pub use time::{SimSpan, SimTime};
@@ -120,7 +120,7 @@ fn slot_keeps_what_is_held() {
 }
 
 fn news_come_after_the_state() {
-    let (news, state) = (Arc::new(News::new(2)), Arc::new(AtomicU32::new(0)));
+    let (news, state) = (Arc::new(DirtySet::new(2)), Arc::new(AtomicU32::new(0)));
     let teller = {
         let (news, state) = (Arc::clone(&news), Arc::clone(&state));
         thread::spawn(move || {
@@ -139,7 +139,7 @@ fn news_come_after_the_state() {
 }
 
 fn nobody_sleeps_through_a_summons() {
-    let bell = Arc::new(Bell::new(1, 1));
+    let bell = Arc::new(WorkerWakeup::new(1, 1));
     let worker = {
         let bell = Arc::clone(&bell);
         thread::spawn(move || {
@@ -178,8 +178,8 @@ const LEADER: AgentId = AgentId(0);
 const LED: AgentId = AgentId(1);
 
 /// One goes to rest, and leads another, while `disturb` does something about it: in the end it must not rest unsummoned.
-fn meets_a_rest(disturb: fn(&Switchboard)) {
-    let board = Arc::new(Switchboard::new(2));
+fn meets_a_rest(disturb: fn(&SleepRegistry)) {
+    let board = Arc::new(SleepRegistry::new(2));
     let disturber = {
         let board = Arc::clone(&board);
         thread::spawn(move || disturb(&board))
@@ -206,7 +206,7 @@ fn a_wake_of_one_who_is_led_meets_a_rest() {
 }
 
 fn a_wake_meets_a_turn() {
-    let (board, letter) = (Arc::new(Switchboard::new(1)), Arc::new(AtomicU32::new(0)));
+    let (board, letter) = (Arc::new(SleepRegistry::new(1)), Arc::new(AtomicU32::new(0)));
     let sender = {
         let (board, letter) = (Arc::clone(&board), Arc::clone(&letter));
         thread::spawn(move || {

@@ -10,12 +10,12 @@ mod memory;
 use super::far::Far;
 use super::tanks::{Account, Tanks};
 use crate::{Contact, Exchange, Other, WAKE_M_S, inverse_mass};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 pub use feet::Feet;
 use glam::DVec3;
 use metachron_core::{Anchor, Inertia};
-use metachron_core::{PairKind, Slots, Twist};
-use metachron_geometry::{FormKind, Place, Placed, Touch};
+use metachron_core::{ContactJacobian, PairKind, Twist};
+use metachron_geometry::{Place, PlacedShape, ShapeKind, Touch};
 
 /// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
 const OTHERS_KEY: u64 = 1 << 63;
@@ -85,7 +85,7 @@ impl Mate {
     pub fn meet(
         &mut self,
         neighbour: &Neighbour,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         exchange: &Exchange,
         (friction, touched): (f64, bool),
     ) -> bool {
@@ -101,7 +101,7 @@ impl Mate {
     pub fn look(
         &mut self,
         neighbour: &Neighbour,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         (exchange, friction): (&Exchange, f64),
         stale: bool,
     ) -> bool {
@@ -229,14 +229,14 @@ impl Mate {
     pub fn speed(&self, all: &[DVec3]) -> f64 {
         let list = &all[self.slots.0..self.end()];
         let spin = match self.other.form().map(|form| &form.kind) {
-            Some(FormKind::Solid(solid)) => list[1].length() * solid.radius_m,
+            Some(ShapeKind::Solid(solid)) => list[1].length() * solid.radius_m,
             _ => 0.0,
         };
         list.iter().step_by(self.other.stride()).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt() + spin
     }
 
     /// Where it is, if it can be touched.
-    pub fn to_touch(&self) -> Option<Placed<'_>> {
+    pub fn to_touch(&self) -> Option<PlacedShape<'_>> {
         self.other.placed().filter(|_| self.touched)
     }
 
@@ -292,21 +292,21 @@ impl Mate {
         if self.back.len() != self.other.velocities().len() {
             return DVec3::ZERO;
         }
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         self.other.join(&mut slots, 0, &touch.on_b, (touch.normal, -1.0));
         let back = slots.velocity(&self.back) * self.fade;
         back - touch.normal * touch.normal.dot(back)
     }
 
     /// The velocities that a place joins, arms brought to the middle of the gap: force and torque then balance exactly.
-    pub fn slots_of(&self, touch: &Touch) -> Slots {
+    pub fn slots_of(&self, touch: &Touch) -> ContactJacobian {
         let half = 0.5 * touch.gap_m;
         let widened = |place: Place, out: DVec3| match place {
             Place::Point(point) => Place::Point(point + out * half),
             Place::Chain { segment, share, radius_m } => Place::Chain { segment, share, radius_m: radius_m + half },
             Place::Surface { .. } => place,
         };
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         widened(touch.on_a, -touch.normal).join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
         let there = widened(touch.on_b, touch.normal);
         self.other.join(&mut slots, self.slots.0 as u32, &there, (touch.normal, -1.0));
@@ -347,7 +347,7 @@ impl Mate {
     pub fn far(&mut self, there: Anchor, h: f64) -> Option<Far> {
         self.linked = true;
         let (point, velocity) = self.other.carried_m_s(there, h)?;
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         self.other.hold(&mut slots, there);
         let inverse_mass = self.other.inverse_mass(&slots);
         Some(Far { point, velocity, inverse_mass })
@@ -355,7 +355,7 @@ impl Mate {
 
     /// Adds what a link gives to one of its points.
     pub fn pull(&mut self, there: Anchor, impulse: DVec3) {
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         self.other.hold(&mut slots, there);
         self.lasting.resize(self.other.velocities().len(), DVec3::ZERO);
         slots.scatter(impulse, &mut self.lasting);
@@ -371,7 +371,7 @@ impl Mate {
 
     /// How one of its points moves by the velocities of [`Self::give_way`].
     pub fn yield_at(&self, there: Anchor) -> DVec3 {
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         self.other.hold(&mut slots, there);
         slots.velocity(&self.lasting)
     }

@@ -6,12 +6,12 @@ use super::Other;
 use crate::Exchange;
 use glam::{DMat3, DVec3};
 use metachron_core::{Body, Inertia};
-use metachron_core::{Impulse, Site, Slots};
+use metachron_core::{ContactJacobian, Impulse, Site};
 
 impl Other {
     /// The inverse mass of what gathers from `slots`, 1/kg: J A⁻¹ Jᵀ.
     #[must_use]
-    pub fn inverse_mass(&mut self, slots: &Slots) -> DMat3 {
+    pub fn inverse_mass(&mut self, slots: &ContactJacobian) -> DMat3 {
         let mut answer = std::mem::take(&mut self.answer);
         answer.resize(self.velocities.len(), DVec3::ZERO);
         let mut column = |axis: DVec3| {

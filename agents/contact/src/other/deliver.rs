@@ -8,7 +8,7 @@ use super::ground::LIFTED_M;
 use super::{Lasting, Other};
 use crate::beside::PART_MAX_S;
 use crate::{Exchange, acknowledged};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, DT_MAX_S, Inertia, SimTime};
 use metachron_core::{Impulse, Ledger, Rebound, Site, Twist};
@@ -30,7 +30,7 @@ impl Other {
     pub(super) fn deliver(
         &mut self,
         neighbour: &Neighbour,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         exchange: &Exchange,
         from: Option<DVec3>,
     ) {
@@ -106,7 +106,7 @@ impl Other {
 
     /// Adds what other owners have given a rigid body by the time `at`, and notes what they will give (eq. 6b); nothing of who
     /// is awake and has not been heard of for longer than any step lasts.
-    fn share(&mut self, flight: &mut Flight<'_>, around: &Surroundings<'_>, at: SimTime) {
+    fn share(&mut self, flight: &mut Flight<'_>, around: &StepContext<'_>, at: SimTime) {
         let to = flight.to;
         self.coming.clear();
         self.lasting.clear();

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/coupling.md, eq. 7l.
 
 use super::{Other, Pose};
-use crate::Surroundings;
+use crate::StepContext;
 use crate::{Exchange, Feet};
 use glam::DVec3;
 use metachron_core::Impulse;
@@ -24,7 +24,7 @@ pub(super) struct Lying {
 
 impl Other {
     /// Takes it to stay where the one that bears it has it, where what is on its way only presses it there: that one answers it.
-    pub(super) fn lie(&mut self, around: &Surroundings<'_>, exchange: &Exchange) {
+    pub(super) fn lie(&mut self, around: &StepContext<'_>, exchange: &Exchange) {
         let Some(neighbour) = self.neighbour.as_ref().filter(|_| !self.held && self.lean.is_none()) else { return };
         let Some(lies) = neighbour.snapshot.lies.get().filter(|lies| lies.on != around.me) else { return };
         let mut given = Impulse::ZERO;

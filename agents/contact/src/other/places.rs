@@ -2,28 +2,28 @@
 
 use super::{Other, Pose};
 use glam::DVec3;
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Place, Placed, View};
+use metachron_geometry::{Place, PlacedShape, ShapePose};
 
 impl Other {
     /// Where it is; `None` before the first [`Self::meet`] and for a body that has no shape.
     #[must_use]
-    pub fn placed(&self) -> Option<Placed<'_>> {
+    pub fn placed(&self) -> Option<PlacedShape<'_>> {
         let neighbour = self.neighbour.as_ref()?;
         let Pose { centre, rotation } = self.pose;
         let view = match &neighbour.snapshot.body {
             Body::Nothing => return None,
-            Body::Rigid(_) => View::Solid { position: centre, rotation },
-            Body::Tool(tool) => View::Tool { tip: centre, rotation, jaw: tool.jaw },
-            Body::Curve(curve) => View::Chain { positions: &self.positions, radii_m: &curve.radii_m },
-            Body::Soft(_) => View::Surface(&self.positions),
+            Body::Rigid(_) => ShapePose::Solid { position: centre, rotation },
+            Body::Tool(tool) => ShapePose::Tool { tip: centre, rotation, jaw: tool.jaw },
+            Body::Curve(curve) => ShapePose::Chain { positions: &self.positions, radii_m: &curve.radii_m },
+            Body::Soft(_) => ShapePose::Surface(&self.positions),
         };
-        Some(Placed { form: neighbour.form.as_deref()?, view })
+        Some(PlacedShape { form: neighbour.form.as_deref()?, view })
     }
 
     /// Adds the velocity of the place of a contact to what `slots` gather, as [`Place::join`] does; this body's slots begin at `base`.
-    pub fn join(&self, slots: &mut Slots, base: u32, place: &Place, towards: (DVec3, f64)) {
+    pub fn join(&self, slots: &mut ContactJacobian, base: u32, place: &Place, towards: (DVec3, f64)) {
         place.join(slots, base, self.pose.centre, towards);
     }
 
@@ -31,7 +31,7 @@ impl Other {
     #[must_use]
     pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
         let place = self.place(anchor)?;
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         self.join(&mut slots, 0, &place, (DVec3::ZERO, 1.0));
         let position = match place {
             Place::Point(point) => point,
@@ -47,7 +47,7 @@ impl Other {
     }
 
     /// Adds the velocity of a material point to what `slots` gather; this body's slots begin at zero.
-    pub fn hold(&self, slots: &mut Slots, anchor: Anchor) {
+    pub fn hold(&self, slots: &mut ContactJacobian, anchor: Anchor) {
         if let Some(place) = self.place(anchor) {
             self.join(slots, 0, &place, (DVec3::ZERO, 1.0));
         }

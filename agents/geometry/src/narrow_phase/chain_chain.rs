@@ -28,7 +28,7 @@ const WIDENING: f64 = 4.0;
 
 /// Storage for candidate pairs.
 #[derive(Default)]
-pub(super) struct ChainRoom {
+pub(super) struct ChainScratch {
     grid: Grid,
     spots: Vec<Spot>,
     /// Span of the first strand in the upper half, of the second in the lower half.
@@ -47,7 +47,7 @@ struct Spot {
     second: bool,
 }
 
-impl ChainRoom {
+impl ChainScratch {
     /// Every place within `reach_m`.
     pub fn touches(&mut self, a: &Strand<'_>, b: &Strand<'_>, reach_m: f64, into: &mut Vec<Touch>) {
         self.find(a, b, reach_m);
@@ -129,7 +129,7 @@ struct Meeting<'a> {
 
 /// The places of one pair of spans, so that none is added twice: the first and last node of either, and a crossing.
 #[derive(Default)]
-struct Told {
+struct ReportedContact {
     shares: [[f64; 2]; 5],
     count: usize,
     least_m: f64,
@@ -146,7 +146,7 @@ impl Meeting<'_> {
         if nearest.distance_m > self.reach_m + taper(ends_a) + taper(ends_b) {
             return;
         }
-        let mut told = Told { least_m: f64::INFINITY, ..Told::default() };
+        let mut told = ReportedContact { least_m: f64::INFINITY, ..ReportedContact::default() };
         for (place, node) in own_nodes(a, i) {
             if let Some(t) = b.foot(a.ball(node).centre, j).filter(|&t| speaks(a, node, b, (j, t))) {
                 self.tell(place, [(node - i) as f64, t], &mut told, into);
@@ -166,7 +166,7 @@ impl Meeting<'_> {
     }
 
     /// Adds a place, unless it is too far or already added.
-    fn tell(&self, place: u64, shares: [f64; 2], told: &mut Told, into: &mut Vec<Touch>) {
+    fn tell(&self, place: u64, shares: [f64; 2], told: &mut ReportedContact, into: &mut Vec<Touch>) {
         let ([a, b], [i, j], [s, t]) = (self.strands, self.spans, shares);
         if told.shares[..told.count].contains(&shares) {
             return;

@@ -25,12 +25,12 @@ const PART_BITS: u32 = 5;
 
 /// Storage for the search.
 #[derive(Default)]
-pub(super) struct BlockRoom {
+pub(super) struct ConvexScratch {
     hull: Hull,
     manifold: ContactManifold<(), ()>,
 }
 
-impl BlockRoom {
+impl ConvexScratch {
     /// Every place within `reach_m`.
     pub fn touches(&mut self, a: &Block<'_>, b: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
         let Self { hull, manifold } = self;

@@ -21,36 +21,42 @@ mod tests;
 mod voronoi_regions;
 
 #[cfg(test)]
-use super::collision_shape::{Form, FormKind, View};
-use super::collision_shape::{Placed, Touch};
+use super::collision_shape::{CollisionShape, ShapeKind, ShapePose};
+use super::collision_shape::{PlacedShape, Touch};
 use crate::signed_distance::Ball;
-use chain_chain::ChainRoom;
-use convex_convex::BlockRoom;
+use chain_chain::ChainScratch;
+use convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
 use shape_cache::Known;
-use surface::SurfaceRoom;
-pub use voronoi_regions::Fans;
+use surface::SurfaceScratch;
+pub use voronoi_regions::VoronoiRegions;
 
 /// The key difference between neighbouring segments in a contact between chains: of the second chain, and of the first.
 pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
 
 /// Reusable storage for contact searches: one for each agent.
 #[derive(Default)]
-pub struct TouchRoom {
+pub struct NarrowPhaseScratch {
     known: Known,
-    chains: ChainRoom,
-    blocks: BlockRoom,
-    surfaces: SurfaceRoom,
+    chains: ChainScratch,
+    blocks: ConvexScratch,
+    surfaces: SurfaceScratch,
 }
 
 /// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; the previous contents of `into` are dropped.
 ///
 /// Nothing is allocated once the numbers of nodes and contacts settle.
 /// Forms without a shape and places that are not finite touch nothing.
-pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
+pub fn touches(
+    a: &PlacedShape<'_>,
+    b: &PlacedShape<'_>,
+    reach_m: f64,
+    room: &mut NarrowPhaseScratch,
+    into: &mut Vec<Touch>,
+) {
     into.clear();
-    let TouchRoom { known, chains, blocks, surfaces } = room;
+    let NarrowPhaseScratch { known, chains, blocks, surfaces } = room;
     known.learn(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
@@ -101,8 +107,13 @@ fn name(touches: &mut [Touch]) {
 
 /// The normal from b towards a where they are nearest, and a gap that is never larger than the true one there, metres;
 /// `None` beyond `reach_m`. For conservative advancement: near its end the bound is within a millionth of the sizes.
-pub fn gap(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom) -> Option<(DVec3, f64)> {
-    let TouchRoom { known, chains, blocks, .. } = room;
+pub fn gap(
+    a: &PlacedShape<'_>,
+    b: &PlacedShape<'_>,
+    reach_m: f64,
+    room: &mut NarrowPhaseScratch,
+) -> Option<(DVec3, f64)> {
+    let NarrowPhaseScratch { known, chains, blocks, .. } = room;
     known.learn(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;

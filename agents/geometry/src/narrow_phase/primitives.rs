@@ -7,7 +7,7 @@ use super::skin;
 use crate::Solid;
 use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
-use crate::{FormKind, Place, Placed, SolidForm, SurfaceForm, View};
+use crate::{Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::SharedShape;
 
@@ -24,7 +24,7 @@ pub(super) enum Piece<'a> {
 
 /// The skin of a soft body.
 pub(super) struct Surface<'a> {
-    pub form: &'a SurfaceForm,
+    pub form: &'a SurfaceShape,
     /// Where its vertices are, metres.
     pub positions: &'a [DVec3],
     /// Lowest and highest coordinates of the vertices.
@@ -64,12 +64,14 @@ pub(super) struct Block<'a> {
 
 impl<'a> Pieces<'a> {
     /// Decomposes a form.
-    pub fn of(placed: &Placed<'a>, known: &'a Known) -> Self {
+    pub fn of(placed: &PlacedShape<'a>, known: &'a Known) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
-            (FormKind::Chain { .. }, View::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
-            (FormKind::Solid(form), View::Solid { position, rotation }) => {
-                let SolidForm { solid, com_local, radius_m, .. } = form;
+            (ShapeKind::Chain { .. }, ShapePose::Chain { positions, radii_m }) => {
+                pieces.0[0] = tube(positions, radii_m)
+            }
+            (ShapeKind::Solid(form), ShapePose::Solid { position, rotation }) => {
+                let SolidShape { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;
                 let along = |half: f64| rotation * (DVec3::Z * half);
                 pieces.0[0] = Some(match solid {
@@ -85,7 +87,7 @@ impl<'a> Pieces<'a> {
                     }
                 });
             }
-            (FormKind::Tool(shape), View::Tool { tip, rotation, jaw }) => {
+            (ShapeKind::Tool(shape), ShapePose::Tool { tip, rotation, jaw }) => {
                 let solids = known.tool(shape).into_iter().flatten();
                 for ((piece, part), solid) in pieces.0.iter_mut().zip(shape.parts(jaw)).zip(solids) {
                     let origin = tip + rotation * part.position;
@@ -96,7 +98,7 @@ impl<'a> Pieces<'a> {
                     *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, pierces: true }));
                 }
             }
-            (FormKind::Surface(form), View::Surface(positions)) if !positions.is_empty() => {
+            (ShapeKind::Surface(form), ShapePose::Surface(positions)) if !positions.is_empty() => {
                 let bounds = crate::bounds(positions);
                 pieces.0[0] = Some(Piece::Surface(Surface { form, positions, bounds }));
             }

@@ -3,7 +3,7 @@
 //! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
 
 use crate::signed_distance::{Ball, Field};
-use crate::{Form, FormKind, SolidForm};
+use crate::{CollisionShape, ShapeKind, SolidShape};
 use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
@@ -32,14 +32,14 @@ pub(super) struct ToolSolid {
 
 impl Known {
     /// Caches the data that a search between `a` and `b` needs.
-    pub fn learn(&mut self, a: &Form, b: &Form) {
+    pub fn learn(&mut self, a: &CollisionShape, b: &CollisionShape) {
         for (form, other) in [(a, b), (b, a)] {
             match &form.kind {
-                FormKind::Solid(SolidForm { solid, .. }) if is_strand(&other.kind) => self.learn_solid(solid),
-                FormKind::Solid(SolidForm { solid, shape, .. }) if shape.as_trimesh().is_some() => {
+                ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.kind) => self.learn_solid(solid),
+                ShapeKind::Solid(SolidShape { solid, shape, .. }) if shape.as_trimesh().is_some() => {
                     self.learn_hull(solid)
                 }
-                FormKind::Tool(shape) => self.learn_tool(shape),
+                ShapeKind::Tool(shape) => self.learn_tool(shape),
                 _ => {}
             }
         }
@@ -74,7 +74,7 @@ impl Known {
     }
 
     /// The shape used for collisions of a solid: its own, or the hull of a mesh that was not divided into convex parts.
-    pub fn shape<'a>(&'a self, SolidForm { solid, shape, .. }: &'a SolidForm) -> &'a SharedShape {
+    pub fn shape<'a>(&'a self, SolidShape { solid, shape, .. }: &'a SolidShape) -> &'a SharedShape {
         let hull = self.hulls.iter().find(|(known, _)| shape.as_trimesh().is_some() && is_same(known, solid));
         hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
     }
@@ -86,10 +86,10 @@ impl Known {
 }
 
 /// Whether a form consists of points and spans that are looked up in the fields of others.
-fn is_strand(kind: &FormKind) -> bool {
+fn is_strand(kind: &ShapeKind) -> bool {
     let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
-    matches!(kind, FormKind::Chain { .. } | FormKind::Surface(_))
-        || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
+    matches!(kind, ShapeKind::Chain { .. } | ShapeKind::Surface(_))
+        || matches!(kind, ShapeKind::Solid(SolidShape { solid, .. }) if round(solid))
 }
 
 /// The field of a body: an open mesh is represented by its hull, as for its mass.

@@ -30,7 +30,7 @@ const PART_SHIFT: u32 = 20;
 
 /// Scratch storage for searches.
 #[derive(Default)]
-pub(super) struct SurfaceRoom {
+pub(super) struct SurfaceScratch {
     /// For a closed surface the outward normal at each vertex, of any length; `others` holds those of the other surface.
     normals: Vec<DVec3>,
     others: Vec<DVec3>,
@@ -108,7 +108,7 @@ fn shares(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     (area2 > 0.0).then(|| [of(b, c), of(c, a), of(a, b)])
 }
 
-impl SurfaceRoom {
+impl SurfaceScratch {
     /// Every place within `reach_m`, with normals towards the surface.
     pub(super) fn touches(&mut self, surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64, into: &mut Vec<Touch>) {
         let (low, high) = other.bounds();

@@ -7,65 +7,65 @@ mod surfaces;
 mod tubes;
 
 use super::*;
-use crate::{Place, SolidForm};
+use crate::{Place, SolidShape};
 use crate::{Solid, ToolShape};
 use glam::DQuat;
 use proptest::prelude::*;
 
 /// A form of a solid without friction; its centre of mass is its origin.
-fn solid(solid: Solid, radius_m: f64) -> Form {
+fn solid(solid: Solid, radius_m: f64) -> CollisionShape {
     let shape = solid.to_shared_shape().unwrap();
-    let kind = FormKind::Solid(SolidForm { solid, shape, com_local: DVec3::ZERO, radius_m });
-    Form { kind, friction: 0.0, restitution: 0.0 }
+    let kind = ShapeKind::Solid(SolidShape { solid, shape, com_local: DVec3::ZERO, radius_m });
+    CollisionShape { kind, friction: 0.0, restitution: 0.0 }
 }
 
-fn ball(radius_m: f64) -> Form {
+fn ball(radius_m: f64) -> CollisionShape {
     solid(Solid::Ball { radius_m }, radius_m)
 }
 
-fn capsule(radius_m: f64, half_height_m: f64) -> Form {
+fn capsule(radius_m: f64, half_height_m: f64) -> CollisionShape {
     solid(Solid::Capsule { radius_m, half_height_m }, radius_m + half_height_m)
 }
 
-fn cylinder(radius_m: f64, half_height_m: f64) -> Form {
+fn cylinder(radius_m: f64, half_height_m: f64) -> CollisionShape {
     solid(Solid::Cylinder { radius_m, half_height_m }, radius_m.hypot(half_height_m))
 }
 
-fn cuboid(half_extents_m: DVec3) -> Form {
+fn cuboid(half_extents_m: DVec3) -> CollisionShape {
     solid(Solid::Box { half_extents_m }, half_extents_m.length())
 }
 
 /// The box as the hull of its corners.
-fn hull(half: DVec3) -> Form {
+fn hull(half: DVec3) -> CollisionShape {
     let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
     let points_m = (0..8).map(|i| half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
     solid(Solid::Hull { points_m }, half.length())
 }
 
-fn chain() -> Form {
-    Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.0, restitution: 0.0 }
+fn chain() -> CollisionShape {
+    CollisionShape { kind: ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.0, restitution: 0.0 }
 }
 
-fn tool() -> Form {
-    Form { kind: FormKind::Tool(ToolShape::default()), friction: 0.0, restitution: 0.0 }
+fn tool() -> CollisionShape {
+    CollisionShape { kind: ShapeKind::Tool(ToolShape::default()), friction: 0.0, restitution: 0.0 }
 }
 
-fn at(form: &Form, position: DVec3, rotation: DQuat) -> Placed<'_> {
-    Placed { form, view: View::Solid { position, rotation } }
+fn at(form: &CollisionShape, position: DVec3, rotation: DQuat) -> PlacedShape<'_> {
+    PlacedShape { form, view: ShapePose::Solid { position, rotation } }
 }
 
-fn along<'a>(form: &'a Form, positions: &'a [DVec3], radii_m: &'a [f64]) -> Placed<'a> {
-    Placed { form, view: View::Chain { positions, radii_m } }
+fn along<'a>(form: &'a CollisionShape, positions: &'a [DVec3], radii_m: &'a [f64]) -> PlacedShape<'a> {
+    PlacedShape { form, view: ShapePose::Chain { positions, radii_m } }
 }
 
-fn all(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64) -> Vec<Touch> {
+fn all(a: &PlacedShape<'_>, b: &PlacedShape<'_>, reach_m: f64) -> Vec<Touch> {
     let mut into = Vec::new();
-    touches(a, b, reach_m, &mut TouchRoom::default(), &mut into);
+    touches(a, b, reach_m, &mut NarrowPhaseScratch::default(), &mut into);
     into
 }
 
-fn nearest(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
-    gap(a, b, reach_m, &mut TouchRoom::default())
+fn nearest(a: &PlacedShape<'_>, b: &PlacedShape<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
+    gap(a, b, reach_m, &mut NarrowPhaseScratch::default())
 }
 
 fn lowest(touches: &[Touch]) -> Touch {

@@ -15,7 +15,7 @@ const OUT_SHARE: f64 = 0.5;
 
 /// The neighbours of every vertex and edge of a skin; it never changes.
 #[derive(Debug, Clone, Default)]
-pub struct Fans {
+pub struct VoronoiRegions {
     /// Where the neighbours of each vertex begin.
     starts: Vec<u32>,
     /// The other ends of the edges at each vertex.
@@ -24,7 +24,7 @@ pub struct Fans {
     opposite: Vec<[u32; 2]>,
 }
 
-impl Fans {
+impl VoronoiRegions {
     /// The neighbourhoods of a skin with these edges and triangles.
     pub fn of(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> Self {
         let vertices = edges.iter().flatten().max().map_or(0, |last| *last as usize + 1);

@@ -1,12 +1,12 @@
 //! The order in which vertices are removed from a mesh.
 //!
-//! In: a welded mesh. Out: a [`Tom`] without its errors. Never here: cuts.
+//! In: a welded mesh. Out: a [`ProgressiveMesh`] without its errors. Never here: cuts.
 //! Each position waits in a heap with its cheapest valid collapse; positions with changed neighbours are evaluated again.
 
 use super::quadric::Quadric;
 use super::topology::{HUB, Surface, Verdict, direction};
 use super::weld::Welded;
-use super::{SAME_PLACE, Tom};
+use super::{ProgressiveMesh, SAME_PLACE};
 use glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -45,7 +45,7 @@ struct Builder {
 }
 
 /// Computes the order of a mesh.
-pub(super) fn ordered(welded: Welded) -> Tom {
+pub(super) fn ordered(welded: Welded) -> ProgressiveMesh {
     let full = welded.triangles.clone();
     let mut builder = Builder::new(&welded);
     for turn in TURNS {
@@ -199,7 +199,7 @@ impl Builder {
     }
 
     /// The finished mesh: vertices and triangles removed last come first.
-    fn sorted(&self, welded: &Welded, full: &[[u32; 3]]) -> Tom {
+    fn sorted(&self, welded: &Welded, full: &[[u32; 3]]) -> ProgressiveMesh {
         let mut went = vec![false; self.wedges.len()];
         self.order.iter().for_each(|&p| went[p as usize] = true);
         let stay = (0..self.wedges.len() as u32).filter(|&p| !went[p as usize]);
@@ -214,7 +214,7 @@ impl Builder {
         let mut triangles: Vec<u32> = (0..full.len() as u32).collect();
         // remaining triangles (0) first, then the last to vanish
         triangles.sort_by_key(|&t| Reverse(self.gone[t as usize].wrapping_sub(1)));
-        Tom {
+        ProgressiveMesh {
             vertices: wedges.iter().map(|&w| welded.wedges[w as usize]).collect(),
             triangles: triangles.iter().map(|&t| full[t as usize].map(|w| number[w as usize])).collect(),
             substitutes: wedges.iter().map(substitute).collect(),

@@ -2,7 +2,7 @@
 //!
 //! In: an ordered mesh. Out: a table of counts and errors, monotone. Never here: estimates.
 
-use super::Tom;
+use super::ProgressiveMesh;
 use crate::near_triangle;
 use glam::DVec3;
 use rapier3d::parry::bounding_volume::Aabb;
@@ -14,7 +14,7 @@ const ROWS: f64 = 1.5;
 const SAMPLES: usize = 500;
 
 /// (triangles, error in metres) from coarse to fine; the error never increases.
-pub(super) fn table(tom: &Tom) -> Vec<(u32, f32)> {
+pub(super) fn table(tom: &ProgressiveMesh) -> Vec<(u32, f32)> {
     let (least, most) = tom.range();
     let doublings = libm::log2(f64::from(most) / f64::from(least.max(1)));
     let rows = (ROWS * doublings).ceil().max(1.0) as u32;
@@ -48,7 +48,7 @@ pub(super) fn at(table: &[(u32, f32)], triangles: u32) -> f64 {
 }
 
 /// The greatest distance of sampled vertices of the full mesh from a cut, metres.
-fn distance(tom: &Tom, triangles: u32) -> f64 {
+fn distance(tom: &ProgressiveMesh, triangles: u32) -> f64 {
     let mut corners = Vec::with_capacity(triangles as usize);
     tom.resolve(tom.cut(triangles), &mut corners);
     let faces: Vec<[DVec3; 3]> =

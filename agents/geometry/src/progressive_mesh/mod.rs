@@ -1,6 +1,6 @@
 //! A mesh that can be drawn with any number of triangles: the totally ordered mesh of (GB99).
 //!
-//! In: a triangle mesh. Out: a [`Tom`], whose first n triangles are a coarser mesh for every n, with its error.
+//! In: a triangle mesh. Out: a [`ProgressiveMesh`], whose first n triangles are a coarser mesh for every n, with its error.
 //! Never here: the choice of the count, the GPU. Theory: `docs/theory/multiresolution.md`.
 //!
 //! Vertices are removed one position after another, each collapsed onto a neighbour, the cheapest by the quadric error (GH97) first.
@@ -18,14 +18,14 @@ mod weld;
 mod tests;
 
 use super::{PrimitiveMesh, PrimitiveVertex};
-pub use weld::TomError;
+pub use weld::ProgressiveMeshError;
 
 /// Flag in the substitute of a vertex at the same position as the one before it (a crease).
 const SAME_PLACE: u32 = 1 << 31;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tom {
+pub struct ProgressiveMesh {
     /// Corners in reverse order of removal; the normals of a crease are separate, consecutive vertices.
     vertices: Vec<PrimitiveVertex>,
     /// Vertex indices of each triangle of the full mesh, in reverse order of removal.
@@ -39,7 +39,7 @@ pub struct Tom {
     errors: Vec<(u32, f32)>,
 }
 
-/// One of the meshes of a [`Tom`].
+/// One of the meshes of a [`ProgressiveMesh`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Cut {
     /// Number of vertices used, from the first.
@@ -48,14 +48,14 @@ pub struct Cut {
     pub triangles: u32,
 }
 
-impl Tom {
+impl ProgressiveMesh {
     /// Computes the order of a mesh.
     ///
     /// Triangles without area (two corners at one position) are left out, all others are unchanged.
     ///
     /// # Errors
-    /// [`TomError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
-    pub fn new(mesh: &PrimitiveMesh) -> Result<Self, TomError> {
+    /// [`ProgressiveMeshError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
+    pub fn new(mesh: &PrimitiveMesh) -> Result<Self, ProgressiveMeshError> {
         let welded = weld::Welded::new(mesh)?;
         let mut tom = build::ordered(welded);
         tom.least = tom.triangles.partition_point(|t| tom.birth(*t) == 0) as u32;

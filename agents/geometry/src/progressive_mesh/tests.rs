@@ -1,6 +1,6 @@
 //! What a totally ordered mesh must keep, against the mesh it was made of and brute force.
 
-use super::{Cut, Tom, TomError};
+use super::{Cut, ProgressiveMesh, ProgressiveMeshError};
 use crate::near_triangle;
 use crate::{Generator, PrimitiveMesh, PrimitiveVertex, creased_mesh, generate};
 use glam::{DVec3, Vec3};
@@ -14,7 +14,7 @@ fn bits(v: Vec3) -> [u32; 3] {
     (v + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
-fn faces(tom: &Tom, cut: Cut) -> Vec<[Vec3; 3]> {
+fn faces(tom: &ProgressiveMesh, cut: Cut) -> Vec<[Vec3; 3]> {
     let mut corners = Vec::new();
     tom.resolve(cut, &mut corners);
     assert!(corners.iter().flatten().all(|&i| i < cut.vertices));
@@ -45,7 +45,7 @@ fn canonical(vertices: [PrimitiveVertex; 3]) -> [(Face, [u32; 3]); 1] {
     [(turned.map(|v| bits(v.core)), bits(turned[0].normal))]
 }
 
-fn all_counts(tom: &Tom) -> Vec<Cut> {
+fn all_counts(tom: &ProgressiveMesh) -> Vec<Cut> {
     let (least, most) = tom.range();
     let mut cuts: Vec<Cut> = (least..=most).map(|n| tom.cut(n)).collect();
     cuts.dedup();
@@ -56,7 +56,7 @@ fn all_counts(tom: &Tom) -> Vec<Cut> {
 fn full_count_is_the_mesh_that_was_given() {
     for kind in Generator::ALL {
         let mesh = generate(kind, 1, 600);
-        let tom = Tom::new(&mesh).unwrap();
+        let tom = ProgressiveMesh::new(&mesh).unwrap();
         let cut = tom.cut(u32::MAX);
         let mut corners = Vec::new();
         tom.resolve(cut, &mut corners);
@@ -75,7 +75,7 @@ fn full_count_is_the_mesh_that_was_given() {
 #[test]
 fn every_cut_is_a_sound_surface_of_the_kind_that_was_given() {
     for kind in Generator::ALL {
-        let tom = Tom::new(&generate(kind, 5, 500)).unwrap();
+        let tom = ProgressiveMesh::new(&generate(kind, 5, 500)).unwrap();
         let open = kind == Generator::Terrain;
         let mut before = 0;
         for cut in all_counts(&tom) {
@@ -94,7 +94,7 @@ fn every_cut_is_a_sound_surface_of_the_kind_that_was_given() {
 
 #[test]
 fn a_cut_has_at_most_a_few_triangles_fewer_than_asked_for() {
-    let tom = Tom::new(&generate(Generator::Blob, 2, 900)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Blob, 2, 900)).unwrap();
     let (least, most) = tom.range();
     assert!(least <= 8, "{least}");
     for n in least..=most {
@@ -106,7 +106,7 @@ fn a_cut_has_at_most_a_few_triangles_fewer_than_asked_for() {
 
 #[test]
 fn a_boundary_shrinks_along_itself_and_stays_one_loop() {
-    let tom = Tom::new(&generate(Generator::Terrain, 9, 400)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Terrain, 9, 400)).unwrap();
     for cut in all_counts(&tom) {
         let rim = rim(&faces(&tom, cut));
         let next: BTreeMap<_, _> = rim.iter().map(|[a, b]| (*a, *b)).collect();
@@ -126,7 +126,7 @@ fn a_boundary_shrinks_along_itself_and_stays_one_loop() {
 }
 
 /// The greatest distance of the full mesh's vertices from a cut, looking at every triangle.
-fn brute_error(tom: &Tom, triangles: u32) -> f64 {
+fn brute_error(tom: &ProgressiveMesh, triangles: u32) -> f64 {
     let faces = faces(tom, tom.cut(triangles));
     let nearest = |p: DVec3| {
         let to = |f: &[Vec3; 3]| near_triangle(p, f.map(|v| v.as_dvec3())).distance(p);
@@ -137,7 +137,7 @@ fn brute_error(tom: &Tom, triangles: u32) -> f64 {
 
 #[test]
 fn the_error_falls_with_the_count_and_is_what_brute_force_finds() {
-    let tom = Tom::new(&generate(Generator::Blob, 3, 1500)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Blob, 3, 1500)).unwrap();
     let (least, most) = tom.range();
     let mut before = f64::INFINITY;
     for n in (least..=most).step_by(50) {
@@ -154,7 +154,7 @@ fn the_error_falls_with_the_count_and_is_what_brute_force_finds() {
 
 #[test]
 fn a_sphere_of_few_triangles_is_near_the_sphere() {
-    let tom = Tom::new(&generate(Generator::Sphere, 0, 4000)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Sphere, 0, 4000)).unwrap();
     for n in [50, 200, 800] {
         let sagitta = 2.0 * std::f64::consts::TAU / (3.0_f64.sqrt() * f64::from(n));
         // n equilateral triangles with corners on the sphere: the middle of one is about 4π/(√3·n)·2/3 inside it;
@@ -168,21 +168,21 @@ fn a_flat_square_needs_two_triangles() {
     let points: Vec<DVec3> = (0..121).map(|i| DVec3::new(f64::from(i % 11), f64::from(i / 11), 0.0)).collect();
     let quad = |a: u32| [[a, a + 1, a + 12], [a, a + 12, a + 11]];
     let triangles: Vec<[u32; 3]> = (0..110).filter(|a| a % 11 != 10).flat_map(quad).collect();
-    let tom = Tom::new(&creased_mesh(&points, &triangles)).unwrap();
+    let tom = ProgressiveMesh::new(&creased_mesh(&points, &triangles)).unwrap();
     assert!(tom.cut(2).triangles <= 2 && tom.error_m(2) < 1e-9, "{:?} {}", tom.cut(2), tom.error_m(2));
 }
 
 #[test]
 fn memory_is_at_most_a_tenth_more_than_a_plain_mesh_needs() {
     for kind in [Generator::Sphere, Generator::Torus, Generator::Blob, Generator::Terrain] {
-        let (own, plain) = Tom::new(&generate(kind, 1, 2000)).unwrap().bytes();
+        let (own, plain) = ProgressiveMesh::new(&generate(kind, 1, 2000)).unwrap().bytes();
         assert!(own as f64 <= 1.10 * plain as f64, "{kind:?}: {own} of {plain}");
     }
     // a word beside the eight of a vertex and the three of a triangle: at most 1/9 for three vertices a triangle, where every edge is
     // sharp; the table of errors is a hundredth of so small a mesh
     let tetrahedra = many_tetrahedra(100);
     for mesh in [generate(Generator::Seat, 1, 2000), tetrahedra] {
-        let (own, plain) = Tom::new(&mesh).unwrap().bytes();
+        let (own, plain) = ProgressiveMesh::new(&mesh).unwrap().bytes();
         assert!(own as f64 <= 1.12 * plain as f64, "{own} of {plain}");
     }
 }
@@ -197,7 +197,7 @@ fn many_tetrahedra(count: u32) -> PrimitiveMesh {
 
 #[test]
 fn a_mesh_cut_short_has_the_same_cuts_below() {
-    let tom = Tom::new(&generate(Generator::Blob, 4, 600)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Blob, 4, 600)).unwrap();
     let short = tom.clone().truncated(300);
     assert_eq!(short.range(), (tom.range().0, tom.cut(300).triangles));
     for n in [10, 77, 299] {
@@ -209,7 +209,7 @@ fn a_mesh_cut_short_has_the_same_cuts_below() {
 
 #[test]
 fn a_morph_leads_from_the_finer_cut_to_the_coarser_one() {
-    let tom = Tom::new(&generate(Generator::Blob, 4, 600)).unwrap();
+    let tom = ProgressiveMesh::new(&generate(Generator::Blob, 4, 600)).unwrap();
     let (fine, coarse) = (tom.cut(400), tom.cut(150));
     let mut corners = Vec::new();
     tom.resolve(fine, &mut corners);
@@ -240,7 +240,7 @@ fn many_parts_go_one_by_one_down_to_the_last() {
         mesh.vertices.extend(one.vertices.iter().map(|v| PrimitiveVertex { core: v.core + away, ..*v }));
         mesh.triangles.extend(one.triangles.iter().map(|t| t.map(|k| k + first)));
     }
-    let tom = Tom::new(&mesh).unwrap();
+    let tom = ProgressiveMesh::new(&mesh).unwrap();
     assert!(tom.range().0 <= 4, "{:?}", tom.range());
 }
 
@@ -248,13 +248,16 @@ fn many_parts_go_one_by_one_down_to_the_last() {
 fn what_is_no_mesh_is_refused_with_its_reason() {
     let vertex = |x: f32| PrimitiveVertex::bare(Vec3::new(x, 0.0, 0.0), Vec3::Z);
     let mesh = |vertices, triangles| PrimitiveMesh { vertices, triangles };
-    assert_eq!(Tom::new(&PrimitiveMesh::default()), Err(TomError::Empty { triangles: 0 }));
+    assert_eq!(ProgressiveMesh::new(&PrimitiveMesh::default()), Err(ProgressiveMeshError::Empty { triangles: 0 }));
     let far = mesh(vec![vertex(0.0), vertex(1.0)], vec![[0, 1, 7]]);
-    assert_eq!(Tom::new(&far), Err(TomError::BadCorner { triangle: 0, corner: 7, vertices: 2 }));
+    assert_eq!(
+        ProgressiveMesh::new(&far),
+        Err(ProgressiveMeshError::BadCorner { triangle: 0, corner: 7, vertices: 2 })
+    );
     let nan = mesh(vec![vertex(0.0), vertex(f32::NAN), vertex(2.0)], vec![[0, 1, 2]]);
-    assert_eq!(Tom::new(&nan), Err(TomError::NotFinite { vertex: 1 }));
+    assert_eq!(ProgressiveMesh::new(&nan), Err(ProgressiveMeshError::NotFinite { vertex: 1 }));
     let flat = mesh(vec![vertex(0.0), vertex(0.0), vertex(2.0)], vec![[0, 1, 2]]);
-    assert_eq!(Tom::new(&flat), Err(TomError::Empty { triangles: 1 }));
+    assert_eq!(ProgressiveMesh::new(&flat), Err(ProgressiveMeshError::Empty { triangles: 1 }));
 }
 
 proptest! {
@@ -266,7 +269,7 @@ proptest! {
         let place = |i: u32| Vec3::new((i % 3) as f32, (i / 3 % 2) as f32, (i / 6) as f32 + 0.1 * (i % 5) as f32);
         let vertices = (0..12).map(|i| PrimitiveVertex::bare(place(i), Vec3::Z)).collect();
         let mesh = PrimitiveMesh { vertices, triangles };
-        if let Ok(tom) = Tom::new(&mesh) {
+        if let Ok(tom) = ProgressiveMesh::new(&mesh) {
             for cut in all_counts(&tom) {
                 for f in faces(&tom, cut) {
                     prop_assert!(f[0] != f[1] && f[1] != f[2] && f[2] != f[0]);
@@ -278,7 +281,7 @@ proptest! {
 
 #[test]
 fn cuts_below_the_floor_are_the_floor() {
-    let tom = Tom::new(&generate(Generator::Bar, 0, 24)).unwrap().no_coarser(4);
+    let tom = ProgressiveMesh::new(&generate(Generator::Bar, 0, 24)).unwrap().no_coarser(4);
     assert_eq!(tom.range(), (4, 24));
     assert_eq!(tom.cut(0).triangles, 4);
     assert_eq!(tom.clone().no_coarser(2).range(), (4, 24));
@@ -298,7 +301,7 @@ fn cone(sides: u32) -> PrimitiveMesh {
 fn fans_of_ten_thousand_triangles_around_one_vertex_are_ordered() {
     // in the square of the count, let alone its cube, this would take minutes
     let sides = 20_000;
-    let tom = Tom::new(&cone(sides)).unwrap();
+    let tom = ProgressiveMesh::new(&cone(sides)).unwrap();
     assert!(tom.range().0 <= 8 && tom.range().1 == 2 * sides, "{:?}", tom.range());
     for n in [40, 400, 4000] {
         let cut = tom.cut(n);
@@ -317,7 +320,8 @@ fn thousands_of_triangles_on_one_edge_are_ordered() {
     let edge = [Vec3::ZERO, Vec3::Z].into_iter();
     let ends = (0..pages).map(|i| DVec3::new(libm::cos(angle(i)), libm::sin(angle(i)), 0.5).as_vec3());
     let vertices = edge.chain(ends).map(|core| PrimitiveVertex::bare(core, Vec3::X)).collect();
-    let tom = Tom::new(&PrimitiveMesh { vertices, triangles: (0..pages).map(|i| [0, 1, 2 + i]).collect() }).unwrap();
+    let tom = ProgressiveMesh::new(&PrimitiveMesh { vertices, triangles: (0..pages).map(|i| [0, 1, 2 + i]).collect() })
+        .unwrap();
     assert_eq!(tom.range().1, pages);
     for cut in [pages, pages / 2, tom.range().0].map(|n| tom.cut(n)) {
         assert!(faces(&tom, cut).iter().all(|f| f[0] != f[1] && f[1] != f[2] && f[2] != f[0]));

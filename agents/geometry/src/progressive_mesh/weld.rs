@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Reasons why a mesh cannot be ordered.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum TomError {
+pub enum ProgressiveMeshError {
     /// A position is not finite.
     #[error("vertex {vertex} is not finite")]
     NotFinite {
@@ -33,14 +33,14 @@ pub enum TomError {
         triangles: usize,
     },
     /// More vertices or triangles than can be indexed.
-    #[error("{count} vertices or triangles are too many: at most {} can be numbered", TomError::MOST)]
+    #[error("{count} vertices or triangles are too many: at most {} can be numbered", ProgressiveMeshError::MOST)]
     TooLarge {
         /// Number of vertices or triangles, whichever is greater.
         count: usize,
     },
 }
 
-impl TomError {
+impl ProgressiveMeshError {
     /// Most vertices, and most triangles.
     pub const MOST: usize = 1 << 30;
 }
@@ -59,7 +59,7 @@ pub(super) struct Welded {
 }
 
 impl Welded {
-    pub fn new(mesh: &PrimitiveMesh) -> Result<Self, TomError> {
+    pub fn new(mesh: &PrimitiveMesh) -> Result<Self, ProgressiveMeshError> {
         check(mesh)?;
         let mut welded = Self::default();
         let (mut places, mut wedges) = (BTreeMap::new(), BTreeMap::new());
@@ -72,7 +72,7 @@ impl Welded {
             welded.triangles.push(triangle);
         }
         if welded.triangles.is_empty() {
-            return Err(TomError::Empty { triangles: mesh.triangles.len() });
+            return Err(ProgressiveMeshError::Empty { triangles: mesh.triangles.len() });
         }
         Ok(welded)
     }
@@ -99,17 +99,17 @@ impl Welded {
     }
 }
 
-fn check(mesh: &PrimitiveMesh) -> Result<(), TomError> {
+fn check(mesh: &PrimitiveMesh) -> Result<(), ProgressiveMeshError> {
     let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
-    if vertices.max(triangles) > TomError::MOST {
-        return Err(TomError::TooLarge { count: vertices.max(triangles) });
+    if vertices.max(triangles) > ProgressiveMeshError::MOST {
+        return Err(ProgressiveMeshError::TooLarge { count: vertices.max(triangles) });
     }
     if let Some(vertex) = mesh.vertices.iter().position(|v| !v.core.is_finite()) {
-        return Err(TomError::NotFinite { vertex });
+        return Err(ProgressiveMeshError::NotFinite { vertex });
     }
     for (triangle, t) in mesh.triangles.iter().enumerate() {
         if let Some(&corner) = t.iter().find(|i| **i as usize >= vertices) {
-            return Err(TomError::BadCorner { triangle, corner, vertices });
+            return Err(ProgressiveMeshError::BadCorner { triangle, corner, vertices });
         }
     }
     Ok(())

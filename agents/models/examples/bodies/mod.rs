@@ -3,7 +3,7 @@
 //! In: shapes, places, masses. Out: specs and bodies. Never here: what is measured.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Companion, Surroundings};
+use metachron_contact::{Agent, Companion, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime, StepReport};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
@@ -33,7 +33,7 @@ pub fn built(specs: impl IntoIterator<Item = RigidSpec>) -> Vec<RigidBody> {
 
 /// One step of all bodies as one world; the seconds that it took, without making the list of who takes part.
 pub fn step(bodies: &mut [RigidBody], span: SimSpan, apart: &mut Vec<u32>) -> (StepReport, f64) {
-    let around = |i| Surroundings::alone(AgentId(i), SimTime::ZERO);
+    let around = |i| StepContext::alone(AgentId(i), SimTime::ZERO);
     let (leader, others) = bodies.split_first_mut().expect("there is a body");
     let mut others: Vec<Companion<'_>> =
         (1..).zip(others.iter_mut()).map(|(i, agent)| Companion { id: AgentId(i), agent, around: around(i) }).collect();

@@ -36,7 +36,7 @@ pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
         let hands = suite.pull.filter(|_| pulled);
         for run in [&mut one, &mut other] {
             if let Some(wanted) = suite.resolutions.get(i as usize / 20 % suite.resolutions.len().max(1)) {
-                run.agent.retune(*wanted);
+                run.agent.set_resolution(*wanted);
             }
             run.must_step(suite.dt, hands.as_slice())?;
         }

@@ -66,7 +66,7 @@ impl Kept {
 }
 
 /// Mass, linear momentum and rest length stay; angular momentum changes by at most (ε/L)² of `swing`.
-pub(super) fn retune(suite: &Suite<'_>) -> Result<(), String> {
+pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
     let mut run = suite.start();
     for _ in 0..suite.steps.min(50) {
         run.must_step(suite.dt, suite.pull.as_slice())?;
@@ -74,13 +74,13 @@ pub(super) fn retune(suite: &Suite<'_>) -> Result<(), String> {
     if suite.resolutions.is_empty() {
         let before = run.hash();
         let wanted = run.agent.resolution().unwrap_or(Resolution { eps_m: 0.01, n: 2 });
-        run.agent.retune(wanted);
+        run.agent.set_resolution(wanted);
         return if run.hash() == before { Ok(()) } else { Err("a wish for what it holds changed it".to_owned()) };
     }
     // coarse to fine and back: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
         let (before, held_before) = (Kept::of(&run), run.agent.resolution());
-        run.agent.retune(*wanted);
+        run.agent.set_resolution(*wanted);
         let after = Kept::of(&run);
         let eps_m = run.agent.resolution().map_or(0.0, |r| r.eps_m).max(held_before.map_or(0.0, |r| r.eps_m));
         compare(&before, &after, eps_m).map_err(|what| format!("retuned to ε {} m, {what}", wanted.eps_m))?;
@@ -112,7 +112,7 @@ pub(super) fn residual(suite: &Suite<'_>) -> Result<(), String> {
     let mut run = Run { agent: make(), ..suite.start() };
     let mut last: Option<(f64, f64)> = None;
     for wanted in &suite.resolutions {
-        run.agent.retune(*wanted);
+        run.agent.set_resolution(*wanted);
         for _ in 0..steps {
             run.must_step(suite.dt, &[])?;
         }

@@ -2,7 +2,7 @@
 
 use super::{Breach, Promise, Suite, check};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -35,7 +35,7 @@ impl Agent for Row {
         "row"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         if self.breaks(Promise::RefusedSpan) {
             self.height += 1e-12;
         }
@@ -59,7 +59,7 @@ impl Agent for Row {
         Some(self.held)
     }
 
-    fn retune(&mut self, wanted: Resolution) {
+    fn set_resolution(&mut self, wanted: Resolution) {
         if self.breaks(Promise::Retune) && wanted != self.held {
             self.speed *= 1.0 + 1e-9;
         }
@@ -101,7 +101,7 @@ fn broken(breaks: Option<Promise>) -> Vec<Promise> {
         work();
         u64::from(breaks == Some(Promise::Allocation))
     };
-    let hand = Pull {
+    let hand = AnchorSpring {
         by: None,
         anchor: Anchor::Arc(0.5),
         target: DVec3::NAN,

@@ -10,12 +10,12 @@ use super::island;
 use super::island::Island;
 use super::leant;
 use super::leant::Leant;
-use super::mass_properties::Spread;
+use super::mass_properties::MassDistribution;
 use super::meeting::Meeting;
 use super::motion::Motion;
 use super::sided::Sided;
-use super::spring_set::Ties;
-use super::static_shapes::Obstacles;
+use super::spring_set::SpringSet;
+use super::static_shapes::StaticShapes;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, linear_spring};
 use glam::DVec3;
@@ -23,28 +23,28 @@ use metachron_contact::beside;
 use metachron_contact::beside::{bends, is_driven};
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
-use metachron_contact::{Agent, Companion, Neighbour, Surroundings};
+use metachron_contact::{Agent, Companion, Neighbour, StepContext};
 use metachron_core::DRIFT_S;
 use metachron_core::{
     AgentId, Body, Grip, LiesOn, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport, Tips,
     check_span,
 };
-use metachron_core::{Impulse, Six, Twist};
-use metachron_geometry::{Form, FormKind, SolidForm};
+use metachron_core::{Impulse, Mat6, Twist};
+use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use metachron_geometry::{Obstacle, Solid};
 use std::any::Any;
 use std::sync::Arc;
 
 /// A rigid body with its own clock.
 pub struct RigidBody {
-    pub(super) spread: Spread,
+    pub(super) spread: MassDistribution,
     pub(super) gravity: DVec3,
     pub(super) may_sleep: bool,
     pub(super) motion: Motion,
     /// The static solids, for flights and for contact with them alone.
     pub(super) world: World,
     /// The same as forms, for simultaneous contact with them and other agents.
-    pub(super) obstacles: Obstacles,
+    pub(super) obstacles: StaticShapes,
     /// The neighbours that it meets.
     pub(super) company: Company,
     pub(super) meeting: Meeting,
@@ -74,7 +74,7 @@ pub struct RigidBody {
     /// The agent that it rests on.
     pub(super) lies: Option<LiesOn>,
     /// Its inverse mass within its island, where that is known, about its centre.
-    pub(super) within: Option<Six>,
+    pub(super) within: Option<Mat6>,
     /// Displacement by late impulses, kg·m and kg·m², until its island applies it.
     pub(super) late: Option<Impulse>,
     /// Time of free flight until a static solid may be in its way, seconds, where peers need it.
@@ -89,7 +89,7 @@ pub struct RigidBody {
     /// Its recent contact history.
     pub(super) lately: Lately,
     pub(super) grips: Vec<Grip>,
-    pub(super) ties: Ties,
+    pub(super) ties: SpringSet,
     /// The tools that pressed it in the last part of an island's step.
     pub(super) leant: Vec<Leant>,
     /// The static solids and the joints of the scene, for its island.
@@ -121,7 +121,7 @@ impl RigidBody {
     /// [`RigidError`] for a shape without volume, a plane, a number outside its range and an invalid obstacle shape.
     pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
         spec.check()?;
-        let spread = Spread::of(&spec.solid, spec.mass_kg)?;
+        let spread = MassDistribution::of(&spec.solid, spec.mass_kg)?;
         let rotation = spec.rotation.normalize();
         let mut motion = Motion {
             position: spec.position + rotation * spread.com,
@@ -132,7 +132,7 @@ impl RigidBody {
         motion.set_spin(&spread, spec.spin);
         let world = World::new(&spec, &spread)?;
         let form = form_of(&spec, &spread, &world);
-        let obstacles = Obstacles::new(&spec.obstacles, world.mover.radius_m)?;
+        let obstacles = StaticShapes::new(&spec.obstacles, world.mover.radius_m)?;
         let mut body = Self {
             spread,
             gravity: spec.gravity,
@@ -166,7 +166,7 @@ impl RigidBody {
             steps: 0,
             lately: Lately::default(),
             grips: Vec::with_capacity(4),
-            ties: Ties::default(),
+            ties: SpringSet::default(),
             leant: Vec::new(),
             scenery: (spec.obstacles, spec.joints),
             island: None,
@@ -194,7 +194,7 @@ impl RigidBody {
     }
 
     /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `fellows`, by rising ids, are in the same island.
-    pub(super) fn begin(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+    pub(super) fn begin(&mut self, around: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
         self.receive(around, fellows, dt);
         self.push_alone(around, dt);
         self.ties.gather(around, &self.company);
@@ -202,7 +202,7 @@ impl RigidBody {
     }
 
     /// Applies springs and gravity for `h` seconds; returns their resistance to further changes in this part, if there are springs.
-    pub(super) fn pull(&mut self, h: f64) -> Result<Option<Six>, &'static str> {
+    pub(super) fn pull(&mut self, h: f64) -> Result<Option<Mat6>, &'static str> {
         self.ties.aim(&self.company);
         let under = self.hold.under(h, self.gravity);
         let pulled = linear_spring::pull(&mut self.motion, &self.spread, &mut self.ties.all, &under, &mut self.grips);
@@ -232,7 +232,7 @@ impl RigidBody {
     }
 
     /// Ends a step in which its island has moved it.
-    pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
+    pub(super) fn led(&mut self, around: &StepContext<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
         (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
         // the island moves it by parts at the speed of their ends
         self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
@@ -299,7 +299,7 @@ impl Agent for RigidBody {
     }
 
     /// Advances the body by `dt`: parts of at most 1/240 s in contact or under springs, one part in free flight.
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         if self.is_jointed(around.me) {
             return island::lead(self, dt, around, &mut [], &mut Vec::new());
@@ -331,7 +331,7 @@ impl Agent for RigidBody {
     }
 
     /// Publishes how springs hold it before it has moved.
-    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
             self.company.gather(around, (&self.world.mover, &self.motion), &[]);
             self.ties.gather(around, &self.company);
@@ -342,7 +342,7 @@ impl Agent for RigidBody {
 
     /// Shortens the step where predictions fail: neither a deformable nor this body can predict how the deformable squeezes it on a static
     /// solid. Nor can a rigid peer predict the ground's reaction to its impacts on this body, nor this body the effect of a tool's drive.
-    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         // a body caught in this step may fall in the next
         let soon_s = 2.0 * dt.as_secs_f64();
@@ -369,7 +369,7 @@ impl Agent for RigidBody {
         )
     }
 
-    fn rename_time(&mut self, _by_s: f64) {
+    fn shift_clock(&mut self, _by_s: f64) {
         self.borne.forget();
     }
 
@@ -378,9 +378,9 @@ impl Agent for RigidBody {
     }
 
     /// A rigid body has no nodes to redistribute: nothing changes.
-    fn retune(&mut self, _wanted: Resolution) {}
+    fn set_resolution(&mut self, _wanted: Resolution) {}
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.company.form.clone())
     }
 
@@ -391,7 +391,7 @@ impl Agent for RigidBody {
     fn lead(
         &mut self,
         dt: SimSpan,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         others: &mut [Companion<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
@@ -439,12 +439,12 @@ impl RigidBody {
 }
 
 /// The shape of `spec` as peers touch it: the one that its own contact solver uses.
-fn form_of(spec: &RigidSpec, spread: &Spread, world: &World) -> Form {
+fn form_of(spec: &RigidSpec, spread: &MassDistribution, world: &World) -> CollisionShape {
     let (shape, radius_m) = (world.mover.shape.clone(), world.mover.radius_m);
     let solid = match &spec.solid {
         Solid::Mesh { points_m, .. } if world.mover.is_convex() => Solid::Hull { points_m: points_m.clone() },
         solid => solid.clone(),
     };
-    let kind = FormKind::Solid(SolidForm { solid, shape, com_local: spread.com, radius_m });
-    Form { kind, friction: spec.friction, restitution: spec.restitution }
+    let kind = ShapeKind::Solid(SolidShape { solid, shape, com_local: spread.com, radius_m });
+    CollisionShape { kind, friction: spec.friction, restitution: spec.restitution }
 }

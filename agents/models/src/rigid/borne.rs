@@ -5,7 +5,7 @@
 
 use super::RigidBody;
 use glam::{DMat3, DVec3};
-use metachron_contact::Surroundings;
+use metachron_contact::StepContext;
 use metachron_contact::beside::may_press;
 use metachron_core::rebound::{since_s, spared};
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
@@ -75,7 +75,7 @@ impl Borne {
 impl RigidBody {
     /// Notes what fixed solids gave in a step of `dt` that begins now: all that neither gravity nor others did, without
     /// what only carried the weight. That they go on to give: others expect it ([`RigidBody::support`]).
-    pub(super) fn note_borne(&mut self, around: &Surroundings<'_>, dt: SimSpan) {
+    pub(super) fn note_borne(&mut self, around: &StepContext<'_>, dt: SimSpan) {
         let start = around.time;
         let dt_s = dt.as_secs_f64();
         let fall = self.gravity * dt_s;
@@ -108,7 +108,7 @@ impl RigidBody {
     }
 
     /// Who bends and was nearest to the body where its step began, of those that stood between it and what then gave it an impulse.
-    fn past(&self, around: &Surroundings<'_>, given: DVec3) -> Option<AgentId> {
+    fn past(&self, around: &StepContext<'_>, given: DVec3) -> Option<AgentId> {
         if given == DVec3::ZERO {
             return None;
         }

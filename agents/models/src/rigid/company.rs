@@ -4,19 +4,19 @@
 //! advancement, MIR96, in the frame of the other); who touched whom for how long. Never here: what happens at a touch
 //! ([`super::meeting`]), fixed solids ([`crate::rigid::conservative_advancement`]).
 
-use super::conservative_advancement::{Ahead, Approach, Fall, Mover, first_root};
+use super::conservative_advancement::{Ahead, Approach, Fall, MovingShape, first_root};
 use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
 use glam::DVec3;
 use metachron_contact::beside::is_led_on;
 use metachron_contact::{Exchange, Law, Other};
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::Impulse;
 use metachron_core::{AgentId, Body, Inertia, Snapshot};
 use metachron_geometry::Solid;
-use metachron_geometry::narrow_phase::{TouchRoom, gap};
-use metachron_geometry::{Form, FormKind, Placed, View};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose};
 use std::sync::Arc;
 
 /// Whom a body meets, and what it has with each.
@@ -26,9 +26,9 @@ pub(super) struct Company {
     /// What is remembered of each pair from step to step.
     pub pairs: Pairs,
     /// Room for searches.
-    pub room: TouchRoom,
+    pub room: NarrowPhaseScratch,
     /// The body's own shape, as others know it.
-    pub form: Arc<Form>,
+    pub form: Arc<CollisionShape>,
     /// Who the body is.
     pub me: AgentId,
     /// Seconds since the step began.
@@ -99,11 +99,11 @@ const BALL_SKIN_SHARE: f64 = 1e-9;
 
 impl Company {
     /// The company of a body of this shape: nobody yet.
-    pub(super) fn new(form: Arc<Form>) -> Self {
+    pub(super) fn new(form: Arc<CollisionShape>) -> Self {
         Self {
             exchange: Exchange::wary(),
             pairs: Pairs::default(),
-            room: TouchRoom::default(),
+            room: NarrowPhaseScratch::default(),
             form,
             me: AgentId(0),
             after_s: 0.0,
@@ -117,8 +117,8 @@ impl Company {
     /// Brings everybody that this body meets to the start of the step, but for `fellows`, by rising ids, who share its world.
     pub(super) fn gather(
         &mut self,
-        around: &Surroundings<'_>,
-        (mover, motion): (&Mover, &Motion),
+        around: &StepContext<'_>,
+        (mover, motion): (&MovingShape, &Motion),
         fellows: &[AgentId],
     ) {
         (self.me, self.count, self.after_s) = (around.me, 0, 0.0);
@@ -149,7 +149,7 @@ impl Company {
     }
 
     /// Finds who sleeps where the body may get within two steps of `dt` seconds: nobody but them would see it come.
-    pub(super) fn knock(&mut self, around: &Surroundings<'_>, mover: &Mover, motion: &Motion, dt: f64) {
+    pub(super) fn knock(&mut self, around: &StepContext<'_>, mover: &MovingShape, motion: &Motion, dt: f64) {
         self.knocks.clear();
         let reach = mover.radius_m + 2.0 * dt * motion.velocity.length();
         for neighbour in around.neighbours.iter().filter(|n| !n.owned && n.form.is_some() && n.law != Law::Off) {
@@ -170,7 +170,12 @@ impl Company {
     /// nothing yet of what the others gave it, or by nobody. Whoever is held up, or is about to be, may have come to a stop by
     /// then, though both fall alike now. And who is light, on the ground or hopping there, is thrown into it by every blow of who
     /// is heavy: it comes back before the other knows, until that has passed through it.
-    pub(super) fn foresee(&mut self, (mover, motion): (&Mover, &Motion), (gravity, dt): (DVec3, f64), held: &Held) {
+    pub(super) fn foresee(
+        &mut self,
+        (mover, motion): (&MovingShape, &Motion),
+        (gravity, dt): (DVec3, f64),
+        held: &Held,
+    ) {
         let Self { guests, count, room, form, pairs, .. } = self;
         let fall = Fall { gravity, spin_max: 0.0 };
         for guest in guests[..*count].iter().filter(|g| g.touchable && g.is_rigid() && g.restitution <= STAYS) {
@@ -182,7 +187,7 @@ impl Company {
                 (held.within(soon_s), mine - falling(mine, gravity)),
                 (is_held_within(soon_s, &neighbour.snapshot, gravity), mine + falling(theirs, gravity)),
             ];
-            let meets = |velocity: DVec3, room: &mut TouchRoom| {
+            let meets = |velocity: DVec3, room: &mut NarrowPhaseScratch| {
                 let motion = Motion { velocity, ..*motion };
                 let coarse = guest.approach_m_s(velocity) * step_s > COARSE_SHARE * mover.radius_m.min(guest.radius_m);
                 coarse && {
@@ -199,7 +204,7 @@ impl Company {
 
     /// Ends a step of `dt` seconds: how long pairs have touched, how everybody should move next, and the accounts. `gravity` is
     /// what pulls at everybody; `held` says whether something beside the pair held the body up.
-    pub(super) fn settle(&mut self, around: &Surroundings<'_>, dt: f64, (gravity, held): (DVec3, bool)) {
+    pub(super) fn settle(&mut self, around: &StepContext<'_>, dt: f64, (gravity, held): (DVec3, bool)) {
         for guest in &self.guests[..self.count] {
             let Some(neighbour) = guest.other.neighbour() else { continue };
             if let Some(pair) = self.pairs.get(neighbour.id) {
@@ -242,7 +247,9 @@ impl Company {
     }
 
     /// Everything that a solve needs, each part for itself.
-    pub(super) fn split(&mut self) -> (&mut [Guest], &mut Exchange, &mut Pairs, &mut TouchRoom, &Arc<Form>) {
+    pub(super) fn split(
+        &mut self,
+    ) -> (&mut [Guest], &mut Exchange, &mut Pairs, &mut NarrowPhaseScratch, &Arc<CollisionShape>) {
         let Self { guests, count, exchange, pairs, room, form, .. } = self;
         (&mut guests[..*count], exchange, pairs, room, form)
     }
@@ -273,7 +280,7 @@ impl Company {
     /// Who lies ahead of a flight of `horizon` seconds.
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.
-    pub(super) fn ahead(&mut self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
+    pub(super) fn ahead(&mut self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
         let Self { guests, count, room, form, span, .. } = self;
         let (me, mut ahead) = (placed(form, motion), Ahead::clear(horizon));
         for guest in guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain) {
@@ -315,19 +322,19 @@ fn falling(velocity: DVec3, gravity: DVec3) -> DVec3 {
 }
 
 /// The body itself, for a search.
-pub(super) fn placed<'a>(form: &'a Form, motion: &Motion) -> Placed<'a> {
-    Placed { form, view: View::Solid { position: motion.position, rotation: motion.rotation } }
+pub(super) fn placed<'a>(form: &'a CollisionShape, motion: &Motion) -> PlacedShape<'a> {
+    PlacedShape { form, view: ShapePose::Solid { position: motion.position, rotation: motion.rotation } }
 }
 
 /// What `neighbour` has been given and has not taken in the state that is seen.
-fn on_their_way(exchange: &Exchange, around: &Surroundings<'_>, neighbour: &Neighbour) -> Impulse {
+fn on_their_way(exchange: &Exchange, around: &StepContext<'_>, neighbour: &Neighbour) -> Impulse {
     let mut sum = Impulse::ZERO;
     exchange.in_flight(around.me, neighbour, around.time, |_, impulse, _| sum += impulse);
     sum
 }
 
 /// Whether `neighbour` has to be brought to the body's own time: the body owns contact or a link with it, or is held by it.
-fn is_met(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+fn is_met(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let touched = neighbour.form.is_some() && neighbour.law != Law::Off;
     let linked = || around.links.iter().any(|link| link.other == neighbour.id);
     // by other laws than the ledger each side acts on itself
@@ -350,7 +357,7 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> bool {
 
 impl Guest {
     /// Takes in what does not change while the step lasts.
-    fn learn(&mut self, neighbour: &Neighbour, mine: &Form, mover: &Mover) {
+    fn learn(&mut self, neighbour: &Neighbour, mine: &CollisionShape, mover: &MovingShape) {
         self.touchable = neighbour.owned && neighbour.law == Law::Ledger && neighbour.form.is_some();
         let Some(form) = &neighbour.form else { return };
         self.friction = (mine.friction * form.friction).sqrt();
@@ -358,7 +365,7 @@ impl Guest {
         (self.skin_m, self.convex, self.chain) = (mover.skin_m(), false, false);
         (self.radius_m, self.swing_m) = (f64::INFINITY, 0.0);
         match &form.kind {
-            FormKind::Solid(solid) => {
+            ShapeKind::Solid(solid) => {
                 let ball = matches!(solid.solid, Solid::Ball { .. });
                 self.convex = !matches!(solid.solid, Solid::Mesh { .. });
                 (self.radius_m, self.swing_m) = (solid.radius_m, if ball { 0.0 } else { solid.radius_m });
@@ -366,11 +373,11 @@ impl Guest {
                     self.skin_m = BALL_SKIN_SHARE * mover.radius_m;
                 }
             }
-            FormKind::Chain { .. } => (self.chain, self.restitution) = (true, 0.0),
+            ShapeKind::Chain { .. } => (self.chain, self.restitution) = (true, 0.0),
             // its drive brings what bounces back at once, and again: pressed, a tip would never come to rest
-            FormKind::Tool(_) => self.restitution = 0.0,
+            ShapeKind::Tool(_) => self.restitution = 0.0,
             // a soft body owns its pairs
-            FormKind::Surface(_) => {}
+            ShapeKind::Surface(_) => {}
         }
     }
 
@@ -445,17 +452,17 @@ impl Guest {
     /// How far off this guest is: at most `horizon` seconds.
     fn approach(
         &self,
-        me: &Placed<'_>,
-        (mover, motion, fall): (&Mover, &Motion, Fall),
+        me: &PlacedShape<'_>,
+        (mover, motion, fall): (&MovingShape, &Motion, Fall),
         horizon: f64,
-        room: &mut TouchRoom,
+        room: &mut NarrowPhaseScratch,
     ) -> Approach {
         let Some(it) = self.other.placed() else { return (horizon, 0.0) };
         let slots = self.other.velocities();
         let (velocity, pull) = (motion.velocity - slots[0], fall.gravity - self.other.acceleration());
         let swing = fall.spin_max * mover.swing_m + slots[1].length() * self.swing_m;
         let reach = (velocity.length() + swing) * horizon + 0.5 * pull.length() * horizon * horizon;
-        if let View::Solid { position, .. } = it.view
+        if let ShapePose::Solid { position, .. } = it.view
             && position.distance(motion.position) > mover.radius_m + self.radius_m + reach + self.skin_m
         {
             return (horizon, 0.0);

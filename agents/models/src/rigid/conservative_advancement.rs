@@ -7,7 +7,7 @@
 //! separates them, so the bound holds; for the rest a = |v| + |ω|R and b = |g|. For a ball over a plane it is the exact time.
 
 use super::RigidError;
-use super::mass_properties::{Spread, encloses, volume};
+use super::mass_properties::{MassDistribution, encloses, volume};
 use super::motion::Motion;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Solid, hull_triangles, mesh_triangles};
@@ -26,7 +26,7 @@ pub(super) struct Fixed {
 }
 
 /// The moving shape with the measures that the bound needs.
-pub(super) struct Mover {
+pub(super) struct MovingShape {
     /// The shape, in its own axes.
     pub shape: SharedShape,
     /// Where the centre of mass is in the shape's axes.
@@ -79,12 +79,12 @@ const SKIN_MAX_M: f64 = 1e-4;
 /// A mesh whose hull has at most this many times its volume counts as convex.
 const HULL_EXCESS: f64 = 1.02;
 
-impl Mover {
+impl MovingShape {
     /// The collision shape of a moving solid, and its measures.
     ///
     /// A closed mesh that is not convex is divided into convex parts (V-HACD, 64³ voxels, concavity 0.01): corners in
     /// hollows are rounded by about a sixty-fourth of its size. An open mesh counts as its hull.
-    pub(super) fn new(solid: &Solid, body: &Spread) -> Result<Self, RigidError> {
+    pub(super) fn new(solid: &Solid, body: &MassDistribution) -> Result<Self, RigidError> {
         let shape = match solid {
             Solid::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
@@ -163,7 +163,7 @@ impl Fixed {
     }
 
     /// The approach of the body to this solid: at most `horizon` seconds.
-    pub(super) fn approach(&self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Approach {
+    pub(super) fn approach(&self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> Approach {
         let reach = fall.reach(motion, mover, horizon);
         if self.bounds.is_some_and(|(low, high)| {
             motion.position.distance(motion.position.clamp(low, high)) > mover.radius_m + reach
@@ -183,7 +183,7 @@ impl Fixed {
     /// Height of the body's lowest point above this plane, metres.
     ///
     /// Each convex part is queried itself: parry 0.31.1 answers for a compound over a half space with the pose inverted.
-    fn height(&self, mover: &Mover, relative: &Pose) -> Option<f32> {
+    fn height(&self, mover: &MovingShape, relative: &Pose) -> Option<f32> {
         let lowest = |part: &dyn Shape, pose: Pose| {
             let lowest = part.as_support_map()?.support_point_toward(&pose, -Vec3::Z);
             Some(lowest.z)
@@ -198,7 +198,7 @@ impl Fixed {
     }
 
     /// The outward normal at the nearest point, and the gap there (negative inside); `None` beyond `reach`.
-    fn gap(&self, mover: &Mover, motion: &Motion, reach: f64) -> Option<(DVec3, f64)> {
+    fn gap(&self, mover: &MovingShape, motion: &Motion, reach: f64) -> Option<(DVec3, f64)> {
         // relative in double precision first: single precision then only handles small numbers where it matters
         let back = self.rotation.conjugate();
         let relative = pose(back * (mover.origin(motion) - self.position), back * motion.rotation);
@@ -213,7 +213,7 @@ impl Fixed {
     }
 
     /// How deep the body is inside this solid, metres, ≥ 0.
-    pub(super) fn depth_m(&self, mover: &Mover, motion: &Motion) -> f64 {
+    pub(super) fn depth_m(&self, mover: &MovingShape, motion: &Motion) -> f64 {
         let near = self
             .bounds
             .is_none_or(|(low, high)| motion.position.distance(motion.position.clamp(low, high)) < mover.radius_m);
@@ -232,7 +232,7 @@ pub(super) struct Fall {
 
 impl Fall {
     /// Upper bound of the distance travelled by any point of the body in `t` seconds.
-    fn reach(&self, motion: &Motion, mover: &Mover, t: f64) -> f64 {
+    fn reach(&self, motion: &Motion, mover: &MovingShape, t: f64) -> f64 {
         (motion.velocity.length() + self.spin_max * mover.swing_m) * t + 0.5 * self.gravity.length() * t * t
     }
 }
@@ -274,8 +274,8 @@ mod tests {
     #[test]
     fn the_bound_never_passes_the_true_touch() {
         let solid = Solid::Box { half_extents_m: DVec3::new(0.1, 0.2, 0.05) };
-        let body = Spread::of(&solid, 1.0).unwrap();
-        let mover = Mover::new(&solid, &body).unwrap();
+        let body = MassDistribution::of(&solid, 1.0).unwrap();
+        let mover = MovingShape::new(&solid, &body).unwrap();
         let floor = Fixed::new(&Solid::Plane, DVec3::ZERO, DQuat::IDENTITY).unwrap();
         let gravity = DVec3::Z * -9.81;
         for i in 0..50_u32 {

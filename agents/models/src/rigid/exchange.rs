@@ -14,10 +14,10 @@ use super::motion::Motion;
 use glam::{DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::beside::may_press;
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::snapshot::STANDING_M_S;
 use metachron_core::{AgentId, Body, Bounds, Inertia, LiesOn, SimSpan, SimTime, Snapshot, Stand, Upheld};
-use metachron_core::{Impulse, Six, Twist};
+use metachron_core::{Impulse, Mat6, Twist};
 
 /// Limit of the published acceleration's difference from gravity, in multiples of gravity: its support can hold it up, but
 /// a single hard step must not make peers predict that it flies off.
@@ -31,7 +31,7 @@ impl RigidBody {
     /// own time.
     ///
     /// `fellows`, by rising ids, are in the same island as this body: contacts between them are not coupled.
-    pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+    pub fn receive(&mut self, around: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
         let before = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.company.exchange.open(around);
         self.company.pairs.open();
@@ -57,7 +57,7 @@ impl RigidBody {
     }
 
     /// Takes owners' impulses, including those that act in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
-    fn take(&mut self, around: &Surroundings<'_>, dt: f64) {
+    fn take(&mut self, around: &StepContext<'_>, dt: f64) {
         let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
         let mut taken = None;
@@ -113,7 +113,7 @@ impl RigidBody {
     }
 
     /// Applies contact laws that act on one side alone (penalty, wave variables), for a step of `dt` seconds.
-    pub fn push_alone(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn push_alone(&mut self, around: &StepContext<'_>, dt: f64) {
         let Self { motion, spread, company, sided, gravity, stand, .. } = self;
         if company.guests().is_empty() {
             return;
@@ -129,7 +129,7 @@ impl RigidBody {
     /// Solves the contacts that this body owns over the next `h` seconds for an island that moves it and applies its gravity: the
     /// velocities change, no position of the body does. Call it after [`Self::receive`], once for each part of the step. Returns the
     /// resistance of pressing tools to further changes in it, if any press the body.
-    pub fn meet(&mut self, h: f64) -> Option<Six> {
+    pub fn meet(&mut self, h: f64) -> Option<Mat6> {
         self.leant.clear();
         if self.company.guests().is_empty() {
             return None;
@@ -148,7 +148,7 @@ impl RigidBody {
     }
 
     /// Ends a step of `dt` seconds: books the impulses given and computes the acceleration to publish.
-    pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn settle(&mut self, around: &StepContext<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
@@ -188,7 +188,7 @@ impl RigidBody {
     }
 
     /// The agent that it rests on, where exactly one neighbour reports that it supports the body on something fixed (eq. 7l).
-    fn upheld(&self, around: &Surroundings<'_>) -> Option<LiesOn> {
+    fn upheld(&self, around: &StepContext<'_>) -> Option<LiesOn> {
         if self.hold.is_known() || !self.ties.is_empty() || self.island.is_some() {
             return None;
         }
@@ -312,6 +312,6 @@ impl RigidBody {
 }
 
 /// Whether a rigid neighbour may touch this body.
-fn seen_rigid(around: &Surroundings<'_>) -> bool {
+fn seen_rigid(around: &StepContext<'_>) -> bool {
     around.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
 }

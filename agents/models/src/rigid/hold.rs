@@ -8,14 +8,14 @@ use super::RigidBody;
 use super::linear_spring::{Pulled, Under, lean};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
-use metachron_contact::Surroundings;
-use metachron_core::{Impulse, Six, Sprung, Twist};
+use metachron_contact::StepContext;
+use metachron_core::{Impulse, Mat6, Sprung, Twist};
 
 /// What such a body keeps from step to step.
 #[derive(Default)]
 pub(super) struct Hold {
     /// What it published last, and (M + h C + h² K)⁻¹ of it.
-    known: Option<(Sprung, Six)>,
+    known: Option<(Sprung, Mat6)>,
     /// The force and torque of what owners go on giving in this step, N and N·m.
     lasting: Twist,
     /// What they gave before did to its velocities at the step's start, m/s and rad/s.
@@ -55,7 +55,7 @@ impl Hold {
 impl RigidBody {
     /// Takes what owners gave, as forces that go on over the `dt` seconds of the step; what they gave before acts at once as
     /// they expect it to (eq. 3, 4 with the answer of eq. 7b).
-    pub(super) fn follow(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub(super) fn follow(&mut self, around: &StepContext<'_>, dt: f64) {
         let Some((_, answer)) = self.hold.known else { return };
         let (mut sum, mut carried, mut lasting) = (Impulse::ZERO, Impulse::ZERO, Impulse::ZERO);
         self.company.exchange.follow(around, dt, |_, [new, way, on]| {
@@ -94,7 +94,7 @@ impl RigidBody {
 
     /// Ends a step of `dt` seconds: others who own contact with the body learn how springs hold it, where only led ones do and
     /// nothing fixed carries it.
-    pub(super) fn tell(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub(super) fn tell(&mut self, around: &StepContext<'_>, dt: f64) {
         let owned = |n: &metachron_contact::Neighbour| n.form.is_some() && !n.owned && n.law == Law::Ledger;
         let seen = around.neighbours.iter().any(owned);
         if !seen || self.touching || self.ties.is_empty() || self.ties.all.iter().any(|tie| tie.yields != DMat3::ZERO) {

@@ -5,7 +5,7 @@
 
 use super::company::Company;
 use glam::DVec3;
-use metachron_core::{Six, Twist};
+use metachron_core::{Mat6, Twist};
 
 /// A tool on a body in a part, all its contacts as one.
 #[derive(Debug, Clone, Copy)]
@@ -39,8 +39,8 @@ impl Leant {
 }
 
 /// How all of them resist a change of the body's velocities, kg, kg·m and kg·m².
-pub(super) fn resistance(all: &[Leant]) -> Option<Six> {
-    let mut sum = Six::ZERO;
+pub(super) fn resistance(all: &[Leant]) -> Option<Mat6> {
+    let mut sum = Mat6::ZERO;
     all.iter().for_each(|leant| sum.add_outer(leant.along, leant.mass_kg));
     (!all.is_empty()).then_some(sum)
 }

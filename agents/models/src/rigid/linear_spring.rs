@@ -8,19 +8,19 @@
 //! a force f adds the stiffness max(r·f, 0)(1 − r̂ r̂ᵀ) against rotation, taken at the force of a first pass. A stiff spring
 //! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
 
-use super::mass_properties::Spread;
+use super::mass_properties::MassDistribution;
 use super::motion::Motion;
-use super::orientation_spring::Turn;
+use super::orientation_spring::OrientationSpring;
 use glam::{DMat3, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::{Anchor, Grip};
-use metachron_core::{Six, Sprung, Twist};
+use metachron_core::{Mat6, Sprung, Twist};
 
 /// A spring on this body, and the compliance of its other end.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tie {
+pub(super) struct LinearSpring {
     /// The spring; its target is the present position of the other end.
-    pub pull: Pull,
+    pub pull: AnchorSpring,
     /// Rest length, metres, ≥ 0.
     pub rest_m: f64,
     /// Inverse mass of the other end, 1/kg; zero where that end is driven.
@@ -28,12 +28,12 @@ pub(super) struct Tie {
     /// The impulse it gave this body in the last part, N·s.
     pub impulse: DVec3,
     /// The torsional spring that keeps the body from turning, where jaws grasp it.
-    pub turn: Option<Turn>,
+    pub turn: Option<OrientationSpring>,
 }
 
-impl Tie {
+impl LinearSpring {
     /// A spring whose other end is driven.
-    pub(super) const fn led(pull: Pull) -> Self {
+    pub(super) const fn led(pull: AnchorSpring) -> Self {
         Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
     }
 
@@ -77,7 +77,7 @@ pub(super) struct Pulled {
     /// The part of it that is due to the lasting loads.
     pub lasting: Twist,
     /// The impulse with which all springs resist a further change of the velocities in this part, about the centre of mass.
-    pub resistance: Six,
+    pub resistance: Mat6,
 }
 
 /// Changes the velocities by gravity, the springs and other lasting loads over a part; writes each spring's impulse, and its force
@@ -86,8 +86,8 @@ pub(super) struct Pulled {
 /// Nothing is written and `None` returned where no spring holds a point of this body.
 pub(super) fn pull(
     motion: &mut Motion,
-    body: &Spread,
-    ties: &mut [Tie],
+    body: &MassDistribution,
+    ties: &mut [LinearSpring],
     under: &Under,
     grips: &mut Vec<Grip>,
 ) -> Option<Pulled> {
@@ -124,7 +124,7 @@ pub(super) fn pull(
 }
 
 /// Writes the change of each spring's impulse due to a further `change` of the velocities in a part of `h` seconds.
-pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change, h): (Twist, f64)) {
+pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [LinearSpring], (change, h): (Twist, f64)) {
     for tie in ties {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
         tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
@@ -136,12 +136,12 @@ pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change
 
 /// The force on the body in this state of springs whose far ends are driven, and its derivatives as the body moves
 /// (docs/theory/coupling.md, eq. 7b).
-pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3) -> Sprung {
+pub(super) fn lean(motion: &Motion, body: &MassDistribution, ties: &[LinearSpring], gravity: DVec3) -> Sprung {
     let mut all = Sprung {
         force: [gravity * body.mass_kg, DVec3::ZERO],
         rising: [DVec3::ZERO; 2],
-        stiffness: Six::ZERO,
-        damping: Six::ZERO,
+        stiffness: Mat6::ZERO,
+        damping: Mat6::ZERO,
         past: [DVec3::ZERO; 2],
         span_s: 0.0,
         limit_n: f64::INFINITY,
@@ -178,14 +178,14 @@ struct Spring {
 
 impl Spring {
     /// The spring of `tie` at its anchor on the body, and that anchor relative to the centre of mass.
-    fn at(tie: &Tie, motion: &Motion, body: &Spread, h: f64) -> Option<(DVec3, Self)> {
+    fn at(tie: &LinearSpring, motion: &Motion, body: &MassDistribution, h: f64) -> Option<(DVec3, Self)> {
         let r = tie.arm(motion)?;
         let velocity = motion.velocity + motion.spin(body).cross(r);
         Some((r, Self::new(tie, motion.position + r, velocity, h)))
     }
 
     /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W turns R into (1 + R W)⁻¹ R.
-    fn new(tie: &Tie, point: DVec3, velocity: DVec3, h: f64) -> Self {
+    fn new(tie: &LinearSpring, point: DVec3, velocity: DVec3, h: f64) -> Self {
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         let slip = tie.pull.target_velocity - velocity;
         let (stretch, pass) = tie.stretch(tie.pull.target - point);
@@ -204,7 +204,7 @@ impl Spring {
     }
 
     /// The impulse by which a spring reacted over `span_s` seconds to a change of the body's velocities.
-    fn bent(&self, tie: &Tie, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
+    fn bent(&self, tie: &LinearSpring, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
     }
@@ -212,22 +212,22 @@ impl Spring {
 
 /// A symmetric positive system for the change of (v, ω).
 struct System {
-    matrix: Six,
+    matrix: Mat6,
     right: Twist,
 }
 
 impl System {
     /// A body without springs.
-    fn free(motion: &Motion, body: &Spread, under: &Under) -> Self {
+    fn free(motion: &Motion, body: &MassDistribution, under: &Under) -> Self {
         let columns = DVec3::AXES.map(|axis| motion.inertia_times(body, axis));
         let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [linear, angular] = under.lasting;
         let right = [under.gravity * (under.h * body.mass_kg) + linear, angular];
-        Self { matrix: Six::mass(body.mass_kg, inertia), right }
+        Self { matrix: Mat6::mass(body.mass_kg, inertia), right }
     }
 
     /// Adds a spring; with the velocity change of a `first` pass also the stiffness of its force against rotation across its arm.
-    fn add(&mut self, tie: &Tie, (motion, body): (&Motion, &Spread), h: f64, first: Option<Twist>) {
+    fn add(&mut self, tie: &LinearSpring, (motion, body): (&Motion, &MassDistribution), h: f64, first: Option<Twist>) {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
         self.matrix.add_point(r, spring.resistance);
         self.right[0] += spring.impulse;

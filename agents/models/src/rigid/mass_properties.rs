@@ -1,6 +1,6 @@
 //! Mass distribution of a solid: centre of mass and principal moments of inertia, in double precision.
 //!
-//! In: a [`Solid`] of uniform density. Out: [`Spread`]. Never here: where the body is, how it moves.
+//! In: a [`Solid`] of uniform density. Out: [`MassDistribution`]. Never here: where the body is, how it moves.
 //! Primitives use the closed forms; hulls and closed meshes the integrals over the tetrahedra between the origin and every
 //! triangle, which are exact for flat faces. An open mesh has no inside: it has the mass distribution of its convex hull.
 
@@ -10,7 +10,7 @@ use metachron_geometry::{Solid, Triangles, hull_triangles, is_closed, mesh_trian
 
 /// Mass, centre and principal moments of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Spread {
+pub(super) struct MassDistribution {
     /// Mass, kilograms.
     pub mass_kg: f64,
     /// Centre of mass in the shape's axes, metres.
@@ -21,7 +21,7 @@ pub(super) struct Spread {
     pub axes: DQuat,
 }
 
-impl Spread {
+impl MassDistribution {
     /// The distribution of `mass_kg` over `solid`.
     pub(super) fn of(solid: &Solid, mass_kg: f64) -> Result<Self, RigidError> {
         let centred = |moments: DVec3| Self { mass_kg, com: DVec3::ZERO, moments, axes: DQuat::IDENTITY };
@@ -152,8 +152,8 @@ mod tests {
     fn a_hull_of_a_boxs_corners_weighs_like_the_box() {
         let half = DVec3::new(0.1, 0.2, 0.3);
         let centre = DVec3::new(5.0, -2.0, 1.0);
-        let hull = Spread::of(&Solid::Hull { points_m: corners(half, centre) }, 2.0).unwrap();
-        let mut expected = Spread::of(&Solid::Box { half_extents_m: half }, 2.0).unwrap().moments.to_array();
+        let hull = MassDistribution::of(&Solid::Hull { points_m: corners(half, centre) }, 2.0).unwrap();
+        let mut expected = MassDistribution::of(&Solid::Box { half_extents_m: half }, 2.0).unwrap().moments.to_array();
         expected.sort_by(f64::total_cmp);
         // the hull passes through single precision: 1e-7 of coordinates near 5, over 0.1
         assert!((hull.com - centre).length() < 1e-6, "{:?}", hull.com);
@@ -187,7 +187,7 @@ mod tests {
             })
         });
         let mesh = Triangles { points, triangles: triangles.collect() };
-        let got = sorted(Spread::inside(&mesh, 3.0).moments);
+        let got = sorted(MassDistribution::inside(&mesh, 3.0).moments);
         let mut expected = capsule(3.0, r, h).to_array();
         expected.sort_by(f64::total_cmp);
         // chords are inside the arc by (angle step)²/8 ≈ 3e-4, its square enters the moments
@@ -201,6 +201,6 @@ mod tests {
         let whole = hull_triangles(&points_m).unwrap().triangles;
         let open = Solid::Mesh { points_m: points_m.clone(), triangles: whole[1..].into() };
         let hull = Solid::Hull { points_m };
-        assert_eq!(Spread::of(&open, 1.0).unwrap(), Spread::of(&hull, 1.0).unwrap());
+        assert_eq!(MassDistribution::of(&open, 1.0).unwrap(), MassDistribution::of(&hull, 1.0).unwrap());
     }
 }

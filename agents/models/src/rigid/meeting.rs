@@ -8,11 +8,11 @@
 //! step, has gravity in the free velocities and foresees what may close within the part (eq. 3, 4).
 
 use super::company::Company;
-use super::conservative_advancement::Mover;
+use super::conservative_advancement::MovingShape;
 use super::leant::Leant;
-use super::mass_properties::Spread;
+use super::mass_properties::MassDistribution;
 use super::motion::Motion;
-use super::static_shapes::Obstacles;
+use super::static_shapes::StaticShapes;
 use glam::{DMat3, DVec3};
 use metachron_contact::{Contact, Problem, Settings, Solver, inverse_mass};
 use metachron_core::Twist;
@@ -21,8 +21,8 @@ use metachron_geometry::Touch;
 /// The body itself, as a solve needs it.
 pub(super) struct Me<'a> {
     pub motion: &'a mut Motion,
-    pub spread: &'a Spread,
-    pub mover: &'a Mover,
+    pub spread: &'a MassDistribution,
+    pub mover: &'a MovingShape,
 }
 
 /// How much of what is around takes part in a press.
@@ -101,7 +101,7 @@ impl Meeting {
         &mut self,
         me: &mut Me<'_>,
         company: &mut Company,
-        fixed: &mut Obstacles,
+        fixed: &mut StaticShapes,
         strike: Strike,
     ) -> bool {
         company.strike(true);
@@ -162,7 +162,7 @@ impl Meeting {
         &mut self,
         me: &mut Me<'_>,
         company: &mut Company,
-        (fixed, scope): (&mut Obstacles, Scope),
+        (fixed, scope): (&mut StaticShapes, Scope),
         (h, gravity): (f64, DVec3),
     ) -> Option<Pressed> {
         company.foresee_springs(h);

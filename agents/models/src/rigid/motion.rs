@@ -6,7 +6,7 @@
 //! turns the body about its three principal axes one after the other (DLM97), symmetrically, composed to fourth order (SUZ90):
 //! energy does not drift, for flights of any length.
 
-use super::mass_properties::Spread;
+use super::mass_properties::MassDistribution;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Position and motion of a rigid body, about its centre of mass.
@@ -37,41 +37,41 @@ const SUZUKI: [f64; 5] = [
 
 impl Motion {
     /// Angular velocity in world axes, rad/s.
-    pub(super) fn spin(&self, body: &Spread) -> DVec3 {
+    pub(super) fn spin(&self, body: &MassDistribution) -> DVec3 {
         let to_world = self.rotation * body.axes;
         to_world * ((to_world.conjugate() * self.angular) / body.moments)
     }
 
     /// Sets the angular momentum from an angular velocity in world axes.
-    pub(super) fn set_spin(&mut self, body: &Spread, spin: DVec3) {
+    pub(super) fn set_spin(&mut self, body: &MassDistribution, spin: DVec3) {
         self.angular = self.inertia_times(body, spin);
     }
 
     /// The inertia tensor in world axes times a vector.
-    pub(super) fn inertia_times(&self, body: &Spread, w: DVec3) -> DVec3 {
+    pub(super) fn inertia_times(&self, body: &MassDistribution, w: DVec3) -> DVec3 {
         let to_world = self.rotation * body.axes;
         to_world * ((to_world.conjugate() * w) * body.moments)
     }
 
     /// The inverses of the mass, 1/kg, and of the inertia tensor in world axes, 1/(kg·m²).
-    pub(super) fn inverse_inertia(&self, body: &Spread) -> (f64, DMat3) {
+    pub(super) fn inverse_inertia(&self, body: &MassDistribution) -> (f64, DMat3) {
         let to_world = DMat3::from_quat(self.rotation * body.axes);
         (body.mass_kg.recip(), to_world * DMat3::from_diagonal(body.moments.recip()) * to_world.transpose())
     }
 
     /// The largest spin the body can reach with its angular momentum, rad/s.
-    pub(super) fn spin_max(&self, body: &Spread) -> f64 {
+    pub(super) fn spin_max(&self, body: &MassDistribution) -> f64 {
         self.angular.length() / body.moments.min_element()
     }
 
     /// Kinetic and gravitational energy, zero at the origin, joules.
-    pub(super) fn energy_j(&self, body: &Spread, gravity: DVec3) -> f64 {
+    pub(super) fn energy_j(&self, body: &MassDistribution, gravity: DVec3) -> f64 {
         0.5 * body.mass_kg * self.velocity.length_squared() + 0.5 * self.angular.dot(self.spin(body))
             - body.mass_kg * gravity.dot(self.position)
     }
 
     /// Flies freely for `t` seconds.
-    pub(super) fn fly(&mut self, body: &Spread, gravity: DVec3, t: f64) {
+    pub(super) fn fly(&mut self, body: &MassDistribution, gravity: DVec3, t: f64) {
         self.position += self.velocity * t + gravity * (0.5 * t * t);
         self.velocity += gravity * t;
         self.turn(body, t);
@@ -90,7 +90,7 @@ impl Motion {
     }
 
     /// Turns freely for `t` seconds; the angular momentum in world axes stays.
-    fn turn(&mut self, body: &Spread, t: f64) {
+    fn turn(&mut self, body: &MassDistribution, t: f64) {
         if self.angular == DVec3::ZERO {
             return;
         }
@@ -113,7 +113,7 @@ impl Motion {
     }
 
     /// Whether every number is finite and none too large for the contact solver's single precision.
-    pub(super) fn is_sane(&self, body: &Spread) -> bool {
+    pub(super) fn is_sane(&self, body: &MassDistribution) -> bool {
         let reach = super::spec::REACH_MAX;
         self.position.is_finite()
             && self.velocity.is_finite()
@@ -141,8 +141,13 @@ fn turn_about_axes(principal: DQuat, angular: DVec3, moments: DVec3, h: f64) -> 
 mod tests {
     use super::*;
 
-    fn brick() -> Spread {
-        Spread { mass_kg: 2.0, com: DVec3::ZERO, moments: DVec3::new(1.0, 2.0, 2.6), axes: DQuat::from_rotation_x(0.3) }
+    fn brick() -> MassDistribution {
+        MassDistribution {
+            mass_kg: 2.0,
+            com: DVec3::ZERO,
+            moments: DVec3::new(1.0, 2.0, 2.6),
+            axes: DQuat::from_rotation_x(0.3),
+        }
     }
 
     fn tumbling() -> Motion {

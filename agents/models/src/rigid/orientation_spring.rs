@@ -5,13 +5,13 @@
 //! Theory: docs/theory/coupling.md, eq. 9b.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::Pull;
-use metachron_core::{Clasp, ToolState};
+use metachron_contact::AnchorSpring;
+use metachron_core::{GraspOrientation, ToolState};
 use metachron_core::{Sprung, Twist};
 
 /// A torsional spring whose far end is driven.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turn {
+pub(super) struct OrientationSpring {
     /// The body's rotation at which the torque is zero, for the present rotation of the jaws.
     target: DQuat,
     /// Angular velocity of that target, rad/s.
@@ -24,9 +24,9 @@ pub(super) struct Turn {
     pub impulse: DVec3,
 }
 
-impl Turn {
+impl OrientationSpring {
     /// The grasp of `tool`, whose state is `age_s` seconds old, on a body that it pulls by `pull`.
-    pub(super) fn of(tool: &ToolState, clasp: &Clasp, (pull, age_s): (&Pull, f64)) -> Self {
+    pub(super) fn of(tool: &ToolState, clasp: &GraspOrientation, (pull, age_s): (&AnchorSpring, f64)) -> Self {
         let square = clasp.arm_m * clasp.arm_m;
         let mut turn = Self {
             target: tool.rotation * clasp.rotation,

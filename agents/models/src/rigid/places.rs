@@ -7,11 +7,11 @@ use super::advance::TOUCH_S;
 use super::company::{Company, Guest, placed};
 use super::footing::FEET_M;
 use super::meeting::{Found, Me, Meeting, Strike};
-use super::static_shapes::{Mine, Obstacles};
+use super::static_shapes::{Mine, StaticShapes};
 use glam::DVec3;
 use metachron_contact::tank::RESERVE_M_S;
 use metachron_contact::{Contact, PUSH_OUT_SHARE};
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase::touches;
 use metachron_geometry::{Place, Touch};
 
@@ -27,7 +27,7 @@ const BOUND_SHARE: f64 = 2e-5;
 
 impl Meeting {
     /// Places within the skin of everything that takes part, for a blow.
-    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &mut Obstacles, strike: Strike) {
+    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &mut StaticShapes, strike: Strike) {
         let span = company.span;
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
@@ -104,7 +104,7 @@ impl Meeting {
         &mut self,
         me: &Me<'_>,
         company: &mut Company,
-        fixed: &mut Obstacles,
+        fixed: &mut StaticShapes,
         (h, gravity): (f64, DVec3),
     ) {
         let (_, _, _, room, form) = company.split();
@@ -128,7 +128,7 @@ impl Meeting {
         (friction, restitution, owed): (f64, impl Fn(f64) -> f64, f64),
     ) {
         for touch in &self.touches {
-            let mut slots = Slots::default();
+            let mut slots = ContactJacobian::default();
             let (mine, theirs) = halfway(touch);
             mine.join(&mut slots, 0, me.motion.position, (-touch.normal, 1.0));
             if let Some((i, guest)) = guest {

@@ -4,16 +4,16 @@
 //! Never here: the laws themselves ([`metachron_contact::laws`]), the other side: it does the same for itself.
 
 use super::company::{Company, Guest, placed};
-use super::mass_properties::Spread;
+use super::mass_properties::MassDistribution;
 use super::motion::Motion;
 use super::places::halfway;
 use glam::{DMat3, DVec3};
-use metachron_contact::Surroundings;
+use metachron_contact::StepContext;
 use metachron_contact::laws::push_off_n;
 use metachron_contact::laws::{Drawn, End, Line};
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, SimTime, Stand};
-use metachron_core::{Impulse, PairKind, Slots};
+use metachron_core::{ContactJacobian, Impulse, PairKind};
 use metachron_geometry::narrow_phase::touches;
 use metachron_geometry::{Place, Touch};
 
@@ -39,7 +39,7 @@ struct Span {
 /// Where a guest presses on the body, all places as one.
 struct Pressed {
     /// The velocity of the body in their middle.
-    slots: Slots,
+    slots: ContactJacobian,
     /// Away from the guest, of length one.
     normal: DVec3,
     /// That of the body against the guest, m/s.
@@ -52,9 +52,9 @@ impl Sided {
     /// Changes the velocities by the impulses of a step of `dt_s` seconds, by all such laws.
     pub(super) fn act(
         &mut self,
-        (motion, spread): (&mut Motion, &Spread),
+        (motion, spread): (&mut Motion, &MassDistribution),
         company: &mut Company,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
         (dt_s, gravity, stand): (f64, DVec3, Option<Stand>),
     ) {
         let span = Span { at: around.time, dt_s, gravity, stand };
@@ -79,7 +79,7 @@ impl Sided {
     /// Penalty contact with guest `i`.
     fn push_off(
         &mut self,
-        (motion, spread): (&mut Motion, &Spread),
+        (motion, spread): (&mut Motion, &MassDistribution),
         (company, i): (&mut Company, usize),
         law: Law,
         span: Span,
@@ -110,7 +110,7 @@ impl Sided {
     /// Contact with guest `i` by wave variables: one line along the normal, in the middle of what presses, that only pushes.
     fn lean(
         &mut self,
-        (motion, spread): (&mut Motion, &Spread),
+        (motion, spread): (&mut Motion, &MassDistribution),
         (company, i): (&mut Company, usize),
         (stiffness, damping): (f64, f64),
         span: Span,
@@ -156,7 +156,7 @@ impl Sided {
             places += 1;
         }
         let normal = normal.try_normalize()?;
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         Place::Point(point).join(&mut slots, 0, motion.position, (-normal, 1.0));
         Some(Pressed { slots, normal, velocity, depth_m, places })
     }
@@ -164,7 +164,7 @@ impl Sided {
     /// A link to guest `i` by wave variables.
     fn draw(
         &mut self,
-        (motion, spread): (&mut Motion, &Spread),
+        (motion, spread): (&mut Motion, &MassDistribution),
         (company, i): (&mut Company, usize),
         link: &Link,
         span: Span,
@@ -179,7 +179,7 @@ impl Sided {
             self.line(id, stiffness_n_m).begin(way, span.at);
         }
         let arriving = self.listen((company, i), stiffness_n_m, span);
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         slots.add_linear(0, 1.0);
         slots.add_angular(1, arm);
         let own = slots.velocity(&[motion.velocity + span.gravity * span.dt_s, motion.spin(spread)]);
@@ -197,7 +197,7 @@ impl Sided {
     }
 
     /// Where guest `i` overlaps the body, and the velocities of both.
-    fn find(&mut self, (motion, spread): (&Motion, &Spread), (company, i): (&mut Company, usize)) {
+    fn find(&mut self, (motion, spread): (&Motion, &MassDistribution), (company, i): (&mut Company, usize)) {
         let (guests, _, _, room, form) = company.split();
         self.touches.clear();
         self.velocities.clear();
@@ -244,7 +244,7 @@ impl Sided {
 
 impl Span {
     /// Whether a push along `axis` on what gathers from `slots` only presses the body on what it stands on.
-    fn bears(&self, slots: &Slots, axis: DVec3, motion: &Motion) -> bool {
+    fn bears(&self, slots: &ContactJacobian, axis: DVec3, motion: &Motion) -> bool {
         let mut push = [DVec3::ZERO; 2];
         slots.scatter(axis, &mut push);
         let push = Impulse { linear: push[0], angular: push[1] };
@@ -253,20 +253,20 @@ impl Span {
 }
 
 /// The velocities that a place joins: the body's slots, then the guest's.
-fn slots_of(touch: &Touch, motion: &Motion, guest: &Guest) -> Slots {
+fn slots_of(touch: &Touch, motion: &Motion, guest: &Guest) -> ContactJacobian {
     let mut slots = only_mine(touch, motion);
     guest.other.join(&mut slots, 2, &halfway(touch).1, (touch.normal, -1.0));
     slots
 }
 
-fn only_mine(touch: &Touch, motion: &Motion) -> Slots {
-    let mut slots = Slots::default();
+fn only_mine(touch: &Touch, motion: &Motion) -> ContactJacobian {
+    let mut slots = ContactJacobian::default();
     halfway(touch).0.join(&mut slots, 0, motion.position, (-touch.normal, 1.0));
     slots
 }
 
 /// How a point of the body answers a unit impulse along `axis`, 1/kg.
-fn answer_of(motion: &Motion, spread: &Spread, slots: &Slots, axis: DVec3) -> DVec3 {
+fn answer_of(motion: &Motion, spread: &MassDistribution, slots: &ContactJacobian, axis: DVec3) -> DVec3 {
     let (inverse_mass, inverse_inertia) = motion.inverse_inertia(spread);
     let mut answer = [DVec3::ZERO; 2];
     slots.scatter(axis, &mut answer);

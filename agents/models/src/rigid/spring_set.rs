@@ -4,20 +4,20 @@
 //! impulses of those ends, booked. Never here: how springs are solved ([`crate::rigid::linear_spring`]).
 
 use super::company::Company;
-use super::linear_spring::Tie;
-use super::orientation_spring::Turn;
+use super::linear_spring::LinearSpring;
+use super::orientation_spring::OrientationSpring;
 use glam::{DMat3, DVec3};
 use metachron_contact::agent::led_s;
+use metachron_contact::{AnchorSpring, StepContext};
 use metachron_contact::{Law, Link, Other};
-use metachron_contact::{Pull, Surroundings};
 use metachron_core::{Anchor, Body};
-use metachron_core::{PairKind, Slots};
+use metachron_core::{ContactJacobian, PairKind};
 
 /// All springs on a body.
 #[derive(Default)]
-pub(super) struct Ties {
+pub(super) struct SpringSet {
     /// The springs.
-    pub all: Vec<Tie>,
+    pub all: Vec<LinearSpring>,
     /// The agent at the other end of each.
     ends: Vec<Option<End>>,
     /// Scratch storage for one response.
@@ -33,7 +33,7 @@ struct End {
     kind: PairKind,
 }
 
-impl Ties {
+impl SpringSet {
     /// Whether there are no springs.
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty()
@@ -46,7 +46,7 @@ impl Ties {
     }
 
     /// Gathers every spring of this step.
-    pub(super) fn gather(&mut self, around: &Surroundings<'_>, company: &Company) {
+    pub(super) fn gather(&mut self, around: &StepContext<'_>, company: &Company) {
         self.all.clear();
         self.ends.clear();
         for pull in around.pulls() {
@@ -56,14 +56,14 @@ impl Ties {
             }
             let guest = by.flatten();
             let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
-            self.all.push(Tie { turn, ..Tie::led(pull) });
+            self.all.push(LinearSpring { turn, ..LinearSpring::led(pull) });
             self.ends.push(guest.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
         }
         for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
             let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
             let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
             if let Some(guest) = guest.filter(|_| owned) {
-                self.all.push(Tie { rest_m: link.rest_m, ..Tie::led(spring_of(link)) });
+                self.all.push(LinearSpring { rest_m: link.rest_m, ..LinearSpring::led(spring_of(link)) });
                 self.ends.push(Some(End { guest, anchor: link.there, kind: PairKind::Attachment }));
             }
         }
@@ -82,7 +82,7 @@ impl Ties {
             let Some((target, velocity)) = other.point(anchor) else { continue };
             (tie.pull.target, tie.pull.target_velocity) = (target, velocity);
             let shared = ends.iter().flatten().filter(|end| end.guest == i).count();
-            let mut slots = Slots::default();
+            let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
             let column = |axis: DVec3| {
                 room.clear();
@@ -111,7 +111,7 @@ impl Ties {
             let Some(End { guest: i, anchor, kind }) = *end else { continue };
             let (guests, exchange, ..) = company.split();
             let other = &mut guests[i].other;
-            let mut slots = Slots::default();
+            let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
             room.clear();
             room.resize(other.velocities().len(), DVec3::ZERO);
@@ -131,16 +131,16 @@ impl Ties {
 }
 
 /// The torsional spring by which a tool, brought to the body's own time, keeps the body that it pulls from turning.
-fn turn_of(tool: &Other, (pull, around): (&Pull, &Surroundings<'_>)) -> Option<Turn> {
+fn turn_of(tool: &Other, (pull, around): (&AnchorSpring, &StepContext<'_>)) -> Option<OrientationSpring> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
     let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
-    Some(Turn::of(state, &clasp, (pull, led_s(around.time, seen.time))))
+    Some(OrientationSpring::of(state, &clasp, (pull, led_s(around.time, seen.time))))
 }
 
 /// A link as a spring; its target is set later.
-const fn spring_of(link: &Link) -> Pull {
-    Pull {
+const fn spring_of(link: &Link) -> AnchorSpring {
+    AnchorSpring {
         by: Some(link.other),
         anchor: link.here,
         target: DVec3::ZERO,

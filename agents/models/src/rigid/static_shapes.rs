@@ -7,23 +7,23 @@
 //! any face. A mesh is tested triangle by triangle with parry: in single precision, relative to the mesh.
 
 use super::company::placed;
-use super::conservative_advancement::{Mover, pose};
+use super::conservative_advancement::{MovingShape, pose};
 use super::motion::Motion;
 use glam::{DQuat, DVec3};
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
-use metachron_geometry::{Form, FormKind, Place, Placed, SolidForm, Touch, View};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{CollisionShape, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
 use metachron_geometry::{Obstacle, ShapeError, Solid};
 use rapier3d::parry::query::{
     ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, PersistentQueryDispatcher,
 };
 
 /// All static solids.
-pub(super) struct Obstacles(Vec<Standing>);
+pub(super) struct StaticShapes(Vec<Standing>);
 
 /// One static solid.
 pub(super) struct Standing {
     /// Its shape and skin.
-    pub form: Form,
+    pub form: CollisionShape,
     position: DVec3,
     rotation: DQuat,
     /// Half the slab's height, for a plane, metres.
@@ -34,8 +34,8 @@ pub(super) struct Standing {
 
 /// The body at its present place.
 pub(super) struct Mine<'a> {
-    pub form: &'a Form,
-    pub mover: &'a Mover,
+    pub form: &'a CollisionShape,
+    pub mover: &'a MovingShape,
     pub motion: &'a Motion,
 }
 
@@ -51,7 +51,7 @@ const SLAB_RADII: f64 = 4.0;
 /// Bits of a triangle's corners, edges and face in keys, and of those of the body.
 const FEATURE_BITS: u32 = 12;
 
-impl Obstacles {
+impl StaticShapes {
     /// The forms of `obstacles` for a body of `radius_m`.
     ///
     /// # Errors
@@ -62,8 +62,8 @@ impl Obstacles {
             let slab = slab_m.map(|half| Solid::Box { half_extents_m: DVec3::splat(half) });
             let solid = slab.unwrap_or_else(|| obstacle.solid.clone());
             let mesh = matches!(solid, Solid::Mesh { .. }).then(MeshRoom::default);
-            let kind = FormKind::Solid(SolidForm::new(solid, DVec3::ZERO)?);
-            let form = Form { kind, friction: obstacle.friction, restitution: obstacle.restitution };
+            let kind = ShapeKind::Solid(SolidShape::new(solid, DVec3::ZERO)?);
+            let form = CollisionShape { kind, friction: obstacle.friction, restitution: obstacle.restitution };
             let rotation = obstacle.rotation.normalize();
             Ok(Standing { form, position: obstacle.position, rotation, slab_m, mesh })
         });
@@ -78,20 +78,28 @@ impl Obstacles {
 
 impl Standing {
     /// Every place with a gap of at most `reach_m` (metres, ≥ 0) between the body and this; the previous contents of `into` are dropped.
-    pub(super) fn touches(&mut self, mine: &Mine<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
+    pub(super) fn touches(
+        &mut self,
+        mine: &Mine<'_>,
+        reach_m: f64,
+        room: &mut NarrowPhaseScratch,
+        into: &mut Vec<Touch>,
+    ) {
         if self.mesh.is_some() {
             into.clear();
             self.touch_triangles(mine, reach_m, into);
         } else {
-            let view = View::Solid { position: self.place(mine.motion.position), rotation: self.rotation };
-            touches(&placed(mine.form, mine.motion), &Placed { form: &self.form, view }, reach_m, room, into);
+            let view = ShapePose::Solid { position: self.place(mine.motion.position), rotation: self.rotation };
+            touches(&placed(mine.form, mine.motion), &PlacedShape { form: &self.form, view }, reach_m, room, into);
         }
     }
 
     /// The same for a mesh. Its inner edges are smoothed over: a body that slides across two coplanar triangles is not caught by their
     /// edge.
     fn touch_triangles(&mut self, mine: &Mine<'_>, reach_m: f64, into: &mut Vec<Touch>) {
-        let (FormKind::Solid(SolidForm { shape, .. }), Some(room)) = (&self.form.kind, &mut self.mesh) else { return };
+        let (ShapeKind::Solid(SolidShape { shape, .. }), Some(room)) = (&self.form.kind, &mut self.mesh) else {
+            return;
+        };
         let MeshRoom { manifolds, workspace } = room;
         // old points would be carried along instead of being recomputed
         manifolds.iter_mut().for_each(|manifold| manifold.points.clear());

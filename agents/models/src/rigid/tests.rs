@@ -2,7 +2,7 @@
 
 use super::{RigidBody, RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
@@ -53,7 +53,7 @@ fn span(seconds: f64) -> SimSpan {
 }
 
 fn step(body: &mut RigidBody, dt: f64) -> StepReport {
-    body.step(span(dt), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap()
+    body.step(span(dt), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap()
 }
 
 fn snapshot(body: &RigidBody) -> Snapshot {
@@ -67,8 +67,8 @@ fn state(body: &RigidBody) -> RigidState {
     state
 }
 
-fn hand(target: DVec3, stiffness_n_m: f64) -> Pull {
-    Pull {
+fn hand(target: DVec3, stiffness_n_m: f64) -> AnchorSpring {
+    AnchorSpring {
         by: None,
         anchor: Anchor::Local(DVec3::ZERO),
         target,
@@ -78,9 +78,9 @@ fn hand(target: DVec3, stiffness_n_m: f64) -> Pull {
     }
 }
 
-fn drag(body: &mut RigidBody, dt: f64, pull: Pull) -> Result<StepReport, StepError> {
+fn drag(body: &mut RigidBody, dt: f64, pull: AnchorSpring) -> Result<StepReport, StepError> {
     let hands = [pull];
-    body.step(span(dt), &Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), SimTime::ZERO) })
+    body.step(span(dt), &StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) })
 }
 
 #[test]
@@ -262,7 +262,8 @@ fn a_hand_moves_the_body_to_itself_at_any_stiffness() {
 #[test]
 fn a_stiff_hand_on_a_corner_does_not_throw_the_body() {
     let mut body = RigidBody::new(cube(0.1, DVec3::ZERO)).unwrap();
-    let pull = Pull { anchor: Anchor::Local(DVec3::splat(0.1)), damping_n_s_m: 0.0, ..hand(DVec3::X * 2.0, 1e7) };
+    let pull =
+        AnchorSpring { anchor: Anchor::Local(DVec3::splat(0.1)), damping_n_s_m: 0.0, ..hand(DVec3::X * 2.0, 1e7) };
     for _ in 0..1000 {
         drag(&mut body, 0.016, pull).unwrap();
         let now = state(&body);
@@ -303,7 +304,7 @@ fn a_step_of_no_length_or_of_hours_is_refused_and_leaves_the_state() {
     step(&mut body, 0.01);
     let before = state(&body);
     for bad in [SimSpan::ZERO, span(1.5), span(1e6), SimSpan::from_nanos(u64::MAX)] {
-        let error = body.step(bad, &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap_err();
+        let error = body.step(bad, &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap_err();
         assert!(matches!(error, StepError::BadSpan { .. }), "{error}");
         assert_eq!(state(&body), before);
     }

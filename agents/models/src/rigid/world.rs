@@ -5,8 +5,8 @@
 //!
 //! A pair's friction is the geometric mean of both coefficients, its restitution the larger of both.
 
-use super::conservative_advancement::{Ahead, Fall, Fixed, Mover, pose};
-use super::mass_properties::Spread;
+use super::conservative_advancement::{Ahead, Fall, Fixed, MovingShape, pose};
+use super::mass_properties::MassDistribution;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
 use glam::DVec3;
@@ -26,7 +26,7 @@ pub(super) struct World {
     /// The fixed solids, each with the restitution of the body's contact with it.
     fixed: Vec<(Fixed, f64)>,
     /// The moving shape.
-    pub mover: Mover,
+    pub mover: MovingShape,
     /// The solver's copy of the motion is old: it must be told before the next contact.
     stale: bool,
 }
@@ -40,8 +40,8 @@ const DAMPING_RATIO: f32 = 10.0;
 
 impl World {
     /// Puts the body of `spec` among its obstacles.
-    pub(super) fn new(spec: &RigidSpec, spread: &Spread) -> Result<Self, RigidError> {
-        let mover = Mover::new(&spec.solid, spread)?;
+    pub(super) fn new(spec: &RigidSpec, spread: &MassDistribution) -> Result<Self, RigidError> {
+        let mover = MovingShape::new(&spec.solid, spread)?;
         let mut sim = PhysicsWorld { integration_parameters: parameters(), ..PhysicsWorld::default() };
         let mut fixed = Vec::with_capacity(spec.obstacles.len());
         for obstacle in spec.obstacles.iter() {
@@ -100,7 +100,7 @@ impl World {
     pub(super) fn contact(
         &mut self,
         motion: &mut Motion,
-        spread: &Spread,
+        spread: &MassDistribution,
         h: f64,
         gravity: DVec3,
     ) -> Result<(), &'static str> {
@@ -126,7 +126,7 @@ impl World {
     }
 
     /// Brings the solver's copy up to date.
-    fn tell(&mut self, motion: &Motion, spread: &Spread) {
+    fn tell(&mut self, motion: &Motion, spread: &MassDistribution) {
         if self.stale {
             let body = &mut self.sim.bodies[self.body];
             body.set_position(pose(motion.position, motion.rotation), true);

@@ -3,11 +3,11 @@
 //! In: specs and pulls. Out: forces and stiffnesses at nodes, implicit in the step. Never here: clamps and pins (they are
 //! not springs: their slots are removed from the system). Theory: docs/theory/rod.md, eq. 21–24.
 
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::spec::Attachment;
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_contact::{Far, Link, Pulled};
 use metachron_core::{AgentId, Anchor};
 
@@ -63,7 +63,7 @@ impl NodeSpring {
 }
 
 /// Lists the springs of `attachments` at the nodes of `division`: each node takes the share of its dual length (eq. 23).
-pub fn springs(attachments: &[Attachment], division: &Division, into: &mut Vec<NodeSpring>) {
+pub fn springs(attachments: &[Attachment], division: &Discretization, into: &mut Vec<NodeSpring>) {
     into.clear();
     let (total, count) = (division.total_m(), division.segments());
     for attachment in attachments {
@@ -123,7 +123,7 @@ pub enum End {
 
 impl Tie {
     /// The tie of a pull; `None` where it has no point on this tube or is not finite.
-    pub fn new(pull: &Pull, division: &Division) -> Option<Self> {
+    pub fn new(pull: &AnchorSpring, division: &Discretization) -> Option<Self> {
         let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
         let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), division)?;
         let (target, target_velocity) = (pull.target, pull.target_velocity);
@@ -131,12 +131,12 @@ impl Tie {
     }
 
     /// The tie of a link, whose far end is set later ([`Tie::aim`]); `None` where it has no point on this tube.
-    pub fn of_link(link: &Link, division: &Division) -> Option<Self> {
+    pub fn of_link(link: &Link, division: &Discretization) -> Option<Self> {
         let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), division)?;
         Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
     }
 
-    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), division: &Division) -> Option<Self> {
+    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), division: &Discretization) -> Option<Self> {
         let Anchor::Arc(arc_m) = anchor else { return None };
         let fair = |c: f64| c.is_finite() && c >= 0.0;
         if !(arc_m.is_finite() && fair(stiffness) && fair(damping)) {
@@ -228,10 +228,10 @@ impl Tie {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rod::rest_curve::Skeleton;
+    use crate::rod::rest_curve::RestCurve;
 
-    fn line() -> Division {
-        Division::first(&Skeleton::new(&[DVec3::ZERO, DVec3::X]), 7)
+    fn line() -> Discretization {
+        Discretization::first(&RestCurve::new(&[DVec3::ZERO, DVec3::X]), 7)
     }
 
     #[test]

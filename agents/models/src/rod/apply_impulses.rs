@@ -6,14 +6,14 @@
 use super::anchor_springs::Tie;
 use super::banded_ldl::Factor;
 use super::contact::TubeContacts;
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::rotation::{exp, unit};
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use glam::DVec3;
 use metachron_contact::Neighbour;
 use metachron_core::SimTime;
 use metachron_core::foot::press;
-use metachron_core::{Foot, Impulse, Site, Slots};
+use metachron_core::{ContactJacobian, Foot, Impulse, Site};
 
 /// A giver whose clock differs from the tube's by more steps than this makes impulses untimely: the displacement since (or its reversal)
 /// is then too long for a linear response.
@@ -37,7 +37,7 @@ pub struct Received {
     /// Whether any came from a giver whose clock is too far off.
     untimely: bool,
     /// A trial state.
-    trial: Config,
+    trial: RodState,
 }
 
 impl Received {
@@ -94,7 +94,7 @@ impl Received {
     }
 
     /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division loses none of it.
-    pub fn add(&mut self, division: &Division, site: Site, sum: Impulse, carried: Impulse) {
+    pub fn add(&mut self, division: &Discretization, site: Site, sum: Impulse, carried: Impulse) {
         let Site::Arc(arc_m) = site else { return };
         let (segment, share) = division.locate(arc_m);
         self.begin();
@@ -106,7 +106,7 @@ impl Received {
     }
 
     /// Adds an impulse that acts now on the velocities that `slots` gathers.
-    pub fn add_slots(&mut self, slots: &Slots, impulse: DVec3) {
+    pub fn add_slots(&mut self, slots: &ContactJacobian, impulse: DVec3) {
         self.begin();
         slots.scatter(impulse, &mut self.sum);
     }
@@ -128,9 +128,9 @@ impl Received {
     /// `ties` are those in the factor: each records the impulse it takes.
     pub fn apply(
         &mut self,
-        state: &mut Config,
+        state: &mut RodState,
         (factor, ties): (&Factor, &mut [Tie]),
-        (matter, division): (&Matter, &Division),
+        (matter, division): (&RodMaterial, &Discretization),
         (walls, feet, way_m): (&TubeContacts, &[Foot], f64),
     ) {
         let Self { sum, carried, fresh, slots, .. } = self;
@@ -161,7 +161,12 @@ impl Received {
 
     /// The share of the displacement of `state`, at most `share`, halved until it does not increase the tube's strain energy; zero where a
     /// few halvings do not suffice (eq. 37b).
-    fn unstrained(&mut self, state: &Config, (matter, division): (&Matter, &Division), mut share: f64) -> f64 {
+    fn unstrained(
+        &mut self,
+        state: &RodState,
+        (matter, division): (&RodMaterial, &Discretization),
+        mut share: f64,
+    ) -> f64 {
         let Self { carried, trial, .. } = self;
         for _ in 0..WAY_HALVINGS {
             trial.resize(state.q.len());
@@ -178,7 +183,7 @@ impl Received {
 }
 
 /// Moves and turns a state by a share of each slot's displacement.
-fn carry(state: &mut Config, carried: &[DVec3], share: f64) {
+fn carry(state: &mut RodState, carried: &[DVec3], share: f64) {
     state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
     let turns = carried.iter().skip(1).step_by(2);
     state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));

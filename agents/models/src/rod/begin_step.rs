@@ -8,13 +8,13 @@ use super::publish::bounds;
 use super::sided::{Now, is_sided};
 use super::step::Lost;
 use super::tube::Tube;
-use metachron_contact::Surroundings;
+use metachron_contact::StepContext;
 use metachron_contact::{Law, Link};
 use metachron_core::{SimSpan, StepError};
 
 impl Tube {
     /// Lists this step's pulls, each of them exactly once.
-    pub(super) fn take_pulls(&mut self, around: &Surroundings<'_>) {
+    pub(super) fn take_pulls(&mut self, around: &StepContext<'_>) {
         std::mem::swap(&mut self.ties, &mut self.ties_before);
         self.ties.clear();
         self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
@@ -28,7 +28,7 @@ impl Tube {
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the impulses received cannot be applied.
-    pub(super) fn meet(&mut self, around: &Surroundings<'_>, dt: SimSpan) -> Result<(), StepError> {
+    pub(super) fn meet(&mut self, around: &StepContext<'_>, dt: SimSpan) -> Result<(), StepError> {
         let dt_s = dt.as_secs_f64();
         self.dt_s = dt_s;
         self.stepper.company.open(around, &self.division, around.time + dt);
@@ -53,7 +53,7 @@ impl Tube {
     }
 
     /// Adds the forces of pair laws that need no ledger to the impulses that the tube receives.
-    fn act_on_itself(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), Lost> {
+    fn act_on_itself(&mut self, around: &StepContext<'_>, dt: f64) -> Result<(), Lost> {
         self.step_by(dt, |stepper, now, setting, _| stepper.prepare(now, setting))?;
         let mut company = std::mem::take(&mut self.stepper.company);
         let mut radii_m = std::mem::take(&mut company.sided().radii_m);

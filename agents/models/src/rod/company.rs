@@ -7,23 +7,23 @@
 use super::anchor_springs::{End, Tie};
 use super::apply_impulses::Received;
 use super::contact::Skin;
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::sided::Sided;
 use glam::DVec3;
 use metachron_contact::beside::{may_touch, parts};
 use metachron_contact::{Contact, Exchange, Law, Mates, Search, WAKE_M_S};
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::PairState;
 use metachron_core::{AgentId, Bounds, SimTime, Snapshot};
-use metachron_geometry::narrow_phase::TouchRoom;
-use metachron_geometry::{Form, Placed, Touch, View};
+use metachron_geometry::narrow_phase::NarrowPhaseScratch;
+use metachron_geometry::{CollisionShape, PlacedShape, ShapePose, Touch};
 use std::fmt;
 use std::sync::Arc;
 
 /// The agents near one tube.
 #[derive(Clone, Default)]
 pub struct Company {
-    form: Option<Arc<Form>>,
+    form: Option<Arc<CollisionShape>>,
     mates: Mates,
     received: Received,
     room: Room,
@@ -37,7 +37,7 @@ pub struct Company {
 
 /// Room for searches; a copy of a tube starts with none.
 #[derive(Default)]
-struct Room(TouchRoom);
+struct Room(NarrowPhaseScratch);
 
 impl Clone for Room {
     fn clone(&self) -> Self {
@@ -53,12 +53,12 @@ impl fmt::Debug for Company {
 
 impl Company {
     /// The company of a tube of this form and mass.
-    pub fn new(form: Arc<Form>, mass_kg: f64) -> Self {
+    pub fn new(form: Arc<CollisionShape>, mass_kg: f64) -> Self {
         Self { form: Some(form), mass_kg, ..Self::default() }
     }
 
     /// The tube's form.
-    pub fn form(&self) -> Option<&Arc<Form>> {
+    pub fn form(&self) -> Option<&Arc<CollisionShape>> {
         self.form.as_ref()
     }
 
@@ -68,7 +68,7 @@ impl Company {
     }
 
     /// Begins a step that ends at `until`: takes in what others gave since the last one, in slots of `division`.
-    pub fn open(&mut self, around: &Surroundings<'_>, division: &Division, until: SimTime) {
+    pub fn open(&mut self, around: &StepContext<'_>, division: &Discretization, until: SimTime) {
         self.watched = !around.links.is_empty() || around.neighbours.iter().any(|n| n.form.is_some());
         let Self { mates: Mates { exchange, .. }, received, .. } = self;
         received.clear(2 * division.segments() + 1);
@@ -104,7 +104,7 @@ impl Company {
     }
 
     /// Lends what a search for places needs: the tube's form, room, and a list that comes back by [`Self::give_back`].
-    pub fn search(&mut self) -> Option<(Arc<Form>, &mut TouchRoom, Vec<Touch>)> {
+    pub fn search(&mut self) -> Option<(Arc<CollisionShape>, &mut NarrowPhaseScratch, Vec<Touch>)> {
         let list = std::mem::take(&mut self.touches);
         self.form.clone().map(|form| (form, &mut self.room.0, list))
     }
@@ -130,7 +130,7 @@ impl Company {
     }
 
     /// Gathers those whose couplings with this tube it owns, for a step of `dt` seconds from `bounds`.
-    pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) {
+    pub fn gather(&mut self, around: &StepContext<'_>, bounds: &Bounds, dt: f64) {
         self.knocks.clear();
         self.knock(around, bounds, dt);
         let friction = self.friction();
@@ -145,7 +145,7 @@ impl Company {
     }
 
     /// Finds those who own the pair with this tube and sleep where it may get within two steps of `dt` seconds.
-    fn knock(&mut self, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) {
+    fn knock(&mut self, around: &StepContext<'_>, bounds: &Bounds, dt: f64) {
         if bounds.speed_m_s <= WAKE_M_S {
             return;
         }
@@ -183,7 +183,7 @@ impl Company {
     pub fn find(&mut self, skin: &Skin<'_>, slack_m: f64, contacts: &mut Vec<Contact>) {
         let Self { form, mates, room, .. } = self;
         let Some(form) = form else { return };
-        let here = Placed { form, view: View::Chain { positions: skin.positions, radii_m: skin.radii_m } };
+        let here = PlacedShape { form, view: ShapePose::Chain { positions: skin.positions, radii_m: skin.radii_m } };
         let first = contacts.len();
         let search = Search { h_s: skin.h_s, slack_m, speed_m_s: skin.speed() };
         mates.find(&here, search, skin.slots, (&mut room.0, contacts));
@@ -213,7 +213,7 @@ impl Company {
     }
 
     /// Ends a step of `dt` seconds.
-    pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub fn close(&mut self, around: &StepContext<'_>, dt: f64) {
         self.mates.tell(self.mass_kg);
         self.mates.keep(around, dt);
         self.mates.close(around, dt);

@@ -3,7 +3,7 @@
 //! In: the skeleton and a density of nodes. Out: rest lengths, rest strains and rest bends of every segment and joint.
 //! Never here: the present state ([`super::remesh`] transfers that). Theory: docs/theory/rod.md, eq. 1–4, 25.
 
-use super::rest_curve::Skeleton;
+use super::rest_curve::RestCurve;
 use super::rotation::{exp, log, shortest_arc};
 use glam::{DQuat, DVec3};
 
@@ -20,7 +20,7 @@ const CEIL_SLACK: f64 = 1e-9;
 
 /// The rest shape of a divided tube of N segments.
 #[derive(Debug, Clone, Default)]
-pub struct Division {
+pub struct Discretization {
     /// Rest arc length of each node, metres: 0 … L, N + 1 entries.
     pub arc_m: Vec<f64>,
     /// Stress-free node positions, metres; N + 1 entries.
@@ -40,14 +40,14 @@ pub struct Division {
 }
 
 /// Number of segments of this skeleton at spacing `eps_m`: ⌈L/ε⌉ within the limits.
-pub fn segments_for(skeleton: &Skeleton, eps_m: f64) -> usize {
+pub fn segments_for(skeleton: &RestCurve, eps_m: f64) -> usize {
     let wanted = libm::ceil(skeleton.length_m() / eps_m - CEIL_SLACK);
     let count = if wanted >= SEGMENTS_MAX as f64 { SEGMENTS_MAX } else { wanted.max(0.0) as usize };
     limit(skeleton, count)
 }
 
 /// The nearest number of segments that can represent this skeleton.
-pub fn limit(skeleton: &Skeleton, count: usize) -> usize {
+pub fn limit(skeleton: &RestCurve, count: usize) -> usize {
     let turns = libm::ceil(skeleton.turning_rad() / TURN_MAX_RAD) as usize;
     count.clamp(SEGMENTS_MIN.max(turns).min(SEGMENTS_MAX), SEGMENTS_MAX)
 }
@@ -92,9 +92,9 @@ pub fn densities(bend: &mut [f64], length: &[f64]) {
     }
 }
 
-impl Division {
+impl Discretization {
     /// The initial division of the skeleton: even where it is straight, denser where it bends.
-    pub fn first(skeleton: &Skeleton, count: usize) -> Self {
+    pub fn first(skeleton: &RestCurve, count: usize) -> Self {
         let mut division = Self::default();
         let length = skeleton.length_m();
         let mut arcs: Vec<f64> = (0..=count).map(|k| length * k as f64 / count as f64).collect();
@@ -134,7 +134,7 @@ impl Division {
     }
 
     /// Divides the skeleton at `arcs` (0 … L, rising), reusing the storage.
-    pub fn rebuild(&mut self, skeleton: &Skeleton, arcs: &[f64]) {
+    pub fn rebuild(&mut self, skeleton: &RestCurve, arcs: &[f64]) {
         let count = arcs.len() - 1;
         self.arc_m.clear();
         self.arc_m.extend_from_slice(arcs);
@@ -158,7 +158,7 @@ impl Division {
     }
 
     /// Twists the sections and the end wall about the curve.
-    fn twist(&mut self, skeleton: &Skeleton) {
+    fn twist(&mut self, skeleton: &RestCurve) {
         let turned = |frame: DQuat, arc_m: f64| match skeleton.twist_at(arc_m) {
             0.0 => frame,
             angle => frame * exp(DVec3::Z * angle),
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_straight_tube_is_divided_evenly_and_its_lengths_sum_exactly() {
-        let division = Division::first(&Skeleton::new(&[DVec3::ZERO, DVec3::X]), 64);
+        let division = Discretization::first(&RestCurve::new(&[DVec3::ZERO, DVec3::X]), 64);
         assert_eq!(division.total_m(), 1.0);
         for l in &division.length {
             assert!((l - 1.0 / 64.0).abs() < 1e-15);
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn bends_are_divided_more_finely_than_straights() {
         let path = [DVec3::ZERO, DVec3::X, DVec3::new(1.1, 0.1, 0.0), DVec3::new(1.1, 1.0, 0.0)];
-        let division = Division::first(&Skeleton::new(&path), 60);
+        let division = Discretization::first(&RestCurve::new(&path), 60);
         let finest = division.length.iter().copied().fold(f64::MAX, f64::min);
         let coarsest = division.length.iter().copied().fold(0.0, f64::max);
         assert!(coarsest / finest > 1.3 && coarsest / finest < 2.1, "{coarsest} / {finest}"); // densities 1 … 2
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn a_point_is_found_in_its_segment() {
-        let division = Division::first(&Skeleton::new(&[DVec3::ZERO, DVec3::X]), 4);
+        let division = Discretization::first(&RestCurve::new(&[DVec3::ZERO, DVec3::X]), 4);
         assert_eq!(division.locate(0.0), (0, 0.0));
         let (segment, share) = division.locate(0.625);
         assert!(segment == 2 && (share - 0.5).abs() < 1e-14); // a few roundings over a quarter

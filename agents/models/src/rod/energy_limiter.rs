@@ -3,14 +3,14 @@
 //! In: a state and the energy to remove. Out: the same state, moving more slowly about its own rigid motion.
 //! Never here: the decision to do so. Theory: docs/theory/rod.md, eq. 28.
 
-use super::discretization::Division;
-use super::state::{Config, Matter};
+use super::discretization::Discretization;
+use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
 use glam::DVec3;
 
 /// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of what differs from
 /// the rigid motion with the same momentum.
-pub fn take(excess: f64, state: &mut Config, matter: &Matter, division: &Division) {
+pub fn take(excess: f64, state: &mut RodState, matter: &RodMaterial, division: &Discretization) {
     let held = matter.held[0] || matter.held[1];
     let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };
     rigid.add(state, -1.0);
@@ -32,7 +32,7 @@ struct Rigid {
 
 impl Rigid {
     /// The rigid motion with the momentum of `state`.
-    fn of(state: &Config, matter: &Matter, division: &Division) -> Self {
+    fn of(state: &RodState, matter: &RodMaterial, division: &Discretization) -> Self {
         let mass = matter.mu * division.total_m();
         let weighted = division.length.iter().zip(state.x.windows(2)).map(|(&l, x)| (x[0] + x[1]) * (0.5 * l));
         let centre = weighted.sum::<DVec3>() / division.total_m();
@@ -52,7 +52,7 @@ impl Rigid {
     }
 
     /// Adds `scale` times this motion to the velocities of `state`.
-    fn add(&self, state: &mut Config, scale: f64) {
+    fn add(&self, state: &mut RodState, scale: f64) {
         for k in 0..state.x.len() {
             state.u[2 * k] += (self.velocity + self.spin.cross(state.x[k] - self.centre)) * scale;
         }

@@ -7,7 +7,7 @@
 
 use super::banded_ldl::Row;
 use super::rotation::{bend_share, cayley};
-use super::state::{Config, Joint, Matter};
+use super::state::{Joint, RodMaterial, RodState};
 use super::sym3::Sym3;
 use super::system::Scene;
 use glam::{DMat3, DQuat, DVec3};
@@ -16,15 +16,15 @@ use glam::{DMat3, DQuat, DVec3};
 const TURN_MIN_RAD: f64 = 1e-6;
 
 /// Fills `rhs` with M (v_n − v) + 2 h f̄, and adds springs to both; `scene.h` is half the substep.
-pub fn fill_mean(scene: &Scene<'_>, (now, next): (&Config, &Config), rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn fill_mean(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
     fill_segments(scene, (now, next), rhs);
     fill_joints(scene, (now, next), rhs);
     add_springs(scene, (now, next), rows, rhs);
 }
 
 /// Change of momentum, weight, stretch and shear (eq. 45, 47).
-fn fill_segments(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [DVec3]) {
-    let Matter { ea, ga, mu, rotary, gravity, .. } = *scene.matter;
+fn fill_segments(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
+    let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *scene.matter;
     let h = scene.h;
     let want = |slot: usize| now.u[slot] - next.u[slot];
     let stiffness = DVec3::new(ga, ga, ea);
@@ -49,7 +49,7 @@ fn fill_segments(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [
 }
 
 /// Bend and twist (eq. 48).
-fn fill_joints(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [DVec3]) {
+fn fill_joints(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
     let Scene { matter, division, .. } = *scene;
     let (count, wall) = (now.q.len(), division.wall);
     let ends = |k: usize| (now.q[k], next.q[k]);
@@ -86,7 +86,7 @@ fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DV
 }
 
 /// Attachments: the mean of the forces at both ends of the substep, corrected along the displacement so that work equals energy change.
-fn add_springs(scene: &Scene<'_>, (now, next): (&Config, &Config), rows: &mut [Row], rhs: &mut [DVec3]) {
+fn add_springs(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
     let h = scene.h;
     for spring in scene.springs {
         let (k, slot) = (spring.node, 2 * spring.node);

@@ -5,7 +5,7 @@
 //! Never here: whether the step is short enough ([`super::method`]). Theory: docs/theory/rod.md, eq. 40–42.
 
 use super::banded_ldl::Row;
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use super::step::{Lost, Stepper};
 use super::sym3::Sym3;
 use super::system::{Iterate, Scene, add_springs, add_ties, gyrate, hold_ends};
@@ -13,7 +13,7 @@ use glam::DVec3;
 
 impl Stepper {
     /// A substep of symplectic Euler: velocities from the forces at the start, positions from those velocities.
-    pub(super) fn push(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
+    pub(super) fn push(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, false);
         self.answer()?;
         self.touch(now, scene, true);
@@ -22,7 +22,7 @@ impl Stepper {
     }
 
     /// A substep of XPBD: gravity and external springs, then the constraints, then contact.
-    pub(super) fn project(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
+    pub(super) fn project(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, true);
         self.answer()?;
         let Self { rhs, projector, .. } = self;
@@ -33,7 +33,7 @@ impl Stepper {
     }
 
     /// The system of masses and springs alone; `lumped` with lumped node masses and no elastic forces (eq. 40).
-    pub(super) fn assemble_light(&mut self, now: &Config, scene: &Scene<'_>, lumped: bool) {
+    pub(super) fn assemble_light(&mut self, now: &RodState, scene: &Scene<'_>, lumped: bool) {
         let Self { rows, rhs, .. } = self;
         rows.resize(now.u.len(), Row::ZERO);
         rhs.resize(now.u.len(), DVec3::ZERO);
@@ -55,8 +55,8 @@ impl Stepper {
 }
 
 /// (1 + h c) M in rows: consistent, or lumped.
-fn fill_masses(scene: &Scene<'_>, at: &Config, lumped: bool, rows: &mut [Row]) {
-    let Matter { mu, rotary, damping, .. } = *scene.matter;
+fn fill_masses(scene: &Scene<'_>, at: &RodState, lumped: bool, rows: &mut [Row]) {
+    let RodMaterial { mu, rotary, damping, .. } = *scene.matter;
     let slow = 1.0 + scene.h * damping;
     let (own, beside) = if lumped { (0.5, 0.0) } else { (1.0 / 3.0, 1.0 / 6.0) };
     rows[0] = Row::ZERO;
@@ -69,8 +69,8 @@ fn fill_masses(scene: &Scene<'_>, at: &Config, lumped: bool, rows: &mut [Row]) {
 }
 
 /// M v_n + h f(x_n), with consistent mass.
-fn fill_forces(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
-    let Matter { mu, rotary, .. } = *scene.matter;
+fn fill_forces(scene: &Scene<'_>, now: &RodState, rhs: &mut [DVec3]) {
+    let RodMaterial { mu, rotary, .. } = *scene.matter;
     let h = scene.h;
     rhs[0] = now.force[0] * h;
     for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {
@@ -82,8 +82,8 @@ fn fill_forces(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
 }
 
 /// M v_n + h · weight, with lumped mass.
-fn fill_weights(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
-    let Matter { mu, rotary, gravity, .. } = *scene.matter;
+fn fill_weights(scene: &Scene<'_>, now: &RodState, rhs: &mut [DVec3]) {
+    let RodMaterial { mu, rotary, gravity, .. } = *scene.matter;
     let h = scene.h;
     rhs[0] = DVec3::ZERO;
     for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {

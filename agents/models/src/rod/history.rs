@@ -4,12 +4,12 @@
 //! implicit Euler. Never here: the choice of method without a past. Theory: docs/theory/rod.md, eq. 43, 44.
 
 use super::rotation::{exp, log, unit};
-use super::state::Config;
+use super::state::RodState;
 use glam::DVec3;
 
 /// Changes over the last substep, in slots.
 #[derive(Debug, Clone, Default)]
-pub struct Past {
+pub struct History {
     /// Of node positions, metres, and of segment frames, radians in world axes.
     way: Vec<DVec3>,
     /// Of velocities, m/s and rad/s.
@@ -20,9 +20,9 @@ pub struct Past {
     spare_j: f64,
 }
 
-impl Past {
+impl History {
     /// Stores the changes of a substep of `h` seconds.
-    pub fn learn(&mut self, from: &Config, to: &Config, h: f64) {
+    pub fn learn(&mut self, from: &RodState, to: &RodState, h: f64) {
         self.span_s = h;
         self.gain.clear();
         self.gain.extend(to.u.iter().zip(&from.u).map(|(b, a)| *b - *a));
@@ -64,7 +64,7 @@ impl Past {
 
     /// Writes the state from which a step of implicit Euler of the returned length, seconds, is a backward difference over
     /// this substep of `h` seconds and the one before it (eq. 43); implicit Euler itself where there is none.
-    pub fn start(&self, now: &Config, into: &mut Config, h: f64) -> f64 {
+    pub fn start(&self, now: &RodState, into: &mut RodState, h: f64) -> f64 {
         let ratio = if self.span_s > 0.0 { h / self.span_s } else { 0.0 };
         let (first, third) = ((1.0 + 2.0 * ratio) / (1.0 + ratio), ratio * ratio / (1.0 + ratio));
         let share = third / first;

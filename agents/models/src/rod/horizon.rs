@@ -9,14 +9,14 @@ use super::contact::respond;
 use super::inertia::momenta;
 use super::method::Integrator;
 use super::publish::bounds;
-use super::state::Config;
+use super::state::RodState;
 use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
 use super::tube::Tube;
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_contact::beside::{PART_MAX_S, bends, is_linked, may_touch};
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::Body;
 use std::cell::LazyCell;
 
@@ -55,7 +55,7 @@ impl Horizon {
 impl Tube {
     /// Works out what owners that bend may expect of a tube that has just made a step of `dt` seconds: of one that touches nothing that moves
     /// its next step where they are soft, keep up with it, and no link joins it to them; and where they are slower one step of theirs.
-    pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
+    pub(super) fn foresee(&mut self, around: &StepContext<'_>, dt: f64) {
         self.stepper.horizon.forget();
         if self.is_foretold(around, dt) {
             return;
@@ -77,7 +77,7 @@ impl Tube {
         let [mut gained, mut standing] =
             [&mut self.accelerations, &mut self.standing_accelerations].map(std::mem::take);
         let span_s = slower.then_some(span_s);
-        let look = |stepper: &mut Stepper, now: &mut Config, setting: &Setting<'_>, _: &mut [Tie]| {
+        let look = |stepper: &mut Stepper, now: &mut RodState, setting: &Setting<'_>, _: &mut [Tie]| {
             stepper.look_ahead(now, setting, span_s, [&mut gained, &mut standing])
         };
         let ahead_s = self.step_by(dt, look);
@@ -94,7 +94,7 @@ impl Tube {
     /// Whether the owners of its contacts expect of the tube the step of [`Self::foretell`] after one of `dt` seconds: tubes with steps
     /// as long, and soft bodies where it touches what moves, as long as that presses as it did. One whole substep, implicit, tells how the
     /// next one goes.
-    pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
+    pub(super) fn is_foretold(&self, around: &StepContext<'_>, dt: f64) -> bool {
         let Self { stepper, now, accelerations, spec, .. } = self;
         let slots = now.u.len();
         let whole = stepper.span_s() == dt && stepper.factor().slots() == slots && accelerations.len() == slots;
@@ -115,7 +115,7 @@ impl Tube {
 
     /// Who has a say in the step after one of `dt` seconds: of those that own contact with the tube who presses on it, or who may touch it
     /// in a step of theirs while nobody does; and who is linked to it.
-    fn owners<'a>(&'a self, around: &'a Surroundings<'_>, dt: f64) -> impl Iterator<Item = &'a Neighbour> {
+    fn owners<'a>(&'a self, around: &'a StepContext<'_>, dt: f64) -> impl Iterator<Item = &'a Neighbour> {
         // most of the time nobody asks
         let bounds = LazyCell::new(|| bounds(&self.now, self.widest_m()));
         let presses = |n: &Neighbour| n.snapshot.pairs.iter().any(|pair| pair.with == around.me && pair.contacts > 0);
@@ -152,7 +152,7 @@ impl Stepper {
     /// step; `None` where it has no factor.
     fn look_ahead(
         &mut self,
-        now: &Config,
+        now: &RodState,
         setting: &Setting<'_>,
         span_s: Option<f64>,
         [gained, standing]: [&mut Vec<DVec3>; 2],
@@ -188,12 +188,12 @@ impl Stepper {
 }
 
 /// Whether an owner is not so far behind a tube with steps of `dt` that what it gives comes whole steps late.
-fn keeps_up(owner: &Neighbour, around: &Surroundings<'_>, dt: f64) -> bool {
+fn keeps_up(owner: &Neighbour, around: &StepContext<'_>, dt: f64) -> bool {
     around.time.secs_after(owner.snapshot.time) <= BEHIND_STEPS * owner.step_s.max(dt)
 }
 
 /// Whether a neighbour computes the contacts or links with this tube, and expects it by its factor.
-pub fn owns_it(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub fn owns_it(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let meets = neighbour.law == Law::Ledger && neighbour.form.is_some();
     bends(neighbour) && !neighbour.owned && (meets || is_linked(neighbour, around))
 }

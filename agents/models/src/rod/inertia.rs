@@ -4,7 +4,7 @@
 
 use super::banded_ldl::Factor;
 use super::contact::respond;
-use super::state::Matter;
+use super::state::RodMaterial;
 use glam::DVec3;
 use metachron_core::{Carried, Foot, Lies};
 use metachron_core::{CurveResponse, ImpulseResponse};
@@ -49,7 +49,7 @@ impl CurveInertia {
     }
 
     /// Copies mass, rotary inertia and damping, and lengths and directions of segments.
-    pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
+    pub(super) fn weigh(&mut self, matter: &RodMaterial, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();
         self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));

@@ -3,8 +3,8 @@
 //! In: a name, a material and a division. Out: the method, and the longest substep it allows. Never here: its
 //! steps ([`super::step`]). Theory: docs/theory/rod.md, 3 and 13.
 
-use super::discretization::Division;
-use super::state::Matter;
+use super::discretization::Discretization;
+use super::state::RodMaterial;
 use super::tube::Tube;
 use metachron_contact::Agent;
 use metachron_core::StepError;
@@ -50,7 +50,7 @@ impl Integrator {
 
     /// The longest substep for a valid result while nothing is stretched, seconds; `None` where any length
     /// is allowed (eq. 38, 39).
-    pub(super) fn longest_substep_s(self, matter: &Matter, division: &Division) -> Option<f64> {
+    pub(super) fn longest_substep_s(self, matter: &RodMaterial, division: &Discretization) -> Option<f64> {
         match self {
             Self::SymplecticEuler => Some(2.0 / fastest_rad_s(matter, division)),
             Self::Xpbd => {
@@ -87,8 +87,8 @@ impl Tube {
 
 /// An upper bound of every frequency of the divided tube at rest, rad/s: the frequency of a single segment bounds stretch and shear,
 /// the greatest row sum bounds bend and twist, and both together bound their sum (eq. 38).
-fn fastest_rad_s(matter: &Matter, division: &Division) -> f64 {
-    let Matter { ea, ga, ei, gj, mu, rotary, clamp, .. } = *matter;
+fn fastest_rad_s(matter: &RodMaterial, division: &Discretization) -> f64 {
+    let RodMaterial { ea, ga, ei, gj, mu, rotary, clamp, .. } = *matter;
     let count = division.segments();
     let bend = ei.max(0.5 * gj);
     let square = |k: usize| {

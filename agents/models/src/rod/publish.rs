@@ -4,13 +4,13 @@
 
 use super::inertia::CurveInertia;
 use super::residual;
-use super::state::Config;
+use super::state::RodState;
 use super::tube::Tube;
 use glam::DVec3;
 use metachron_core::{Bounds, Inertia, Snapshot};
 
 /// The bounding box of a tube in this state that is nowhere wider than `radius_m`.
-pub fn bounds(state: &Config, radius_m: f64) -> Bounds {
+pub fn bounds(state: &RodState, radius_m: f64) -> Bounds {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for x in &state.x {
         (low, high) = (low.min(*x), high.max(*x));

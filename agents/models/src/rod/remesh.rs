@@ -3,9 +3,9 @@
 //! In: the old division and state, the new division. Out: the new state: same length and mass, the same linear momentum to
 //! rounding, angular momentum and shape to O(ε²). Never here: when to do it. Theory: docs/theory/rod.md, eq. 25, 30–32.
 
-use super::discretization::{Division, densities, spread};
+use super::discretization::{Discretization, densities, spread};
 use super::rotation::between;
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use glam::{DQuat, DVec3};
 
 /// Working storage.
@@ -22,7 +22,7 @@ pub struct Remesher {
 
 impl Remesher {
     /// The arc lengths of `count` segments distributed by the present curvature; even where the tube is straight (eq. 25).
-    pub fn arcs(&mut self, state: &Config, old: &Division, count: usize) -> &[f64] {
+    pub fn arcs(&mut self, state: &RodState, old: &Discretization, count: usize) -> &[f64] {
         let last = state.t.len() - 1;
         let turn = |k: usize| if k == 0 || k > last { 0.0 } else { (state.t[k] - state.t[k - 1]).length() };
         self.bend.clear();
@@ -36,7 +36,12 @@ impl Remesher {
     }
 
     /// Writes the state `from` on division `old` into `to` on division `new`.
-    pub fn carry(&mut self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+    pub fn carry(
+        &mut self,
+        matter: &RodMaterial,
+        (from, old): (&RodState, &Discretization),
+        (to, new): (&mut RodState, &Discretization),
+    ) {
         to.resize(new.segments());
         self.learn(matter, from, old);
         self.shape(matter, (from, old), (to, new));
@@ -44,7 +49,7 @@ impl Remesher {
     }
 
     /// Samples rotations and strains of the old segments relative to rest.
-    fn learn(&mut self, matter: &Matter, from: &Config, old: &Division) {
+    fn learn(&mut self, matter: &RodMaterial, from: &RodState, old: &Discretization) {
         self.turns.clear();
         self.at.clear();
         self.strains.clear();
@@ -64,7 +69,12 @@ impl Remesher {
     }
 
     /// Frames by interpolated rotations (eq. 30), positions by summing the strained segments (eq. 31).
-    fn shape(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+    fn shape(
+        &self,
+        matter: &RodMaterial,
+        (from, old): (&RodState, &Discretization),
+        (to, new): (&mut RodState, &Discretization),
+    ) {
         to.x[0] = from.x[0];
         for k in 0..new.segments() {
             let s = new.middle_m(k);
@@ -76,7 +86,12 @@ impl Remesher {
     }
 
     /// Restores held ends, or the centre of mass where none is held.
-    fn place(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+    fn place(
+        &self,
+        matter: &RodMaterial,
+        (from, old): (&RodState, &Discretization),
+        (to, new): (&mut RodState, &Discretization),
+    ) {
         let gap = from.x[old.segments()] - to.x[new.segments()];
         match matter.held {
             [true, false] => {}
@@ -94,7 +109,12 @@ impl Remesher {
     }
 
     /// Velocities by interpolation, then the missing momentum spread evenly over the free nodes (eq. 32).
-    fn motion(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+    fn motion(
+        &self,
+        matter: &RodMaterial,
+        (from, old): (&RodState, &Discretization),
+        (to, new): (&mut RodState, &Discretization),
+    ) {
         let count = new.segments();
         for (k, &s) in new.arc_m.iter().enumerate() {
             let (left, w) = old.locate(s);
@@ -124,7 +144,7 @@ impl Remesher {
         between(self.turns[left], self.turns[right], w)
     }
 
-    fn strain_at(&self, old: &Division, s: f64) -> DVec3 {
+    fn strain_at(&self, old: &Discretization, s: f64) -> DVec3 {
         let (left, w) = bracket(old.segments(), |i| old.middle_m(i), s);
         let right = (left + 1).min(old.segments() - 1);
         self.strains[left].lerp(self.strains[right], w.clamp(0.0, 1.0))
@@ -142,12 +162,12 @@ fn bracket(count: usize, at: impl Fn(usize) -> f64, s: f64) -> (usize, f64) {
     (low, if size > 0.0 { (s - at(low)) / size } else { 0.0 })
 }
 
-fn centre(state: &Config, division: &Division) -> DVec3 {
+fn centre(state: &RodState, division: &Discretization) -> DVec3 {
     let sum: DVec3 = division.length.iter().zip(state.x.windows(2)).map(|(&l, x)| (x[0] + x[1]) * (0.5 * l)).sum();
     sum / division.total_m()
 }
 
 /// Linear momentum over mass per length, m²/s.
-fn flow(state: &Config, division: &Division) -> DVec3 {
+fn flow(state: &RodState, division: &Discretization) -> DVec3 {
     division.length.iter().enumerate().map(|(k, &l)| (state.u[2 * k] + state.u[2 * k + 2]) * (0.5 * l)).sum()
 }

@@ -3,11 +3,11 @@
 //! In: a state. Out: the largest sagitta between a chord and the bent curve. Never here: errors in time.
 //! Theory: docs/theory/rod.md, eq. 29.
 
-use super::discretization::Division;
-use super::state::{Config, Joint, Matter};
+use super::discretization::Discretization;
+use super::state::{Joint, RodMaterial, RodState};
 
 /// max over joints of |κ − κ₀| l̄²/8: second order in ε, zero in the stress-free state (eq. 29).
-pub fn estimate_m(state: &Config, matter: &Matter, division: &Division) -> f64 {
+pub fn estimate_m(state: &RodState, matter: &RodMaterial, division: &Discretization) -> f64 {
     let count = division.segments();
     let inner = (1..count).map(|k| (k, state.q[k - 1], state.q[k]));
     let start = matter.clamp[0].then(|| (0, division.wall[0], state.q[0]));

@@ -2,7 +2,7 @@
 //!
 //! In: its motion, step by step. Out: true after enough quiet time. Never here: the use of it (sleep is up to the runtime).
 
-use super::state::Config;
+use super::state::RodState;
 use glam::DVec3;
 
 /// A node is quiet below this speed, m/s: a tenth of a millimetre per second is invisible on any screen.
@@ -26,7 +26,7 @@ impl RestWatch {
     }
 
     /// Observes a step of `dt` seconds that ended at `now`; returns whether the tube has been quiet for long enough.
-    pub fn observe(&mut self, now: &Config, dt: f64) -> bool {
+    pub fn observe(&mut self, now: &RodState, dt: f64) -> bool {
         let known = self.before.len() == now.x.len();
         let nodes = now.u.iter().step_by(2);
         let speed2 = nodes.clone().map(|v| v.length_squared()).fold(0.0, f64::max);

@@ -39,7 +39,7 @@ struct Knot {
 
 /// The initial centre line.
 #[derive(Debug, Clone)]
-pub struct Skeleton {
+pub struct RestCurve {
     spans: Vec<Span>,
     knots: Vec<Knot>,
     straight: bool,
@@ -77,7 +77,7 @@ impl Span {
     }
 }
 
-impl Skeleton {
+impl RestCurve {
     /// The curve through `path`: at least two points, adjacent ones distinct, without reversals.
     pub fn new(path: &[DVec3]) -> Self {
         let spans = spans_of(path);
@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn two_points_make_an_exactly_straight_line() {
-        let line = Skeleton::new(&[DVec3::X, DVec3::X * 3.0]);
+        let line = RestCurve::new(&[DVec3::X, DVec3::X * 3.0]);
         assert_eq!(line.length_m(), 2.0);
         for s in [0.0, 0.3, 1.0, 1.9, 2.0] {
             let at = line.at(s);
@@ -217,7 +217,7 @@ mod tests {
         let count = 64;
         let angle = |i: usize| std::f64::consts::TAU * i as f64 / f64::from(count);
         let path: Vec<_> = (0..=count as usize).map(|i| DVec3::new(angle(i).cos(), angle(i).sin(), 0.0)).collect();
-        let circle = Skeleton::new(&path);
+        let circle = RestCurve::new(&path);
         // the error of Catmull–Rom is of fourth order in the spacing, at the two ends of second order: 2 (2π/64)³/24 of the length
         assert!((circle.length_m() - std::f64::consts::TAU).abs() < 1e-4, "{}", circle.length_m());
         assert!((circle.at(circle.length_m() / 4.0).position - DVec3::Y).length() < 1e-4);
@@ -227,7 +227,7 @@ mod tests {
     #[test]
     fn arc_length_is_the_distance_gone_and_the_curve_meets_its_points() {
         let path = [DVec3::ZERO, DVec3::new(0.2, 0.05, 0.0), DVec3::new(0.3, 0.0, 0.1), DVec3::new(0.3, -0.2, 0.1)];
-        let curve = Skeleton::new(&path);
+        let curve = RestCurve::new(&path);
         let (mut gone, steps) = (0.0, 20_000);
         let at = |i: usize| curve.at(curve.length_m() * i as f64 / steps as f64);
         for i in 0..steps {

@@ -8,7 +8,7 @@ use super::contact::Solved;
 use super::energy_momentum::fill_mean;
 use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use super::step::{Lost, Stepper, TURN_MAX_RAD, Verdict};
 use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
 
@@ -26,7 +26,7 @@ impl Stepper {
     /// One trial substep of second order (eq. 43–48); `bound` limits turns, `divide` allows a smaller substep.
     pub(super) fn glide(
         &mut self,
-        now: &Config,
+        now: &RodState,
         scene: &Scene<'_>,
         (bound, divide): (bool, bool),
     ) -> Result<Verdict, Lost> {
@@ -50,7 +50,7 @@ impl Stepper {
     }
 
     /// Backward differences (eq. 43): implicit Euler of another length from another state; returns whether the iteration converged.
-    fn look_back(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+    fn look_back(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let mut start = std::mem::take(&mut self.ahead);
         let h = self.past.start(now, &mut start, scene.h);
         let scene = Scene { h, ..*scene };
@@ -78,7 +78,7 @@ impl Stepper {
     }
 
     /// The first iterate: velocities extrapolated from the past, and the positions they reach from `start`.
-    fn guess(&mut self, now: &Config, start: &Config, (h, whole): (f64, f64)) {
+    fn guess(&mut self, now: &RodState, start: &RodState, (h, whole): (f64, f64)) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -94,7 +94,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves accordingly (eq. 20).
-    fn follow(&mut self, start: &Config, h: f64) {
+    fn follow(&mut self, start: &RodState, h: f64) {
         let Self { next, rhs, .. } = self;
         next.u.iter_mut().zip(&*rhs).for_each(|(u, change)| *u += *change);
         for (k, x) in next.x.iter_mut().enumerate() {
@@ -109,9 +109,9 @@ impl Stepper {
     /// converged.
     ///
     /// Damping of the mean velocity would not act on motion that changes sign in every substep.
-    fn keep(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+    fn keep(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let slower = libm::exp(-0.5 * scene.h * scene.matter.damping);
-        let undamped = Matter { damping: 0.0, ..*scene.matter };
+        let undamped = RodMaterial { damping: 0.0, ..*scene.matter };
         let mut start = std::mem::take(&mut self.ahead);
         start.copy_from(now);
         start.u.iter_mut().for_each(|u| *u *= slower);
@@ -122,7 +122,7 @@ impl Stepper {
         ended
     }
 
-    fn keep_undamped(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+    fn keep_undamped(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let half = 0.5 * scene.h;
         let tangent = Scene { h: half, ..*scene };
         self.guess_mean(now, scene.h);
@@ -149,7 +149,7 @@ impl Stepper {
     }
 
     /// The first iterate of the energy-momentum rule.
-    fn guess_mean(&mut self, now: &Config, h: f64) {
+    fn guess_mean(&mut self, now: &RodState, h: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -165,7 +165,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves by the mean of old and new.
-    fn follow_mean(&mut self, now: &Config, half: f64) {
+    fn follow_mean(&mut self, now: &RodState, half: f64) {
         let Self { next, rhs, .. } = self;
         for k in 0..next.x.len() {
             next.u[2 * k] += rhs[2 * k];
@@ -178,7 +178,7 @@ impl Stepper {
     }
 
     /// The spins whose mean, in the segments' own axes, gives the turn made (eq. 46).
-    fn turn_mean(&mut self, now: &Config, half: f64) {
+    fn turn_mean(&mut self, now: &RodState, half: f64) {
         let Self { next, .. } = self;
         for (k, q) in next.q.iter().enumerate() {
             let turn = *q * now.q[k].conjugate();
@@ -198,7 +198,7 @@ impl Stepper {
     }
 
     /// The largest turn of a segment from `now` to the next state, radians.
-    fn farthest_turn(&self, now: &Config) -> f64 {
+    fn farthest_turn(&self, now: &RodState) -> f64 {
         let share = |(a, b): (&glam::DQuat, &glam::DQuat)| {
             let turn = *b * a.conjugate();
             turn.x * turn.x + turn.y * turn.y + turn.z * turn.z
@@ -207,7 +207,7 @@ impl Stepper {
     }
 
     /// Whether the skin comes near itself or a fixed solid on the way to the next state.
-    fn would_touch(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+    fn would_touch(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let Self { rhs, next, rows, factor, contacts, .. } = self;
         for k in 0..now.x.len() {
             rhs[2 * k] = (next.x[k] - now.x[k]) / scene.h;

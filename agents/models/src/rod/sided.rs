@@ -4,17 +4,17 @@
 //! Never here: the laws themselves ([`metachron_contact::laws`]), the other side: it does the same for itself.
 
 use super::company::Company;
-use super::discretization::Division;
+use super::discretization::Discretization;
 use crate::rod::banded_ldl::Factor;
 use glam::{DMat3, DVec3};
 use metachron_contact::laws::push_off_n;
 use metachron_contact::laws::{Drawn, End, Line};
 use metachron_contact::{Law, Link, Mate};
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, SimTime};
-use metachron_core::{PairKind, Slots};
+use metachron_core::{ContactJacobian, PairKind};
 use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{Placed, Touch, View};
+use metachron_geometry::{PlacedShape, ShapePose, Touch};
 
 /// Below this slip friction grows in proportion to it, m/s.
 const STICK_M_S: f64 = 1e-3;
@@ -33,7 +33,7 @@ pub struct Sided {
 /// The tube at the start of the step in which it acts on itself.
 pub struct Now<'a> {
     /// Its division.
-    pub division: &'a Division,
+    pub division: &'a Discretization,
     /// Node positions, metres.
     pub positions: &'a [DVec3],
     /// Velocities in slots.
@@ -49,14 +49,14 @@ pub struct Now<'a> {
 }
 
 /// Whether `neighbour` and the one who looks each act on themselves alone.
-pub fn is_sided(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub fn is_sided(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let lined = |link: &metachron_contact::Link| link.other == neighbour.id && matches!(link.law, Law::Tlm { .. });
     matches!(neighbour.law, Law::Penalty { .. } | Law::Tlm { .. }) || around.links.iter().any(lined)
 }
 
 impl Company {
     /// Adds the impulses of a step by all such laws to what the tube is given.
-    pub fn act_on_itself(&mut self, around: &Surroundings<'_>, now: &Now<'_>) {
+    pub fn act_on_itself(&mut self, around: &StepContext<'_>, now: &Now<'_>) {
         let mut sided = std::mem::take(self.sided());
         for neighbour in around.neighbours.iter().filter(|n| is_sided(n, around) && n.snapshot.is_finite()) {
             if !sided.see(neighbour, around, self) {
@@ -80,7 +80,7 @@ impl Company {
 
 impl Sided {
     /// Takes in a neighbour: as it was published for a law that does not bring it forward.
-    fn see(&mut self, neighbour: &Neighbour, around: &Surroundings<'_>, company: &Company) -> bool {
+    fn see(&mut self, neighbour: &Neighbour, around: &StepContext<'_>, company: &Company) -> bool {
         let stale = matches!(neighbour.law, Law::Penalty { extrapolate: false, .. });
         self.mate.look(neighbour, around, (company.exchange(), company.friction()), stale)
     }
@@ -93,8 +93,8 @@ impl Sided {
         let Some((form, room, mut list)) = company.search() else { return vec![] };
         list.clear();
         if let Some(there) = self.mate.other.placed() {
-            let view = View::Chain { positions: now.positions, radii_m: now.radii_m };
-            touches(&Placed { form: &form, view }, &there, 0.0, room, &mut list);
+            let view = ShapePose::Chain { positions: now.positions, radii_m: now.radii_m };
+            touches(&PlacedShape { form: &form, view }, &there, 0.0, room, &mut list);
         }
         list
     }
@@ -125,7 +125,7 @@ impl Sided {
         company: &mut Company,
         (neighbour, now): (&Neighbour, &Now<'_>),
         (stiffness, damping): (f64, f64),
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
     ) {
         let arriving = self.listen(neighbour, stiffness, (around, now.dt));
         let list = self.find(company, now);
@@ -153,7 +153,7 @@ impl Sided {
         company: &mut Company,
         (neighbour, now): (&Neighbour, &Now<'_>),
         link: &Link,
-        around: &Surroundings<'_>,
+        around: &StepContext<'_>,
     ) {
         let (Law::Tlm { stiffness_n_m, damping_n_s_m }, Anchor::Arc(arc_m)) = (link.law, link.here) else { return };
         let Some((far_m, far)) = self.mate.other.point(link.there) else { return };
@@ -163,7 +163,7 @@ impl Sided {
             self.line(neighbour.id, stiffness_n_m).begin(way, around.time);
         }
         let arriving = self.listen(neighbour, stiffness_n_m, (around, now.dt));
-        let mut slots = Slots::default();
+        let mut slots = ContactJacobian::default();
         slots.add_linear(2 * segment as u32, 1.0 - share);
         slots.add_linear(2 * segment as u32 + 2, share);
         let own = slots.velocity(now.slots) + now.gravity * now.dt;
@@ -178,7 +178,7 @@ impl Sided {
     }
 
     /// What arrives during the step.
-    fn listen(&mut self, neighbour: &Neighbour, stiffness: f64, (around, dt): (&Surroundings<'_>, f64)) -> DVec3 {
+    fn listen(&mut self, neighbour: &Neighbour, stiffness: f64, (around, dt): (&StepContext<'_>, f64)) -> DVec3 {
         let pair = neighbour.snapshot.pairs.iter().find(|pair| pair.with == around.me);
         let (at, wave): (SimTime, _) = (neighbour.snapshot.time, pair.and_then(|pair| pair.wave));
         let line = self.line(neighbour.id, stiffness);
@@ -207,7 +207,7 @@ impl Sided {
     }
 
     /// The velocity of what gathers from `slots` after a force of 1 N along `axis` for the step, m/s.
-    fn answer_of(&mut self, now: &Now<'_>, slots: &Slots, axis: DVec3) -> DVec3 {
+    fn answer_of(&mut self, now: &Now<'_>, slots: &ContactJacobian, axis: DVec3) -> DVec3 {
         self.answer.clear();
         self.answer.resize(now.slots.len(), DVec3::ZERO);
         slots.scatter(axis * now.dt, &mut self.answer);
@@ -217,8 +217,8 @@ impl Sided {
 }
 
 /// The tube's side of a place.
-fn mine(touch: &Touch) -> Slots {
-    let mut slots = Slots::default();
+fn mine(touch: &Touch) -> ContactJacobian {
+    let mut slots = ContactJacobian::default();
     touch.on_a.join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
     slots
 }

@@ -24,7 +24,7 @@ pub struct TubeSpec {
     pub mass_per_length_kg_m: f64,
     /// Initial resolution of the simulation.
     pub resolution: Resolution,
-    /// The resolutions that `retune` may take.
+    /// The resolutions that `set_resolution` may take.
     pub range: ResolutionRange,
     /// Initial number of segments where a scene fixes it; else ⌈L/ε⌉.
     pub segments: Option<usize>,

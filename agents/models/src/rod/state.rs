@@ -3,13 +3,13 @@
 //! In: positions, frames, velocities. Out: internal and gravity forces in slots, and the quantities that the matrix needs.
 //! Never here: time steps, attachments, the linear system. Theory: docs/theory/rod.md, eq. 2–10.
 
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::rotation::{bend_share, director, log};
 use glam::{DQuat, DVec3};
 
 /// The material of the tube, as its solver needs it.
 #[derive(Debug, Clone, Copy)]
-pub struct Matter {
+pub struct RodMaterial {
     /// Stretch stiffness EA, N.
     pub ea: f64,
     /// Shear stiffness GA, N.
@@ -35,9 +35,9 @@ pub struct Matter {
 /// The share of the shear stiffness that tension may take from the Hessian, which keeps its form above (GA − b)|δu + u × φ|².
 const TENSION_SHARE: f64 = 0.9;
 
-/// A state, and its elastic quantities, which [`Config::strain`] fills.
+/// A state, and its elastic quantities, which [`RodState::strain`] fills.
 #[derive(Debug, Clone, Default)]
-pub struct Config {
+pub struct RodState {
     /// Node positions, metres; N + 1.
     pub x: Vec<DVec3>,
     /// Segment frames; N.
@@ -62,9 +62,9 @@ pub struct Config {
     pub stretch: f64,
 }
 
-impl Config {
+impl RodState {
     /// The stress-free state of a division, at rest.
-    pub fn at_rest(division: &Division) -> Self {
+    pub fn at_rest(division: &Discretization) -> Self {
         let mut config = Self { x: division.place.clone(), q: division.frame.clone(), ..Self::default() };
         config.resize(division.segments());
         config
@@ -92,14 +92,14 @@ impl Config {
         (self.elastic_j, self.gravity_j, self.kinetic_j, self.stretch) = (elastic_j, gravity_j, kinetic_j, stretch);
     }
 
-    /// Whether every position, frame and velocity is finite. Needs [`Config::strain`].
+    /// Whether every position, frame and velocity is finite. Needs [`RodState::strain`].
     pub fn is_finite(&self) -> bool {
         // each energy contains every position, velocity or frame in squares or products: they are finite only if all of those are
         (self.elastic_j + self.gravity_j + self.kinetic_j).is_finite()
     }
 
     /// Computes strains, forces and energies of this state (eq. 2–10).
-    pub fn strain(&mut self, matter: &Matter, division: &Division) {
+    pub fn strain(&mut self, matter: &RodMaterial, division: &Discretization) {
         self.elastic_j = 0.0;
         self.gravity_j = 0.0;
         self.stretch = 0.0;
@@ -110,8 +110,8 @@ impl Config {
     }
 
     /// Forces of every segment: n = C u − s₀ EA t on its ends, −l n × u on its frame (eq. 7, 8), and its weight.
-    fn stretch_and_shear(&mut self, matter: &Matter, division: &Division) {
-        let Matter { ea, ga, mu, gravity, .. } = *matter;
+    fn stretch_and_shear(&mut self, matter: &RodMaterial, division: &Discretization) {
+        let RodMaterial { ea, ga, mu, gravity, .. } = *matter;
         let tension_max = TENSION_SHARE * ga.min(ea);
         let count = self.q.len();
         let (x, q, length, chord) = (&self.x[..=count], &self.q[..count], &division.length[..count], &division.chord);
@@ -138,7 +138,7 @@ impl Config {
     }
 
     /// Moments of every joint, and of the walls that hold clamped ends (eq. 5, 6, 9).
-    fn bend_and_twist(&mut self, matter: &Matter, division: &Division) {
+    fn bend_and_twist(&mut self, matter: &RodMaterial, division: &Discretization) {
         let count = self.q.len();
         if matter.clamp[0] {
             let joint = Joint::between(division, 0, division.wall[0], self.q[0]);
@@ -159,7 +159,7 @@ impl Config {
     }
 
     /// Recomputes the kinetic energy from the velocities (eq. 10). Needs directors.
-    pub fn measure_motion(&mut self, matter: &Matter, division: &Division) {
+    pub fn measure_motion(&mut self, matter: &RodMaterial, division: &Discretization) {
         let (mut linear, mut rotary, mut a) = (0.0, 0.0, self.u[0]);
         for ((pair, t), &l) in self.u[1..].chunks_exact(2).zip(&self.t).zip(&division.length) {
             let (w, b) = (pair[0], pair[1]);
@@ -172,7 +172,7 @@ impl Config {
     }
 
     /// Linear momentum, kg·m/s, and angular momentum about the origin, kg·m²/s. Needs directors.
-    pub fn momentum(&self, matter: &Matter, division: &Division) -> (DVec3, DVec3) {
+    pub fn momentum(&self, matter: &RodMaterial, division: &Discretization) -> (DVec3, DVec3) {
         let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
         for (k, &l) in division.length.iter().enumerate() {
             let (va, w, vb) = (self.u[2 * k], self.u[2 * k + 1], self.u[2 * k + 2]);
@@ -198,7 +198,7 @@ pub struct Joint {
 impl Joint {
     /// Joint `index` of the division, between these frames.
     #[inline(always)]
-    pub fn between(division: &Division, index: usize, before: DQuat, after: DQuat) -> Self {
+    pub fn between(division: &Discretization, index: usize, before: DQuat, after: DQuat) -> Self {
         let theta = log(after * before.conjugate());
         let strain = theta - before * division.bend[index];
         Self { theta, strain, inverse: division.joint[index] }
@@ -206,7 +206,7 @@ impl Joint {
 
     /// The moment that turns the segment before the joint forward and the one after it back (eq. 6, 9).
     #[inline(always)]
-    fn moment(&self, matter: &Matter, axis: DVec3, energy_j: &mut f64) -> DVec3 {
+    fn moment(&self, matter: &RodMaterial, axis: DVec3, energy_j: &mut f64) -> DVec3 {
         let Self { theta, strain, inverse } = *self;
         let m = (strain * matter.ei + axis * ((matter.gj - matter.ei) * axis.dot(strain))) * inverse;
         *energy_j += 0.5 * strain.dot(m);

@@ -8,14 +8,14 @@ use super::banded_ldl::InverseBlocks;
 use super::banded_ldl::{Factor, Row};
 use super::company::Company;
 use super::contact::{Solved, TubeContacts, respond};
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::energy_limiter;
 use super::footing::Footing;
-use super::history::Past;
+use super::history::History;
 use super::horizon::Horizon;
 use super::method::Integrator;
 use super::rotation::{exp, unit};
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use super::system::{Iterate, Scene, assemble};
 use super::xpbd::Projector;
 use glam::{DMat3, DVec3};
@@ -38,9 +38,9 @@ const STRAIN_SLACK: f64 = 1e-10;
 /// Constants of a step.
 pub struct Setting<'a> {
     /// The material.
-    pub matter: &'a Matter,
+    pub matter: &'a RodMaterial,
     /// The division.
-    pub division: &'a Division,
+    pub division: &'a Discretization,
     /// Attachments.
     pub springs: &'a [NodeSpring],
     /// The span of the step, seconds.
@@ -68,10 +68,10 @@ pub struct Stepper {
     pub(super) presses: Presses,
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
-    pub(super) next: Config,
+    pub(super) next: RodState,
     /// Changes of the previous substep, and an extrapolated start state for rules that need one.
-    pub(super) past: Past,
-    pub(super) ahead: Config,
+    pub(super) past: History,
+    pub(super) ahead: RodState,
     pub(super) projector: Projector,
     /// Contacts of the skin.
     pub contacts: TubeContacts,
@@ -103,7 +103,7 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Lost`] where the next state is not finite; `now` is then the last state that was.
-    pub fn step(&mut self, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
+    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
         let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
@@ -143,7 +143,7 @@ impl Stepper {
     /// [`Lost`] where the system cannot be factored; `now` is then untouched.
     pub fn receive(
         &mut self,
-        now: &mut Config,
+        now: &mut RodState,
         setting: &Setting<'_>,
         (ties, way_m): (&mut [Tie], f64),
     ) -> Result<(), Lost> {
@@ -164,7 +164,7 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Lost`] where it cannot be factored.
-    pub fn prepare(&mut self, now: &Config, setting: &Setting<'_>) -> Result<(), Lost> {
+    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Lost> {
         if self.factor.slots() == now.u.len() {
             return Ok(());
         }
@@ -225,7 +225,7 @@ impl Stepper {
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, in the last
     /// substep (eq. 18); `None` where the segments have changed since, or no step was taken.
-    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &Matter, slots: usize) -> Option<DMat3> {
+    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &RodMaterial, slots: usize) -> Option<DMat3> {
         if self.factor.slots() != slots {
             return None;
         }
@@ -241,7 +241,7 @@ impl Stepper {
     }
 
     /// One trial substep, from `now` into `next`; of `smaller`, the first limits turns, the second allows a smaller substep.
-    fn attempt(&mut self, now: &Config, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
+    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
         match scene.integrator {
             Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
             Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
@@ -253,7 +253,7 @@ impl Stepper {
     /// The same by implicit Euler (eq. 11–20).
     pub(super) fn attempt_euler(
         &mut self,
-        now: &Config,
+        now: &RodState,
         scene: &Scene<'_>,
         (bound, divide): (bool, bool),
     ) -> Result<Verdict, Lost> {
@@ -284,7 +284,7 @@ impl Stepper {
     }
 
     /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
-    fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
+    fn solve(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
         self.answer()?;
@@ -302,7 +302,7 @@ impl Stepper {
     }
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    pub(super) fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+    pub(super) fn touch(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
         let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
         // contact is a law of whole velocities, not of their change in an iteration
@@ -318,7 +318,7 @@ impl Stepper {
     }
 
     /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
-    pub(super) fn advance(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+    pub(super) fn advance(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
         let Self { next, rhs, .. } = self;
         let (h, count) = (scene.h, now.q.len());
         next.resize(count);
@@ -337,7 +337,7 @@ impl Stepper {
     }
 
     /// Energy of `next` beyond that of `now` and the work of pulls, contact and received impulses, less rounding, J (eq. 27).
-    pub(super) fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
+    pub(super) fn energy_rise(&self, now: &RodState, scene: &Scene<'_>) -> f64 {
         let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
         // energy that friction removes must not be added elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
@@ -361,7 +361,7 @@ impl Stepper {
     }
 
     /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
-    fn remember(&mut self, now: &Config, (integrator, untied): (Integrator, bool), h: f64) {
+    fn remember(&mut self, now: &RodState, (integrator, untied): (Integrator, bool), h: f64) {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;
         }
@@ -373,7 +373,7 @@ impl Stepper {
     }
 
     /// Makes `next` the state and books the impulses of pulls and contacts.
-    fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
+    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
         self.company.received().spend();
@@ -394,7 +394,7 @@ impl Stepper {
 }
 
 /// The sum of kinetic, elastic and gravitational energy and that of the attachments, J (eq. 10).
-pub fn energy(state: &Config, springs: &[NodeSpring]) -> f64 {
+pub fn energy(state: &RodState, springs: &[NodeSpring]) -> f64 {
     let held: f64 = springs.iter().map(|s| s.energy_j(state.x[s.node])).sum();
     state.kinetic_j + state.elastic_j + state.gravity_j + held
 }

@@ -6,9 +6,9 @@
 use super::anchor_springs::Tie;
 use super::banded_ldl::Factor;
 use super::company::Company;
-use super::history::Past;
+use super::history::History;
 use super::method::Integrator;
-use super::state::Config;
+use super::state::RodState;
 use super::step::{Setting, Stepper};
 use metachron_core::AgentId;
 use metachron_core::step_doubling::{Watch, farthest};
@@ -23,8 +23,8 @@ pub(super) struct Doubling {
 /// The tube in twice the substeps, and its working storage; only allocated for a tube that has moved.
 #[derive(Debug, Clone, Default)]
 struct Again {
-    state: Config,
-    past: Past,
+    state: RodState,
+    past: History,
     factor: Factor,
     /// Empty: impulses are received and given once only, in the real step.
     company: Company,
@@ -49,7 +49,7 @@ impl Doubling {
 
     /// Prepares for step number `steps` of the tube `me` from `now`. A step with peers or received impulses is not repeated: impulses are
     /// given once only.
-    pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&Config, &[Tie]), stepper: &Stepper) {
+    pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&RodState, &[Tie]), stepper: &Stepper) {
         let begins = self.watch.begins(steps, me);
         if !stepper.company.is_empty()
             || !stepper.company.fresh().is_empty()
@@ -72,7 +72,7 @@ impl Doubling {
     }
 
     /// Repeats the step that has ended at `now`, made in `setting`'s substeps, with twice as many.
-    pub fn end(&mut self, stepper: &mut Stepper, now: &Config, setting: &Setting<'_>) {
+    pub fn end(&mut self, stepper: &mut Stepper, now: &RodState, setting: &Setting<'_>) {
         let Some(again) = self.again.as_deref_mut() else { return };
         let touching = stepper.contacts.is_touching();
         let setting = Setting { substeps: 2 * setting.substeps, ..*setting };
@@ -87,7 +87,7 @@ impl Doubling {
 
 impl Again {
     /// Whether the number of nodes equals that of `now`.
-    fn fits(&self, now: &Config) -> bool {
+    fn fits(&self, now: &RodState) -> bool {
         self.state.x.len() == now.x.len()
     }
 

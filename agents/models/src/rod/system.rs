@@ -5,9 +5,9 @@
 
 use super::anchor_springs::{NodeSpring, Tie};
 use super::banded_ldl::Row;
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::method::Integrator;
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 
@@ -15,9 +15,9 @@ use glam::{DMat3, DVec3};
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
     /// The material.
-    pub matter: &'a Matter,
+    pub matter: &'a RodMaterial,
     /// The division.
-    pub division: &'a Division,
+    pub division: &'a Discretization,
     /// Attachments.
     pub springs: &'a [NodeSpring],
     /// Pulls.
@@ -34,9 +34,9 @@ pub struct Scene<'a> {
 #[derive(Clone, Copy)]
 pub struct Iterate<'a> {
     /// The state at the start of the substep.
-    pub start: &'a Config,
+    pub start: &'a RodState,
     /// The state linearised about: the start itself in the first iteration.
-    pub at: &'a Config,
+    pub at: &'a RodState,
     /// Whether `at` is the start: velocities since the start then count as zero.
     pub first: bool,
 }
@@ -57,7 +57,7 @@ pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, r
 }
 
 /// Fills `rows` with stiffness and mass about `at`, and sizes `rhs` (eq. 12–15).
-pub fn fill_matrix(scene: &Scene<'_>, at: &Config, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+pub fn fill_matrix(scene: &Scene<'_>, at: &RodState, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
     rows.resize(at.u.len(), Row::ZERO);
     rhs.resize(at.u.len(), DVec3::ZERO);
     fill_segments(scene, at, rows);
@@ -65,8 +65,8 @@ pub fn fill_matrix(scene: &Scene<'_>, at: &Config, rows: &mut Vec<Row>, rhs: &mu
 }
 
 /// Mass, stretch and shear: D = (GA − b) I + (EA − GA) t tᵀ is the clamped stiffness (eq. 12, 13).
-fn fill_segments(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
-    let Matter { ea, ga, mu, rotary, damping, .. } = *scene.matter;
+fn fill_segments(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
+    let RodMaterial { ea, ga, mu, rotary, damping, .. } = *scene.matter;
     let (h2, slow) = (scene.h * scene.h, 1.0 + scene.h * damping);
     let (sixth, turn) = (slow * mu / 6.0, slow * rotary);
     let count = at.q.len();
@@ -96,7 +96,7 @@ fn fill_segments(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
 }
 
 /// Bend and twist about the joint's mean director, without their geometric terms (eq. 14).
-fn fill_joints(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
+fn fill_joints(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
     let Scene { matter, division, .. } = *scene;
     let (h2, count) = (scene.h * scene.h, at.q.len());
     let stiffness = |k: usize, axis: DVec3| {
@@ -121,7 +121,7 @@ fn fill_joints(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
 
 /// r = M (v_n − v_i) − h c M v_i + h f (eq. 11), the spin of v_n turned by its own gyroscopic torque (eq. 19).
 fn fill_right_side(scene: &Scene<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) {
-    let Matter { mu, rotary, damping, .. } = *scene.matter;
+    let RodMaterial { mu, rotary, damping, .. } = *scene.matter;
     let (h, slow) = (scene.h, 1.0 + scene.h * damping);
     let (start, force) = (iterate.start, &iterate.at.force);
     let count = start.q.len();
@@ -179,7 +179,7 @@ pub fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs:
 }
 
 /// Removes the positions of held ends from the system: their velocity is zero under any load.
-pub fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn hold_ends(matter: &RodMaterial, rows: &mut [Row], rhs: &mut [DVec3]) {
     let last = rows.len() - 1;
     if matter.held[0] {
         rows[0].diag = Sym3::identity(1.0);

@@ -9,13 +9,13 @@ use super::check::{TubeError, check};
 use super::company::Company;
 use super::contact::TubeContacts;
 use super::discretization;
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::horizon::owns_it;
 use super::publish::bounds;
 use super::remesh::Remesher;
 use super::rest::RestWatch;
-use super::rest_curve::Skeleton;
-use super::state::{Config, Matter};
+use super::rest_curve::RestCurve;
+use super::state::{RodMaterial, RodState};
 use super::step::{Lost, Setting, Stepper, energy};
 use super::step_doubling::Doubling;
 use super::{Section, TubeSpec};
@@ -25,9 +25,9 @@ use metachron_contact::beside::has_a_say;
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
 use metachron_contact::smooth;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
-use metachron_geometry::{Form, FormKind, height_j_kg};
+use metachron_geometry::{CollisionShape, ShapeKind, height_j_kg};
 use std::sync::Arc;
 
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
@@ -37,10 +37,10 @@ pub const STRETCH_WARN: f64 = 1.4;
 #[derive(Debug, Clone)]
 pub struct Tube {
     pub(super) spec: TubeSpec,
-    skeleton: Skeleton,
-    pub(super) matter: Matter,
-    pub(super) division: Division,
-    pub(super) now: Config,
+    skeleton: RestCurve,
+    pub(super) matter: RodMaterial,
+    pub(super) division: Discretization,
+    pub(super) now: RodState,
     pub(super) stepper: Stepper,
     remesher: Remesher,
     springs: Vec<NodeSpring>,
@@ -82,15 +82,15 @@ impl Tube {
     /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
     pub fn new(spec: TubeSpec) -> Result<Self, TubeError> {
         check(&spec)?;
-        let skeleton = Skeleton::new(&spec.path_m).strained(spec.straight, spec.twist_rad);
+        let skeleton = RestCurve::new(&spec.path_m).strained(spec.straight, spec.twist_rad);
         let resolution = spec.range.clamp(spec.resolution);
         let count = match spec.segments {
             Some(count) => discretization::limit(&skeleton, count),
             None => discretization::segments_for(&skeleton, resolution.eps_m),
         };
-        let division = Division::first(&skeleton, count);
+        let division = Discretization::first(&skeleton, count);
         let matter = matter_of(&spec);
-        let mut now = Config::at_rest(&division);
+        let mut now = RodState::at_rest(&division);
         now.strain(&matter, &division);
         let mut tube = Self {
             resolution: held(resolution, &skeleton, count),
@@ -120,8 +120,8 @@ impl Tube {
         };
         let held_ends = tube.matter.held.map(u8::from).iter().sum();
         let height_j_kg = height_j_kg(&tube.now.x, tube.spec.gravity, held_ends > 0);
-        let kind = FormKind::Chain { held_ends, height_j_kg };
-        let form = Form { kind, friction: tube.spec.friction, restitution: 0.0 };
+        let kind = ShapeKind::Chain { held_ends, height_j_kg };
+        let form = CollisionShape { kind, friction: tube.spec.friction, restitution: 0.0 };
         tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
         tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
@@ -139,7 +139,7 @@ impl Tube {
     pub(super) fn step_by<T>(
         &mut self,
         dt: f64,
-        act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T,
+        act: impl FnOnce(&mut Stepper, &mut RodState, &Setting<'_>, &mut [Tie]) -> T,
     ) -> T {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
         let substeps = self.spec.substeps.max(stepper.company.parts(dt));
@@ -183,7 +183,7 @@ impl Tube {
     pub fn warnings(&self) -> Vec<String> {
         let mut list = vec![];
         if self.now.stretch > STRETCH_WARN {
-            let Matter { ea, ga, .. } = self.matter;
+            let RodMaterial { ea, ga, .. } = self.matter;
             let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
             list.push(format!(
                 "the tube is stretched {:.2} times (warned of above {STRETCH_WARN}): past {limit:.2} its sections tilt and the answer is no longer that of a tube; use a stiffer or lighter one",
@@ -264,7 +264,7 @@ impl Tube {
     }
 
     /// Computes the accelerations to publish after a step of `dt` seconds.
-    fn end_watch(&mut self, before: Option<DVec3>, around: &Surroundings<'_>, dt: f64) {
+    fn end_watch(&mut self, before: Option<DVec3>, around: &StepContext<'_>, dt: f64) {
         let Some(before) = before else { return };
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
@@ -304,20 +304,20 @@ impl Tube {
 /// Access for tests.
 #[cfg(test)]
 impl Tube {
-    pub(super) fn matter(&self) -> &Matter {
+    pub(super) fn matter(&self) -> &RodMaterial {
         &self.matter
     }
 
-    pub(super) fn division(&self) -> &Division {
+    pub(super) fn division(&self) -> &Discretization {
         &self.division
     }
 
-    pub(super) fn state(&self) -> &Config {
+    pub(super) fn state(&self) -> &RodState {
         &self.now
     }
 
     /// Replaces the state, for violent starts; its strains are recomputed.
-    pub(super) fn set_state(&mut self, mut state: Config) {
+    pub(super) fn set_state(&mut self, mut state: RodState) {
         state.strain(&self.matter, &self.division);
         self.now = state;
     }
@@ -336,7 +336,7 @@ impl Agent for Tube {
     /// doubling the error in time, estimated now and then
     /// grips    the mean force of each pull
     /// rest     whether it may sleep
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         self.check_substep(dt_s)?;
         self.meet(around, dt)?;
@@ -363,18 +363,18 @@ impl Agent for Tube {
         Ok(StepReport { work, substeps, at_rest: self.at_rest })
     }
 
-    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         self.foresee(around, dt.as_secs_f64());
     }
 
-    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
         let bounds = || bounds(&self.now, self.widest_m());
         let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
         let Some(form) = self.stepper.company.form() else { return dt };
         crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately, form))
     }
 
-    fn rename_time(&mut self, by_s: f64) {
+    fn shift_clock(&mut self, by_s: f64) {
         self.wave_from_s += by_s;
     }
 
@@ -382,7 +382,7 @@ impl Agent for Tube {
         Some(self.resolution)
     }
 
-    fn retune(&mut self, wanted: Resolution) {
+    fn set_resolution(&mut self, wanted: Resolution) {
         let wanted = self.spec.range.clamp(wanted);
         let (fine, coarse) = self.spec.range.eps_m;
         self.resolution.n = wanted.n;
@@ -397,7 +397,7 @@ impl Agent for Tube {
         let old = self.division.clone();
         let arcs = self.remesher.arcs(&self.now, &old, count);
         self.division.rebuild(&self.skeleton, arcs);
-        let mut next = Config::default();
+        let mut next = RodState::default();
         self.remesher.carry(&self.matter, (&self.now, &old), (&mut next, &self.division));
         next.strain(&self.matter, &self.division);
         self.now = next;
@@ -415,7 +415,7 @@ impl Agent for Tube {
         self.publish(into);
     }
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         self.stepper.company.form().cloned()
     }
 
@@ -428,9 +428,9 @@ impl Agent for Tube {
     }
 }
 
-fn matter_of(spec: &TubeSpec) -> Matter {
+fn matter_of(spec: &TubeSpec) -> RodMaterial {
     let s = &spec.section;
-    Matter {
+    RodMaterial {
         ea: s.ea_n,
         ga: s.ga_n,
         ei: s.ei_n_m2,
@@ -445,7 +445,7 @@ fn matter_of(spec: &TubeSpec) -> Matter {
 }
 
 /// The resolution of `count` segments: the request where it gave that count, else the mean spacing.
-fn held(wanted: Resolution, skeleton: &Skeleton, count: usize) -> Resolution {
+fn held(wanted: Resolution, skeleton: &RestCurve, count: usize) -> Resolution {
     let kept = discretization::segments_for(skeleton, wanted.eps_m) == count;
     let exact = libm::ceil(skeleton.length_m() / wanted.eps_m - 1e-9) == count as f64;
     if kept && exact { wanted } else { Resolution { eps_m: skeleton.length_m() / count as f64, n: wanted.n } }

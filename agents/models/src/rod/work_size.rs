@@ -3,8 +3,8 @@
 //! Out: numbers for benchmarks. Never here: time.
 
 use super::Tube;
-use super::discretization::Division;
-use super::state::Config;
+use super::discretization::Discretization;
+use super::state::RodState;
 
 impl Tube {
     /// Bytes that a step reads and writes, contacts excluded: the state and the next one, the division, the linear
@@ -23,14 +23,14 @@ impl Tube {
     }
 }
 
-fn of_state(state: &Config) -> usize {
-    let Config { x, q, u, t, e, b, force, .. } = state;
+fn of_state(state: &RodState) -> usize {
+    let RodState { x, q, u, t, e, b, force, .. } = state;
     let vectors = [x, u, t, e, force].into_iter().map(|list| size_of_val(&list[..]));
     vectors.sum::<usize>() + size_of_val(&q[..]) + size_of_val(&b[..])
 }
 
 /// The part that a step reads.
-fn of_division(division: &Division) -> usize {
-    let Division { length, chord, joint, bend, .. } = division;
+fn of_division(division: &Discretization) -> usize {
+    let Discretization { length, chord, joint, bend, .. } = division;
     [length, chord, joint].into_iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&bend[..])
 }

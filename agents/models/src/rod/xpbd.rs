@@ -3,9 +3,9 @@
 //! In: a state and the velocities without elasticity. Out: the velocities that lead to the projected nodes and
 //! frames. Never here: gravity, external springs, contact. Theory: docs/theory/rod.md, eq. 41, 42.
 
-use super::discretization::Division;
+use super::discretization::Discretization;
 use super::rotation::{bend_share, exp, log, unit};
-use super::state::{Config, Matter};
+use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
 use glam::{DQuat, DVec3};
 
@@ -24,15 +24,15 @@ pub struct Projector {
 
 /// Constants of a projection.
 struct Law<'a> {
-    matter: &'a Matter,
-    division: &'a Division,
+    matter: &'a RodMaterial,
+    division: &'a Discretization,
     /// 1/h².
     rate2: f64,
 }
 
 impl Projector {
     /// Projects the state that `velocities` reach from `now` in `h` seconds, and corrects them to reach the projected one.
-    pub fn project(&mut self, now: &Config, velocities: &mut [DVec3], of: (&Matter, &Division), h: f64) {
+    pub fn project(&mut self, now: &RodState, velocities: &mut [DVec3], of: (&RodMaterial, &Discretization), h: f64) {
         let law = Law { matter: of.0, division: of.1, rate2: 1.0 / (h * h) };
         let count = now.q.len();
         self.predict(now, velocities, h);
@@ -57,7 +57,7 @@ impl Projector {
         self.gain.get(slot).copied().unwrap_or(DVec3::ZERO)
     }
 
-    fn predict(&mut self, now: &Config, velocities: &[DVec3], h: f64) {
+    fn predict(&mut self, now: &RodState, velocities: &[DVec3], h: f64) {
         let count = now.q.len();
         self.x.clear();
         self.x.extend(now.x.iter().zip(velocities.iter().step_by(2)).map(|(x, v)| *x + *v * h));
@@ -79,7 +79,7 @@ impl Projector {
 
     /// C = Rᵀ u − s₀ ẑ with compliance K⁻¹/l (eq. 41).
     fn segment(&mut self, k: usize, law: &Law<'_>) {
-        let Matter { ea, ga, rotary, .. } = *law.matter;
+        let RodMaterial { ea, ga, rotary, .. } = *law.matter;
         let (l, q) = (law.division.length[k], self.q[k]);
         let u = q.conjugate() * ((self.x[k + 1] - self.x[k]) / l);
         let (wa, wb) = (law.lightness(k), law.lightness(k + 1));
@@ -102,12 +102,12 @@ impl Projector {
 
     /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall clamps it (eq. 42).
     fn joint(&mut self, k: usize, law: &Law<'_>) {
-        let Matter { ei, gj, rotary, clamp, .. } = *law.matter;
+        let RodMaterial { ei, gj, rotary, clamp, .. } = *law.matter;
         let count = self.q.len();
         if (k == 0 && !clamp[0]) || (k == count && !clamp[1]) {
             return;
         }
-        let Division { wall, joint, bend, length, .. } = law.division;
+        let Discretization { wall, joint, bend, length, .. } = law.division;
         let before = if k == 0 { wall[0] } else { self.q[k - 1] };
         let after = if k == count { wall[1] } else { self.q[k] };
         let theta = log(before.conjugate() * after);

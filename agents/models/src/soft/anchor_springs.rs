@@ -5,7 +5,7 @@
 
 use super::system::System;
 use glam::{DMat3, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_contact::{Far, Link, Pulled};
 use metachron_core::{AgentId, Anchor};
 
@@ -42,7 +42,7 @@ pub(super) struct Tie {
 
 impl Tie {
     /// The tie of a pull; `None` where it has no such vertex or is not finite.
-    pub fn of_pull(pull: &Pull, count: usize) -> Option<Self> {
+    pub fn of_pull(pull: &AnchorSpring, count: usize) -> Option<Self> {
         let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
         let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), count)?;
         let (target, target_velocity) = (pull.target, pull.target_velocity);

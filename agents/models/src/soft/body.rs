@@ -6,7 +6,7 @@
 use super::anchor_springs::Tie;
 use super::company::Company;
 use super::contact::Contacts;
-use super::fe_mesh::Lattice;
+use super::fe_mesh::FeMesh;
 use super::footing::Footing;
 use super::foretold::Foretold;
 use super::spec::{SoftError, SoftSpec};
@@ -18,16 +18,16 @@ use metachron_contact::beside;
 use metachron_contact::beside::has_a_say;
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_contact::{Knock, Law, Link};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{Form, FormKind, Placed, View, height_j_kg};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, height_j_kg};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
 pub struct SoftBody {
     pub(super) spec: SoftSpec,
-    pub(super) lattice: Lattice,
+    pub(super) lattice: FeMesh,
     pub(super) system: System,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
@@ -70,7 +70,7 @@ impl SoftBody {
     /// [`SoftError`] for a number outside its range, a side it does not have, an invalid obstacle shape.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let lattice = Lattice::new(&spec);
+        let lattice = FeMesh::new(&spec);
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> =
@@ -79,7 +79,7 @@ impl SoftBody {
         let height_j_kg = height_j_kg(&positions, spec.gravity, held);
         let surface = lattice.surface(height_j_kg);
         let edge_m = surface.edge_m;
-        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
+        let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
         Ok(Self {
             system: lattice.system(),
@@ -132,14 +132,14 @@ impl SoftBody {
         let (low, high) = metachron_geometry::bounds(&self.positions);
         let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let radius_m = match &self.contacts.form.kind {
-            FormKind::Surface(surface) => surface.radius_m,
+            ShapeKind::Surface(surface) => surface.radius_m,
             _ => 0.0,
         };
         Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
     }
 
     /// Lists this step's springs: user springs, tools that grasp it, and links whose pair it owns.
-    pub(super) fn take_ties(&mut self, around: &Surroundings<'_>) {
+    pub(super) fn take_ties(&mut self, around: &StepContext<'_>) {
         let count = self.positions.len();
         self.ties.clear();
         self.ties.extend(around.pulls().filter_map(|pull| Tie::of_pull(&pull, count)));
@@ -167,14 +167,14 @@ impl SoftBody {
     }
 
     /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+    fn wake_others(&mut self, around: &StepContext<'_>, dt_s: f64) {
         let bounds = self.bounds();
-        let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
+        let placed = PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) };
         self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
     /// Ends a step of `dt` seconds: books impulses, grips and the published prediction; returns the additional substeps that this took.
-    fn settle(&mut self, around: &Surroundings<'_>, dt: f64) -> u32 {
+    fn settle(&mut self, around: &StepContext<'_>, dt: f64) -> u32 {
         let mass_kg = self.mass_kg();
         let Self { company, system, .. } = self;
         company.mates_mut().weigh(system.vertices(), |impulses| system.respond(impulses));
@@ -197,14 +197,14 @@ impl Agent for SoftBody {
     }
 
     /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         let (substeps, doubled) = self.advance(around, dt_s)?;
         let told = self.settle(around, dt_s);
         Ok(StepReport { work: self.work() * f64::from(substeps + doubled + told), substeps, at_rest: self.at_rest })
     }
 
-    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
         let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately, &self.contacts.form));
         beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
@@ -215,9 +215,9 @@ impl Agent for SoftBody {
     }
 
     /// The division of a soft body is fixed by its scene: nothing changes.
-    fn retune(&mut self, _wanted: Resolution) {}
+    fn set_resolution(&mut self, _wanted: Resolution) {}
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.contacts.form.clone())
     }
 
@@ -244,7 +244,7 @@ impl SoftBody {
     fn unhurried_m(&self, neighbour: &Neighbour) -> Option<f64> {
         let edge_m = self.contacts.edge_m();
         match neighbour.form.as_deref().map(|form| &form.kind) {
-            Some(FormKind::Surface(there)) => Some(HASTE_MAX * edge_m.min(there.edge_m)),
+            Some(ShapeKind::Surface(there)) => Some(HASTE_MAX * edge_m.min(there.edge_m)),
             _ => Some(edge_m).filter(|_| neighbour.owned),
         }
     }

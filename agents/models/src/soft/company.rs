@@ -7,7 +7,7 @@
 use super::anchor_springs::Tie;
 use super::system::System;
 use glam::DVec3;
-use metachron_contact::Surroundings;
+use metachron_contact::StepContext;
 use metachron_contact::beside::{bends, may_touch};
 use metachron_contact::{Contact, Mate, Mates};
 use metachron_core::{Bounds, DT_MAX_S, SimSpan};
@@ -34,7 +34,7 @@ pub(super) struct Company {
 
 impl Company {
     /// Begins a step of `dt` seconds: takes in what others gave since the last one.
-    pub fn open(&mut self, around: &Surroundings<'_>, vertices: usize, dt: f64) {
+    pub fn open(&mut self, around: &StepContext<'_>, vertices: usize, dt: f64) {
         // only what bends may own a pair with this one
         self.watched = around.neighbours.iter().any(|n| !n.owned && bends(n));
         self.was_given = false;
@@ -70,7 +70,7 @@ impl Company {
     }
 
     /// Gathers those whose couplings with this body it owns, for a step of `dt` seconds from `bounds`.
-    pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, (dt, friction): (f64, f64)) {
+    pub fn gather(&mut self, around: &StepContext<'_>, bounds: &Bounds, (dt, friction): (f64, f64)) {
         // who has been given something since is no longer on the way that it published
         let turned = |pair: &PairState| pair.in_flight_n_s > 0.0;
         self.mates.gather(around, friction, |neighbour, pair| {
@@ -163,7 +163,7 @@ impl Company {
     }
 
     /// Ends a step of `dt` seconds of a body of `mass_kg`.
-    pub fn close(&mut self, around: &Surroundings<'_>, (dt, mass_kg): (f64, f64)) {
+    pub fn close(&mut self, around: &StepContext<'_>, (dt, mass_kg): (f64, f64)) {
         self.mates.tell(mass_kg);
         self.mates.keep(around, dt);
         self.mates.close(around, dt);

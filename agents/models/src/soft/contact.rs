@@ -9,9 +9,9 @@ use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Contact, Owner, Problem, Search, Settings, Solver};
-use metachron_core::Slots;
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
-use metachron_geometry::{Form, FormKind, Placed, SolidForm, Touch, View};
+use metachron_core::ContactJacobian;
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
 use std::sync::Arc;
 
 /// Solver settings: 10 µm/s, a tenth of the limit for rest.
@@ -30,20 +30,20 @@ const WALLS_END: u64 = 1 << 63;
 /// The contacts of one soft body.
 pub(super) struct Contacts {
     /// The body's own form.
-    pub form: Arc<Form>,
+    pub form: Arc<CollisionShape>,
     walls: Vec<Wall>,
     list: Vec<Contact>,
     solver: Solver,
     touches: Vec<Touch>,
     /// Scale of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
-    room: TouchRoom,
+    room: NarrowPhaseScratch,
     slack_m: f64,
 }
 
 /// A static solid at its place.
 struct Wall {
-    form: Form,
+    form: CollisionShape,
     position: DVec3,
     rotation: DQuat,
     /// The vertices of the body that pass through it.
@@ -55,11 +55,11 @@ impl Contacts {
     ///
     /// # Errors
     /// [`SoftError::Obstacle`] for an invalid static solid.
-    pub fn new(spec: &SoftSpec, form: Arc<Form>, edge_m: f64) -> Result<Self, SoftError> {
+    pub fn new(spec: &SoftSpec, form: Arc<CollisionShape>, edge_m: f64) -> Result<Self, SoftError> {
         let wall = |obstacle: &metachron_geometry::Obstacle| {
-            let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
+            let solid = SolidShape::new(obstacle.solid.clone(), DVec3::ZERO)
                 .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
-            let form = Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
+            let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
             let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
             Ok(Wall { form, position, rotation, bores: Bores::default() })
         };
@@ -71,7 +71,7 @@ impl Contacts {
             solver: Solver::forming(),
             touches: vec![],
             mobilities: vec![],
-            room: TouchRoom::default(),
+            room: NarrowPhaseScratch::default(),
             slack_m: SLACK_SHARE * edge_m,
         })
     }
@@ -112,16 +112,16 @@ impl Contacts {
         let deep_m = DEEP_SHARE * self.edge_m();
         let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
         let (mut stands, held) = (false, mobilities.contains(&0.0));
-        let here = Placed { form, view: View::Surface(positions) };
+        let here = PlacedShape { form, view: ShapePose::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         for (wall, number) in walls.iter_mut().zip(0_u64..) {
-            let view = View::Solid { position: wall.position, rotation: wall.rotation };
-            touches(&here, &Placed { form: &wall.form, view }, *slack_m + speed * h, room, places);
+            let view = ShapePose::Solid { position: wall.position, rotation: wall.rotation };
+            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, room, places);
             wall.bores.follow(places, held, deep_m);
             let friction = (form.friction * wall.form.friction).sqrt();
             for place in places.iter().filter(|place| !wall.bores.pass(place)) {
-                let mut slots = Slots::default();
+                let mut slots = ContactJacobian::default();
                 place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
                 let closing = slots.velocity(velocities).dot(place.normal);
                 if place.gap_m + closing * h > *slack_m {
@@ -157,7 +157,7 @@ impl Contacts {
     }
 
     /// Feet on static solids in the last substep: the velocities that each place joins, and its normal.
-    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
+    pub fn footholds(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }

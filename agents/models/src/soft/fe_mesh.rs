@@ -1,6 +1,6 @@
 //! Division of a soft body: vertices at rest, their masses, the elements between them, its skin.
 //!
-//! In: a shape and its material. Out: a [`Lattice`], fixed for the body's life. Never here: where the vertices are now.
+//! In: a shape and its material. Out: a [`FeMesh`], fixed for the body's life. Never here: where the vertices are now.
 
 use super::bar::Strut;
 use super::bending::Fold;
@@ -10,12 +10,12 @@ use super::membrane::Membrane;
 use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::system::System;
 use glam::{DQuat, DVec2, DVec3};
-use metachron_geometry::SurfaceForm;
-use metachron_geometry::narrow_phase::Fans;
+use metachron_geometry::SurfaceShape;
+use metachron_geometry::narrow_phase::VoronoiRegions;
 
 /// A divided soft body.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Lattice {
+pub(super) struct FeMesh {
     /// Positions of the vertices at rest, in the body's own axes, metres.
     pub rest: Vec<DVec3>,
     /// Mass of each vertex, kg.
@@ -34,7 +34,7 @@ pub(super) struct Lattice {
     radius_m: f64,
 }
 
-impl Lattice {
+impl FeMesh {
     /// Divides the body of `spec`.
     pub fn new(spec: &SoftSpec) -> Self {
         let grid = Grid::of(&spec.shape);
@@ -256,13 +256,13 @@ impl Lattice {
         self.edges.iter().map(share).fold(0.0, f64::max)
     }
 
-    /// The skin, as peers touch it, of a body that starts at `height_j_kg` (see [`SurfaceForm`]).
-    pub fn surface(&self, height_j_kg: f32) -> SurfaceForm {
+    /// The skin, as peers touch it, of a body that starts at `height_j_kg` (see [`SurfaceShape`]).
+    pub fn surface(&self, height_j_kg: f32) -> SurfaceShape {
         let mut on = vec![false; self.rest.len()];
         self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
         let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
         let edge_m = lengths.sum::<f64>() / self.edges.len() as f64;
-        SurfaceForm {
+        SurfaceShape {
             edge_m,
             vertices: (0..on.len() as u32).filter(|vertex| on[*vertex as usize]).collect(),
             edges: self.edges.clone().into(),
@@ -271,7 +271,7 @@ impl Lattice {
             height_j_kg,
             closed: !self.bricks.is_empty(),
             held: self.held.contains(&true),
-            fans: Fans::of(&self.edges, &self.triangles).into(),
+            fans: VoronoiRegions::of(&self.edges, &self.triangles).into(),
         }
     }
 

@@ -5,7 +5,7 @@
 
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::skyline_cholesky::Envelope;
+use metachron_core::skyline_cholesky::SkylineCholesky;
 
 /// Data common to all cells of one rest shape.
 #[derive(Debug, Clone)]
@@ -103,7 +103,7 @@ impl BrickKind {
 
 /// The stiffness with the incompatible modes condensed out (eq. 11).
 fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
-    let mut inner = Envelope::<3>::default();
+    let mut inner = SkylineCholesky::<3>::default();
     inner.shape(&[0, 0, 0]);
     for a in 0..3 {
         for b in 0..=a {

@@ -4,7 +4,7 @@
 
 use super::body::SoftBody;
 use glam::{DMat3, DVec3};
-use metachron_contact::Surroundings;
+use metachron_contact::StepContext;
 use metachron_core::StepError;
 use metachron_core::foot::press;
 
@@ -20,7 +20,7 @@ impl SoftBody {
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state stops being finite.
-    pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(u32, u32), StepError> {
+    pub(super) fn advance(&mut self, around: &StepContext<'_>, dt: f64) -> Result<(u32, u32), StepError> {
         self.receive(around, dt)?;
         let doubled = self.rehearse(around.me, dt);
         let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
@@ -92,7 +92,7 @@ impl SoftBody {
     }
 
     /// Applies the impulses of peers since the last step, and collects the neighbours.
-    fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
+    fn receive(&mut self, around: &StepContext<'_>, dt: f64) -> Result<(), StepError> {
         let Self { system, positions, velocities, given, company, foretold, footing, .. } = self;
         given.clear();
         company.open(around, positions.len(), dt);

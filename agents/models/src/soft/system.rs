@@ -3,7 +3,7 @@
 //! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
-use metachron_core::skyline_cholesky::Envelope;
+use metachron_core::skyline_cholesky::SkylineCholesky;
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
 #[derive(Debug, Clone, Default)]
@@ -20,7 +20,7 @@ pub(super) struct System {
 /// The matrix of the moving vertices, and then its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Factor {
-    matrix: Envelope<3>,
+    matrix: SkylineCholesky<3>,
     /// The row of each vertex; none for held ones. Rows rise with the vertices.
     rows: Vec<Option<u32>>,
 }
@@ -32,7 +32,7 @@ impl System {
         let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
         let first: Vec<u32> =
             rows.iter().zip(first).filter_map(|(row, first)| row.and(rows[*first as usize])).collect();
-        let mut matrix = Envelope::default();
+        let mut matrix = SkylineCholesky::default();
         matrix.shape(&first);
         Self { matrix: Factor { matrix, rows }, first, forces: vec![DVec3::ZERO; held.len()], square: 0.0 }
     }
@@ -103,7 +103,7 @@ impl System {
 
     /// Cost of a factorisation, multiplications.
     pub fn work(&self) -> usize {
-        Envelope::<3>::work(&self.first)
+        SkylineCholesky::<3>::work(&self.first)
     }
 }
 

@@ -16,7 +16,7 @@ mod thin;
 
 use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
 
 const MATTER: SoftMatter = SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0 };
@@ -58,7 +58,7 @@ fn dt(seconds: f64) -> SimSpan {
 /// Steps a body alone for so many steps.
 fn run(body: &mut SoftBody, dt_s: f64, steps: u32) {
     for _ in 0..steps {
-        body.step(dt(dt_s), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+        body.step(dt(dt_s), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
     }
 }
 

@@ -13,14 +13,14 @@ use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Knock, beside};
 use metachron_core::{
     AgentId, Anchor, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState,
     check_span,
 };
 use metachron_geometry::ToolShape;
-use metachron_geometry::{Form, FormKind, Placed, View};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose};
 use std::fmt;
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub struct Instrument {
     jaws: Jaws,
     felt: Felt,
     knock: Knock,
-    form: Arc<Form>,
+    form: Arc<CollisionShape>,
     /// Speed of its fastest point in the last step, m/s.
     speed_m_s: f64,
     at_rest: bool,
@@ -84,7 +84,7 @@ impl Instrument {
         let spin = DVec3::ZERO;
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
-        let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
+        let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
         let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
         Ok(Self {
@@ -105,13 +105,13 @@ impl Instrument {
     }
 
     /// Target of the user spring for the tip, and its velocity.
-    fn hand_target(&self, hand: &Pull) -> (DVec3, DVec3) {
+    fn hand_target(&self, hand: &AnchorSpring) -> (DVec3, DVec3) {
         let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
         (hand.target - self.tool.rotation * local, hand.target_velocity)
     }
 
     /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
-    fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
+    fn follow_hand(&self, hand: &AnchorSpring, dt: f64, around: &StepContext<'_>) -> ToolState {
         let (target, target_velocity) = self.hand_target(hand);
         let now = (self.led.0 - target, self.led.1 - target_velocity);
         let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
@@ -146,13 +146,13 @@ impl Instrument {
     }
 
     /// Whether the tool grasps a neighbour or is linked to it: such neighbours see it as driven, and it takes their impulses so.
-    fn is_held_by(&self, other: &Neighbour, around: &Surroundings<'_>) -> bool {
+    fn is_held_by(&self, other: &Neighbour, around: &StepContext<'_>) -> bool {
         let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
         held || around.links.iter().any(|link| link.other == other.id)
     }
 
     /// Moves the tip by the drive, against the impulses it received in contact.
-    fn drive_on(&mut self, led: ToolState, around: &Surroundings<'_>, dt_s: f64) -> ToolState {
+    fn drive_on(&mut self, led: ToolState, around: &StepContext<'_>, dt_s: f64) -> ToolState {
         let mut felt = std::mem::take(&mut self.felt);
         let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
         self.felt = felt;
@@ -162,17 +162,17 @@ impl Instrument {
     }
 
     /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
-    fn let_in(&self, around: &Surroundings<'_>, dt_s: f64) -> Option<AgentId> {
+    fn let_in(&self, around: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let open = self.tool.jaw > GRASP_BELOW;
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
         if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+    fn wake_others(&mut self, around: &StepContext<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
-        let placed = Placed { form: &self.form, view: View::Tool { tip, rotation, jaw } };
+        let placed = PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } };
         self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
@@ -243,7 +243,7 @@ impl Agent for Instrument {
     /// Moves the tip by `dt`, moves the jaws, reads the forces felt.
     ///
     /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         let (start_s, end_s) = (around.time.as_secs_f64(), (around.time + dt).as_secs_f64());
         let end = self.script.at(end_s);
@@ -276,7 +276,7 @@ impl Agent for Instrument {
 
     /// Shortens the step near agents that it may push: neither the tool nor such an agent can predict the joint effect of drive and body,
     /// and an impulse received once in several steps of a peer would go on through all of the tool's steps.
-    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
         let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
         let bounds = || bounds(&self.tool, self.speed_m_s);
         let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
@@ -286,7 +286,7 @@ impl Agent for Instrument {
         beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
     }
 
-    fn rename_time(&mut self, by_s: f64) {
+    fn shift_clock(&mut self, by_s: f64) {
         self.script.begin_later(by_s);
     }
 
@@ -295,12 +295,12 @@ impl Agent for Instrument {
     }
 
     /// Publishes the length of a step before the first one: peers predict the drive over that span.
-    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         self.drive.look(self.longest_step(dt, around).as_secs_f64());
     }
 
     /// A tool has no nodes to redistribute: nothing changes.
-    fn retune(&mut self, _wanted: Resolution) {}
+    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
@@ -319,7 +319,7 @@ impl Agent for Instrument {
         self.felt.write(into);
     }
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
     }
 

@@ -7,7 +7,7 @@
 
 use glam::{DMat3, DVec3};
 use metachron_core::Inertia;
-use metachron_core::{Six, Sprung};
+use metachron_core::{Mat6, Sprung};
 
 /// A point and its velocity, metres and m/s.
 pub(super) type Led = (DVec3, DVec3);
@@ -143,7 +143,7 @@ impl Drive {
     pub(super) fn sprung(&self, velocity: DVec3) -> Sprung {
         let [k, c] = self.spring();
         let all_ways = |x: f64| {
-            let mut six = Six::ZERO;
+            let mut six = Mat6::ZERO;
             six.add_point(DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(x)));
             six
         };

@@ -8,7 +8,7 @@
 use super::drive::Given;
 use glam::DVec3;
 use metachron_contact::Exchange;
-use metachron_contact::{Neighbour, Surroundings};
+use metachron_contact::{Neighbour, StepContext};
 use metachron_core::Impulse;
 use metachron_core::{AgentId, SimTime, Snapshot};
 
@@ -44,14 +44,14 @@ struct From {
 impl Felt {
     /// Reads the impulses given since the last reading, by the agents to which the tool `is_led` and by the others; returns those that the
     /// others give in a step of `dt` seconds.
-    pub(super) fn read(&mut self, around: &Surroundings<'_>, is_led: impl Fn(&Neighbour) -> bool, dt: f64) -> Given {
+    pub(super) fn read(&mut self, around: &StepContext<'_>, is_led: impl Fn(&Neighbour) -> bool, dt: f64) -> Given {
         self.exchange.open(around);
         let [mut held, mut touching] = [&mut self.held, &mut self.touching].map(std::mem::take);
         for other in around.neighbours {
             if is_led(other) { held.push(other.clone()) } else { touching.push(other.clone()) }
         }
-        self.hold(&Surroundings { neighbours: &held, ..*around });
-        let given = self.touch(&Surroundings { neighbours: &touching, ..*around }, dt);
+        self.hold(&StepContext { neighbours: &held, ..*around });
+        let given = self.touch(&StepContext { neighbours: &touching, ..*around }, dt);
         held.clear();
         touching.clear();
         (self.held, self.touching) = (held, touching);
@@ -59,7 +59,7 @@ impl Felt {
     }
 
     /// Takes contact impulses, as forces that go on.
-    fn touch(&mut self, around: &Surroundings<'_>, dt: f64) -> Given {
+    fn touch(&mut self, around: &StepContext<'_>, dt: f64) -> Given {
         let (mut given, mut awake) = (Given::default(), false);
         self.exchange.follow(around, dt, |id, [sum, carried, lasting]| {
             given.sum += sum.linear;
@@ -74,7 +74,7 @@ impl Felt {
     }
 
     /// Reads the impulses of the agents to which the tool is driven: a force is the mean over the giver's own time between two readings.
-    fn hold(&mut self, around: &Surroundings<'_>) {
+    fn hold(&mut self, around: &StepContext<'_>) {
         let Self { exchange, from, .. } = self;
         from.iter_mut().for_each(|f| (f.here, f.given) = (false, DVec3::ZERO));
         for other in around.neighbours {

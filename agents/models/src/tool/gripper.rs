@@ -7,9 +7,9 @@
 
 use super::ToolSpec;
 use glam::{DQuat, DVec3};
-use metachron_contact::{Neighbour, Surroundings};
-use metachron_core::{AgentId, Anchor, Body, Clasp, CurveState, GRASP_BELOW, Grasp, RigidState, SoftState};
-use metachron_geometry::{FormKind, SolidForm};
+use metachron_contact::{Neighbour, StepContext};
+use metachron_core::{AgentId, Anchor, Body, CurveState, GRASP_BELOW, Grasp, GraspOrientation, RigidState, SoftState};
+use metachron_geometry::{ShapeKind, SolidShape};
 
 /// Jaws that open past this opening release.
 pub(super) const RELEASE_ABOVE: f64 = 0.3;
@@ -63,7 +63,7 @@ impl Jaws {
         spec: &ToolSpec,
         (was, now): (f64, f64),
         (tip, rotation): (DVec3, DQuat),
-        seen: (&Surroundings<'_>, f64),
+        seen: (&StepContext<'_>, f64),
     ) {
         let (around, dt) = seen;
         if now > RELEASE_ABOVE {
@@ -89,7 +89,7 @@ impl Jaws {
         Some(Grasp {
             target: held.target,
             anchor: held.anchor,
-            clasp: held.rotation.map(|rotation| Clasp { rotation, arm_m: spec.reach_m }),
+            clasp: held.rotation.map(|rotation| GraspOrientation { rotation, arm_m: spec.reach_m }),
             stiffness_n_m: share * spec.stiffness_n_m,
             damping_n_s_m: share * spec.damping_n_s_m,
         })
@@ -97,12 +97,12 @@ impl Jaws {
 }
 
 /// The nearest graspable point within reach.
-pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<Near> {
+pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &StepContext<'_>) -> Option<Near> {
     nearest_of(spec, tip, (around, spec.reach_m), |_| true)
 }
 
 /// The rigid body that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
-pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundings<'_>, f64)) -> Option<AgentId> {
+pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&StepContext<'_>, f64)) -> Option<AgentId> {
     let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
     nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
 }
@@ -111,7 +111,7 @@ pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundi
 fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
-    (around, reach_m): (&Surroundings<'_>, f64),
+    (around, reach_m): (&StepContext<'_>, f64),
     wanted: impl Fn(&Neighbour) -> bool,
 ) -> Option<Near> {
     let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
@@ -125,7 +125,7 @@ fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
         Body::Curve(curve) => (nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?, None),
         Body::Soft(soft) => (nearest_vertex(soft, tip)?, None),
         Body::Rigid(state) => {
-            let FormKind::Solid(form) = &other.form.as_ref()?.kind else { return None };
+            let ShapeKind::Solid(form) = &other.form.as_ref()?.kind else { return None };
             (nearest_in(form, state, tip)?, Some(state.rotation))
         }
         Body::Tool(_) | Body::Nothing => return None,
@@ -134,7 +134,7 @@ fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
 }
 
 /// The nearest point of a solid, and its distance: zero inside.
-fn nearest_in(form: &SolidForm, state: &RigidState, tip: DVec3) -> Option<(Anchor, f64)> {
+fn nearest_in(form: &SolidShape, state: &RigidState, tip: DVec3) -> Option<(Anchor, f64)> {
     let local = state.rotation.conjugate() * (tip - state.position);
     let place = (local + form.com_local).as_vec3();
     if !place.is_finite() {

@@ -7,12 +7,12 @@ mod rigid;
 
 use super::{Instrument, Keyframe, ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{
     AgentId, Anchor, Body, Bounds, CurveState, SimSpan, SimTime, Snapshot, StepError, StepReport, ToolState,
 };
 use metachron_core::{Impulse, Ledger, Site};
-use metachron_geometry::{Form, FormKind};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 const ME: AgentId = AgentId(7);
@@ -71,9 +71,9 @@ impl Stage {
         Self { tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
     }
 
-    fn step_with(&mut self, hands: &[Pull]) -> Result<StepReport, StepError> {
+    fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let around = Surroundings { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
+        let around = StepContext { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
         let report = self.tool.step(dt, &around)?;
         self.time += dt;
         Ok(report)
@@ -88,8 +88,8 @@ impl Stage {
     }
 }
 
-fn hand(target: DVec3) -> Pull {
-    Pull {
+fn hand(target: DVec3) -> AnchorSpring {
+    AnchorSpring {
         by: None,
         anchor: Anchor::Local(DVec3::ZERO),
         target,
@@ -225,7 +225,7 @@ fn a_tool_feels_what_it_was_given_as_the_mean_force_since_it_last_read() {
 fn a_hand_leads_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
     let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
     let (mut before, target) = (state(&stage.tool), DVec3::new(0.5, 1.0, 0.5));
-    let mut step = |stage: &mut Stage, hands: &[Pull]| {
+    let mut step = |stage: &mut Stage, hands: &[AnchorSpring]| {
         let report = stage.step_with(hands).unwrap();
         let now = state(&stage.tool);
         // 0.7 m at 60/s: no faster than 0.7·60/e m/s, so no farther than that in a step
@@ -305,8 +305,11 @@ fn scripts_that_are_none_are_refused() {
 
 #[test]
 fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
-    let form =
-        Arc::new(Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.2, restitution: 0.0 });
+    let form = Arc::new(CollisionShape {
+        kind: ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 },
+        friction: 0.2,
+        restitution: 0.0,
+    });
     let asleep = |mut neighbour: Neighbour| {
         let snapshot = Snapshot {
             at_rest: true,

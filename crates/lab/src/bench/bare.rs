@@ -6,7 +6,7 @@
 use super::cast::{Model, agent, rate_hz};
 use super::machine::own_cpu;
 use anyhow::Context;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_runtime::THREADS_MAX;
 use std::cmp::Reverse;
@@ -95,7 +95,7 @@ fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> 
 
 /// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let around = Surroundings { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    let around = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
     agent.step(dt, &around)?;
     Ok(())
 }

@@ -4,7 +4,7 @@
 
 use anyhow::Context;
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;
@@ -111,7 +111,7 @@ impl Agent for Aloof {
         self.agent.model()
     }
 
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let report = self.agent.step(dt, around)?;
         Ok(StepReport { at_rest: self.rests || report.at_rest, ..report })
     }
@@ -120,8 +120,8 @@ impl Agent for Aloof {
         self.agent.resolution()
     }
 
-    fn retune(&mut self, wanted: Resolution) {
-        self.agent.retune(wanted);
+    fn set_resolution(&mut self, wanted: Resolution) {
+        self.agent.set_resolution(wanted);
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {

@@ -5,10 +5,10 @@
 //! its step, as in a run whose steps cost nothing, or only when that time has come. Never here: measurements.
 
 use metachron_contact::audit::Member;
-use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Law, Link, Standing, keep_step, owns};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
-use metachron_geometry::Form;
+use metachron_geometry::CollisionShape;
 use std::sync::Arc;
 
 /// Deliberate faults.
@@ -35,14 +35,14 @@ pub(super) struct Stage {
 /// An agent on the stage.
 struct Actor {
     agent: Box<dyn Agent>,
-    form: Option<Arc<Form>>,
+    form: Option<Arc<CollisionShape>>,
     rate_hz: f64,
     /// Its newest state, visible to others or not.
     own: Snapshot,
     /// The state visible to others, and the one visible before.
     shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
-    hands: Vec<Pull>,
+    hands: Vec<AnchorSpring>,
     links: Vec<Link>,
     /// Mass per length and rotary inertia of a tube.
     weight: [f64; 2],
@@ -77,7 +77,7 @@ impl Stage {
     }
 
     /// Attaches fixed springs to an agent.
-    pub(super) fn hold(&mut self, id: AgentId, hands: Vec<Pull>) {
+    pub(super) fn hold(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
         self.actors[id.0 as usize].hands = hands;
     }
 
@@ -99,7 +99,7 @@ impl Stage {
     }
 
     /// The shape of an agent.
-    pub(super) fn form(&self, id: AgentId) -> Option<&Arc<Form>> {
+    pub(super) fn form(&self, id: AgentId) -> Option<&Arc<CollisionShape>> {
         self.actors[id.0 as usize].form.as_ref()
     }
 
@@ -129,7 +129,7 @@ impl Stage {
             let actor = &mut self.actors[i];
             let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
             let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
-            actor.agent.look(dt, &Surroundings { me, time, neighbours: &neighbours, hands, links });
+            actor.agent.look(dt, &StepContext { me, time, neighbours: &neighbours, hands, links });
             actor.agent.write_snapshot(&mut actor.own);
             let shown = Arc::new(actor.own.clone());
             actor.shown = [Arc::clone(&shown), shown];
@@ -148,7 +148,7 @@ impl Stage {
         let actor = &mut self.actors[i];
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let around = Surroundings { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        let around = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
         let wanted = dt;
         let dt = actor.agent.longest_step(wanted, &around);
         actor.agent.step(dt, &around)?;

@@ -5,12 +5,12 @@
 
 use super::bench::{Faults, Stage};
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_contact::audit::{Audit, audit, on_their_way, settled};
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
-use metachron_geometry::narrow_phase::{TouchRoom, gap};
-use metachron_geometry::{Placed, View};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
+use metachron_geometry::{PlacedShape, ShapePose};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Tube;
@@ -29,7 +29,7 @@ struct Solid {
     /// Zero for a tube, which reports all of its energy itself.
     mass_kg: f64,
     gravity: DVec3,
-    springs: Vec<Pull>,
+    springs: Vec<AnchorSpring>,
 }
 
 impl Play {
@@ -39,7 +39,7 @@ impl Play {
     }
 
     /// Adds a rigid body that fixed springs pull; `None` where the body cannot be built.
-    pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<Pull>) -> Option<AgentId> {
+    pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<AnchorSpring>) -> Option<AgentId> {
         let (mass_kg, gravity) = (spec.mass_kg, spec.gravity);
         let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz, [0.0; 2]);
         self.stage.hold(id, springs.clone());
@@ -117,10 +117,10 @@ impl Play {
     }
 
     /// How deep two rigid bodies overlap at the time `at`, metres; zero where they do not.
-    pub(super) fn depth_m(&self, pair: [AgentId; 2], at: SimTime, room: &mut TouchRoom) -> f64 {
+    pub(super) fn depth_m(&self, pair: [AgentId; 2], at: SimTime, room: &mut NarrowPhaseScratch) -> f64 {
         let placed = |id: AgentId| {
             let RigidState { position, rotation, .. } = self.body(id, at)?;
-            Some(Placed { form: self.stage.form(id)?, view: View::Solid { position, rotation } })
+            Some(PlacedShape { form: self.stage.form(id)?, view: ShapePose::Solid { position, rotation } })
         };
         let found = placed(pair[0]).zip(placed(pair[1])).and_then(|(a, b)| gap(&a, &b, 0.0, room));
         found.map_or(0.0, |(_, gap_m)| -gap_m)
@@ -147,8 +147,8 @@ impl Play {
 }
 
 /// Energy of springs between fixed points and a body, joules.
-fn springs_j(springs: &[Pull], state: &RigidState) -> f64 {
-    let one = |spring: &Pull| {
+fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
+    let one = |spring: &AnchorSpring| {
         let end = Body::Rigid(*state).point(spring.anchor);
         end.map_or(0.0, |(end, _)| 0.5 * spring.stiffness_n_m * end.distance_squared(spring.target))
     };

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// A run.
-pub(super) struct Company(Lockstep);
+pub(super) struct LockstepRun(Lockstep);
 
 /// A machine on which every step takes no time.
 fn tireless() -> Machine {
@@ -22,7 +22,7 @@ fn tireless() -> Machine {
     }
 }
 
-impl Company {
+impl LockstepRun {
     /// Begins a run.
     ///
     /// # Errors

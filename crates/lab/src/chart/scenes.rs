@@ -6,8 +6,8 @@ use super::bench::Faults;
 use super::energy_bench::Play;
 use super::stability::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
+use metachron_contact::AnchorSpring;
 use metachron_contact::Law;
-use metachron_contact::Pull;
 use metachron_core::{AgentId, Anchor};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
@@ -97,7 +97,7 @@ fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
             let corner = DVec3::new(0.0, b * half.y, c * half.z);
             let press = DVec3::X * (-side * 0.01);
             let sag = DVec3::Z * (0.1 * GRAVITY / 400.0);
-            Pull {
+            AnchorSpring {
                 by: None,
                 anchor: Anchor::Local(corner),
                 target: at + corner + press + sag,

@@ -7,7 +7,7 @@ use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::{Identified, Tuned};
 use anyhow::Context;
 use metachron_lod::control::Law;
-use metachron_lod::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, measure, play};
+use metachron_lod::tune::{Candidate, Disturbance, Measures, Plant, Start, Trial, measure, play};
 use std::path::{Path, PathBuf};
 
 /// Starting rates shown, in parts of the target rate.
@@ -58,7 +58,7 @@ fn fit(plant: &Plant) -> Panel {
     }
 }
 
-fn calm(on: &Identified, contender: impl Into<Contender>, rate: f64, seconds: f64) -> Trial {
+fn calm(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
     Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
 }
 
@@ -101,7 +101,7 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
     let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
     let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
-        Contender::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
+        Candidate::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
         _ => None,
     });
     let found: Vec<_> = found.collect();
@@ -151,7 +151,7 @@ fn kind(measured: &[Measures]) -> usize {
 
 /// Late frames over the speed of the machine, with 40 % more load for a third of the time.
 fn misses(on: &Identified, tuned: &Tuned) -> Panel {
-    let trial = |contender: Contender, speed: f64| Trial {
+    let trial = |contender: Candidate, speed: f64| Trial {
         speed,
         disturbance: Disturbance::Load(1.4),
         noise: on.plant.line.scatter,

@@ -16,7 +16,7 @@ use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
 use metachron_lod::control::Law;
 use metachron_lod::tune::{
-    Contender, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
+    Candidate, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
 };
 use metachron_render::{Gpu, Offscreen, RendererOptions, Size};
 use metachron_scene::{Source, load};
@@ -136,7 +136,7 @@ fn extent(args: &TuneArgs) -> Extent {
 }
 
 /// Explains given gains.
-fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Result<Exit> {
+fn analyse(args: &TuneArgs, on: &Identified, contender: Candidate) -> anyhow::Result<Exit> {
     let explanation = explain(&on.plant, contender, on.target_hz);
     let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
     data(&if args.common.json {
@@ -208,7 +208,7 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
 /// write to the fragment: both are only shown in the table.
 fn best_law(found: &[(Family, Found)]) -> Option<Law> {
     let law = |(_, f): &(Family, Found)| match f.best.contender {
-        Contender::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
+        Candidate::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
         _ => None,
     };
     found.iter().filter_map(law).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(law, _)| law)

@@ -7,7 +7,7 @@ use super::checked::Checked;
 use super::{Identified, Tuned};
 use metachron_console::gains;
 use metachron_lod::control::Law;
-use metachron_lod::tune::{Contender, Explanation, Margins, Verdict};
+use metachron_lod::tune::{Candidate, Explanation, Margins, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -158,21 +158,21 @@ fn row_json(name: &str, v: &Verdict) -> Value {
 }
 
 /// The law's name, as scenes and `--analyse` write it.
-fn law_name(contender: Contender) -> &'static str {
+fn law_name(contender: Candidate) -> &'static str {
     match contender {
-        Contender::Feedback(Law::Printed { .. }) => "printed",
-        Contender::Feedback(Law::Corrected { .. }) => "corrected",
-        Contender::Adaptive { .. } => "adaptive",
+        Candidate::Feedback(Law::Printed { .. }) => "printed",
+        Candidate::Feedback(Law::Corrected { .. }) => "corrected",
+        Candidate::Adaptive { .. } => "adaptive",
     }
 }
 
-fn gains_json(contender: Contender) -> Value {
+fn gains_json(contender: Candidate) -> Value {
     match contender {
-        Contender::Feedback(Law::Printed { alpha, beta }) => json!({ "alpha": alpha, "beta": beta }),
-        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+        Candidate::Feedback(Law::Printed { alpha, beta }) => json!({ "alpha": alpha, "beta": beta }),
+        Candidate::Feedback(Law::Corrected { kappa, lead, margin }) => {
             json!({ "kappa": kappa, "lead": lead, "margin": margin })
         }
-        Contender::Adaptive { margin } => json!({ "margin": margin }),
+        Candidate::Adaptive { margin } => json!({ "margin": margin }),
     }
 }
 

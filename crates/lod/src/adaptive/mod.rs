@@ -30,7 +30,7 @@ pub use speed_estimator::{Gauge, Lesson};
 
 use crate::select::Level;
 use hysteresis::Hold;
-use options::Menu;
+use options::Options;
 use pick::{Picker, Terms};
 
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
@@ -123,7 +123,7 @@ struct Sent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adaptive {
     settings: Settings,
-    menu: Menu,
+    menu: Options,
     picker: Picker,
     gauges: [Gauge; STAGES],
     /// κ used in plans: follows the gauges up immediately and down slowly.
@@ -145,7 +145,7 @@ impl Adaptive {
     pub fn new(settings: Settings) -> Self {
         Self {
             settings: settings.sound(),
-            menu: Menu::default(),
+            menu: Options::default(),
             picker: Picker::default(),
             gauges: [Gauge::default(); STAGES],
             kappa: [1.0; STAGES],

@@ -83,7 +83,7 @@ impl Object {
 
 /// Objects in the order of their ids, and the steps of their hulls.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Menu {
+pub(crate) struct Options {
     objects: Vec<Object>,
     steps: Vec<Step>,
     /// Where each step leads.
@@ -99,7 +99,7 @@ pub(crate) struct Menu {
     points: Vec<Vertex>,
 }
 
-impl Menu {
+impl Options {
     pub(crate) fn objects(&self) -> &[Object] {
         &self.objects
     }

@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::STAGES;
-use super::options::{Menu, Object, Step};
+use super::options::{Object, Options, Step};
 
 /// Buckets to an octave: the top bits of the mantissa. A bucket spans 9 %.
 const BITS: u32 = 3;
@@ -152,7 +152,7 @@ pub(crate) struct Picker {
 
 impl Picker {
     /// Chooses; the menu stores the steps taken, and objects that changed are reluctant to reverse.
-    pub(crate) fn pick(&mut self, menu: &mut Menu, mut terms: Terms, dwell: u8) -> Picked {
+    pub(crate) fn pick(&mut self, menu: &mut Options, mut terms: Terms, dwell: u8) -> Picked {
         let mut picked = Picked { table: menu.least, ..Picked::default() };
         let spare = terms.budget - terms.cost(&menu.least);
         terms.reach = terms.kappa.map(|k| (spare / k) as u64);
@@ -178,7 +178,7 @@ impl Picker {
 
     /// Takes all steps above the bucket in which the budget ends, and collects those in it in `edge`. Gives the ticks taken by the table;
     /// `None` where that bucket is not among the near ones.
-    fn find_edge(&mut self, menu: &Menu, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
+    fn find_edge(&mut self, menu: &Options, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
         let (mut table, all) = self.take_far(menu, terms, near);
         if terms.cost(&table) > terms.budget {
             return None;
@@ -198,7 +198,7 @@ impl Picker {
     }
 
     /// Takes the steps above the near ones and collects the near ones. Gives the ticks taken, and whether no step is below.
-    fn take_far(&mut self, menu: &Menu, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
+    fn take_far(&mut self, menu: &Options, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
         self.near.clear();
         self.near.reserve(menu.room());
         self.taken.clear();
@@ -225,7 +225,7 @@ impl Picker {
     }
 
     /// Fills the bins.
-    fn sort_into_buckets(&mut self, menu: &Menu, near: Near) {
+    fn sort_into_buckets(&mut self, menu: &Options, near: Near) {
         self.bins.resize(STAGES, [0; BUCKETS]);
         self.bins.iter_mut().for_each(|bins| bins[near.buckets()].fill(0));
         for step in &self.near {
@@ -256,7 +256,7 @@ impl Picker {
 
     /// Takes the steps on the edge that fit, and gives the gain per tick of the first that does not. One large step must not block those
     /// after it, whose gains are nearly as high; but no further step of its object is taken.
-    fn take_edge(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) -> f64 {
+    fn take_edge(&mut self, menu: &Options, terms: &Terms, picked: &mut Picked) -> f64 {
         let mut lambda = 0.0;
         for edge in &self.edge {
             let object = &menu.objects()[edge.object as usize];
@@ -272,7 +272,7 @@ impl Picker {
     }
 
     /// Below the bucket in which the budget ends: takes each object's next steps that fit, best first.
-    fn go_on(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) {
+    fn go_on(&mut self, menu: &Options, terms: &Terms, picked: &mut Picked) {
         self.edge.clear();
         for (i, object) in menu.objects().iter().enumerate() {
             let (at, steps) = (usize::from(self.taken[i]), menu.steps_of(object));
@@ -293,7 +293,7 @@ impl Picker {
 
     /// Stores the steps taken, their value, and the bound that the price λ gives for any choice, with each object optimised on its own (eq.
     /// 33): the value taken, the price of the time left over, and the loss caused by hysteresis.
-    fn settle(&self, menu: &mut Menu, terms: &Terms, picked: &mut Picked, dwell: u8) {
+    fn settle(&self, menu: &mut Options, terms: &Terms, picked: &mut Picked, dwell: u8) {
         let mut astray = 0.0;
         for (i, &taken) in self.taken.iter().enumerate() {
             let object = &menu.objects()[i];

@@ -7,7 +7,7 @@
 
 use super::groups::Groups;
 use super::hierarchy::leave_out_members;
-use super::impostors::Closing;
+use super::impostors::ImpostorChoice;
 use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
 use super::query::{Ask, Promise, TICKS, demand};
@@ -50,7 +50,7 @@ pub(super) struct AdaptiveChoice {
     law: Adaptive,
     /// In the order in which the objects are given.
     dishes: Vec<Dish>,
-    closing: Closing,
+    closing: ImpostorChoice,
     offers: Vec<Offer>,
     fixed_s: f64,
     /// Number of the last frame chosen for, as the law counts them.
@@ -68,7 +68,7 @@ impl Default for AdaptiveChoice {
         Self {
             law: Adaptive::new(kept),
             dishes: Vec::new(),
-            closing: Closing::default(),
+            closing: ImpostorChoice::default(),
             offers: Vec::new(),
             fixed_s: 0.0,
             frame: 0,
@@ -206,7 +206,7 @@ impl AdaptiveChoice {
     pub fn clear(&mut self) {
         (0..self.dishes.len()).for_each(|at| self.take_off(at));
         self.dishes.clear();
-        self.closing = Closing::default();
+        self.closing = ImpostorChoice::default();
     }
 
     fn serve(&self, ask: &Ask<'_>, levels: &mut [LevelDemand]) {

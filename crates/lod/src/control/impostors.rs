@@ -41,7 +41,7 @@ struct Sum {
 
 /// All groups, by the numbers of their objects.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Closing {
+pub(super) struct ImpostorChoice {
     doors: Vec<Option<Door>>,
     sums: Vec<Sum>,
     impostors: Impostors,
@@ -49,7 +49,7 @@ pub(super) struct Closing {
     price: f64,
 }
 
-impl Closing {
+impl ImpostorChoice {
     /// Decides at `lambda` (gain of a tick) and `kappa` (measured ticks per tick by the prices).
     pub fn decide(&mut self, ask: &Ask<'_>, groups: &Groups, (lambda, kappa): (f64, f64)) {
         self.doors.resize(ask.views.len(), None);

@@ -10,7 +10,7 @@ use crate::control::{Law, PictureControl, Policy, Prices, Stages};
 
 /// A controller that can be judged.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Contender {
+pub enum Candidate {
     /// Feedback from the measured time (GDC04), by this law.
     Feedback(Law),
     /// The policy `adaptive`: prices, and a Kalman filter for how much slower the machine is than the prices say.
@@ -24,13 +24,13 @@ pub enum Contender {
 const WANDER: f64 = 2e-4;
 const SIGMA_LEAST: f64 = 0.01;
 
-impl From<Law> for Contender {
+impl From<Law> for Candidate {
     fn from(law: Law) -> Self {
         Self::Feedback(law)
     }
 }
 
-impl Contender {
+impl Candidate {
     /// The policy with the margin of scenes that do not set one.
     pub const ADAPTIVE: Self = Self::Adaptive { margin: 0.02 };
 
@@ -96,7 +96,7 @@ fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
 }
 
 /// The starting ε̂ of a law that is placed at the target time.
-fn rest_of(contender: Contender, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
+fn rest_of(contender: Candidate, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
     let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(contender, target_hz) };
     play(plant, &trial).first().map_or(1.0, |beat| beat.eps_hat)
 }

@@ -4,7 +4,7 @@
 //! frames slower where ε̂ grows, so there can be two. Never here: the way to a fixed point.
 //! Theory: `docs/theory/control.md`, eq. 2, 4 and 6.
 
-use super::candidate::Contender;
+use super::candidate::Candidate;
 use super::plant::Plant;
 use super::play::{Start, Trial, play};
 use crate::control::{FrameWork, Law, PictureControl};
@@ -33,19 +33,19 @@ const REST_S: f64 = 5.0;
 
 /// The fixed points of `contender` on `plant` at `target_hz`, by rising ε̂.
 #[must_use]
-pub fn fixed_points(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<FixedPoint> {
+pub fn fixed_points(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<FixedPoint> {
     let set_s = contender.set_share() / target_hz;
     match contender {
-        Contender::Feedback(Law::Corrected { .. }) => rests(&along_the_range(plant, contender, target_hz), set_s),
-        Contender::Feedback(Law::Printed { beta, .. }) => {
+        Candidate::Feedback(Law::Corrected { .. }) => rests(&along_the_range(plant, contender, target_hz), set_s),
+        Candidate::Feedback(Law::Printed { beta, .. }) => {
             rests(&along_the_line(plant, contender, target_hz, beta), set_s)
         }
-        Contender::Adaptive { .. } => where_it_ends(plant, contender, target_hz),
+        Candidate::Adaptive { .. } => where_it_ends(plant, contender, target_hz),
     }
 }
 
 /// (ε̂, seconds) over the range of the corrected law, finest first.
-fn along_the_range(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<(f64, f64)> {
+fn along_the_range(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<(f64, f64)> {
     let mut control = contender.control(plant, target_hz);
     control.plan(plant.views(0));
     let place = |step: usize| {
@@ -57,7 +57,7 @@ fn along_the_range(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<(
 }
 
 /// (ε̂, seconds) along the line ρ − β ε̂ = constant on which the printed law moves from its start, finest first.
-fn along_the_line(plant: &Plant, contender: Contender, target_hz: f64, beta: f64) -> Vec<(f64, f64)> {
+fn along_the_line(plant: &Plant, contender: Candidate, target_hz: f64, beta: f64) -> Vec<(f64, f64)> {
     let mut control = contender.control(plant, target_hz);
     control.plan(plant.views(0));
     control.set_law(Law::Printed { alpha: LEADING, beta });
@@ -99,7 +99,7 @@ fn rests(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
 }
 
 /// The single fixed point of a predicting policy, which budgets by its prediction: the end of a calm trial.
-fn where_it_ends(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<FixedPoint> {
+fn where_it_ends(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<FixedPoint> {
     let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::calm(contender, target_hz) };
     let last = play(plant, &trial).last().map(|beat| FixedPoint {
         eps_hat: beat.eps_hat,

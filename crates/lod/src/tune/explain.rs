@@ -3,7 +3,7 @@
 //! In: a plant, a contender with its gains, a target. Out: the loop near its set point, its fixed points, and two sentences of advice.
 //! Never here: a search for other gains.
 
-use super::candidate::Contender;
+use super::candidate::Candidate;
 use super::equilibria::{FixedPoint, fixed_points};
 use super::margins::Loop;
 use super::measures::{BAND, Cycle, Measures};
@@ -48,7 +48,7 @@ const LITTLE_ROOM: f64 = 2.0;
 
 /// Explains the behaviour of `contender` on `plant` at `target_hz`.
 #[must_use]
-pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -> Explanation {
+pub fn explain(plant: &Plant, contender: impl Into<Candidate>, target_hz: f64) -> Explanation {
     let contender = contender.into();
     let calm = |rate: f64| {
         let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S, ..Trial::calm(contender, target_hz) };
@@ -63,9 +63,9 @@ pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -
         share: plant.share(set_s, 1.0),
         near: contender.local_loop(plant, target_hz, 1.0),
         rests: match contender {
-            Contender::Feedback(_) => with_ends(fixed_points(plant, contender, target_hz), &played),
+            Candidate::Feedback(_) => with_ends(fixed_points(plant, contender, target_hz), &played),
             // its fixed point from each start depends on the start
-            Contender::Adaptive { .. } => fixed_points(plant, contender, target_hz),
+            Candidate::Adaptive { .. } => fixed_points(plant, contender, target_hz),
         },
         cycle: runs.iter().find_map(|measured| measured.cycle),
         chatter: runs.iter().map(|measured| measured.chatter).fold(0.0, f64::max),
@@ -123,12 +123,12 @@ fn tell_of_the_range(Reach { least_s, most_s }: Reach, set_s: f64, target_hz: f6
 
 impl Explanation {
     /// Two sentences: the behaviour with its cause, and the advice.
-    fn tell(&self, contender: Contender, target_hz: f64) -> String {
+    fn tell(&self, contender: Candidate, target_hz: f64) -> String {
         let Some(near) = self.near else {
             return tell_of_the_range(self.reach, self.set_s, target_hz);
         };
         let settle = self.from.iter().map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten();
-        let Contender::Feedback(law) = contender else { return self.tell_of_prices(near, settle) };
+        let Candidate::Feedback(law) = contender else { return self.tell_of_prices(near, settle) };
         let (name, value) = knob(law);
         let margin = near.gain_margin();
         let safe = value * margin / LITTLE_ROOM;
@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn a_gain_that_is_too_high_swings() {
         // 5 times the boundary of the slope, 2 ε̂/(s f)
-        let near = Contender::from(Law::PRINTED).local_loop(&plant(), 30.0, 1.0).unwrap();
+        let near = Candidate::from(Law::PRINTED).local_loop(&plant(), 30.0, 1.0).unwrap();
         let alpha = 1e-4 * 5.0 * near.gain_margin();
         let told = explain(&plant(), Law::Printed { alpha, beta: 1e-6 }, 30.0);
         assert!(told.sentences.starts_with("It swings"), "{}", told.sentences);
@@ -285,7 +285,7 @@ mod tests {
 
     #[test]
     fn the_policy_that_predicts_is_fine_and_says_what_it_learns() {
-        let told = explain(&plant(), Contender::ADAPTIVE, 30.0);
+        let told = explain(&plant(), Candidate::ADAPTIVE, 30.0);
         assert!(told.sentences.starts_with("It settles in"), "{}", told.sentences);
         assert_eq!(told.rests.len(), 1, "{:?}", told.rests);
     }

@@ -22,7 +22,7 @@ mod trials;
 #[cfg(test)]
 mod tests;
 
-pub use candidate::Contender;
+pub use candidate::Candidate;
 pub use disturbance::Disturbance;
 pub use equilibria::{FixedPoint, fixed_points};
 pub use explain::{Explanation, explain, refusal};

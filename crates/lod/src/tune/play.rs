@@ -3,7 +3,7 @@
 //! In: a [`Trial`]. Out: its frames. The controller is the one used for drawing; the plant is the fitted one. Equal trials give equal
 //! frames on every machine. Never here: the rating of a trial.
 
-use super::candidate::Contender;
+use super::candidate::Candidate;
 use super::disturbance::{Dice, Disturbance};
 use super::plant::{Plant, ends};
 use crate::Bound;
@@ -23,7 +23,7 @@ pub enum Start {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
     /// The controller of the picture.
-    pub contender: Contender,
+    pub contender: Candidate,
     /// Target rate, frames per second, > 0.
     pub target_hz: f64,
     /// Speed of this machine relative to the plant's, > 0.
@@ -43,7 +43,7 @@ pub struct Trial {
 impl Trial {
     /// Ten seconds at rest on the plant's own machine, without noise.
     #[must_use]
-    pub fn calm(contender: impl Into<Contender>, target_hz: f64) -> Self {
+    pub fn calm(contender: impl Into<Candidate>, target_hz: f64) -> Self {
         Self {
             contender: contender.into(),
             target_hz,
@@ -138,8 +138,8 @@ pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
 
 /// Whether a controller of this status that draws `polygons` cannot do better. The printed law ties n to ε̂, so an end of its ε̂ is not
 /// always an end of the picture's range.
-fn is_at_end(contender: Contender, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
-    let printed = matches!(contender, Contender::Feedback(Law::Printed { .. }));
+fn is_at_end(contender: Candidate, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
+    let printed = matches!(contender, Candidate::Feedback(Law::Printed { .. }));
     match status {
         Status::Clamped(bound) if printed => {
             let (least, most) = ends(views);
@@ -163,7 +163,7 @@ fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64)
         Start::Target => 1.0,
         Start::Rate(rate) => rate,
     };
-    if matches!(trial.contender, Contender::Adaptive { .. }) {
+    if matches!(trial.contender, Candidate::Adaptive { .. }) {
         // its state is its κ: the start is the settled state on a machine on which this picture takes exactly its time
         return learn(control, plant, trial.speed / rate);
     }

@@ -3,7 +3,7 @@
 //! In: a plant, a target, the extent of the trials. Out: the best verdict so far, whenever it is stopped. Deterministic. Never here: the
 //! objective ([`crate::tune::judge`] has it).
 
-use super::candidate::Contender;
+use super::candidate::Candidate;
 use super::plant::Plant;
 use super::trials::{Extent, Verdict, judge};
 use crate::control::Law;
@@ -29,7 +29,7 @@ pub struct Found {
     /// The best verdict.
     pub best: Verdict,
     /// Every candidate with its objective, in the order they were tried.
-    pub tried: Vec<(Contender, f64)>,
+    pub tried: Vec<(Candidate, f64)>,
     /// Whether it was stopped before its end.
     pub interrupted: bool,
 }
@@ -57,7 +57,7 @@ impl Family {
     pub const ALL: [Self; 4] = [Self::Corrected, Self::Pi, Self::Printed, Self::Adaptive];
 
     /// The contender with the gains whose logarithms are `at`.
-    fn contender(self, at: &[f64]) -> Contender {
+    fn contender(self, at: &[f64]) -> Candidate {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
         let margin = (0.005, 0.5);
         match self {
@@ -66,7 +66,7 @@ impl Family {
                 Law::Corrected { kappa: gain(0, Law::KAPPA), lead: gain(2, Law::LEAD), margin: gain(1, margin) }.into()
             }
             Self::Printed => Law::Printed { alpha: gain(0, (1e-9, 1.0)), beta: gain(1, (1e-6, 1e3)) }.into(),
-            Self::Adaptive => Contender::Adaptive { margin: gain(0, margin) },
+            Self::Adaptive => Candidate::Adaptive { margin: gain(0, margin) },
         }
     }
 
@@ -106,7 +106,7 @@ struct Judging<'a, 'b> {
     search: &'b mut Search<'a>,
     family: Family,
     best: Option<Verdict>,
-    tried: Vec<(Contender, f64)>,
+    tried: Vec<(Candidate, f64)>,
     expected: f64,
     interrupted: bool,
 }
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn no_margin_is_left_that_nothing_asks_for() {
         // times scatter by 1 % at most here: a few hundredths of the frame suffice to keep frames on time
-        let Contender::Feedback(Law::Corrected { margin, .. }) = found(Family::Corrected, usize::MAX).best.contender
+        let Candidate::Feedback(Law::Corrected { margin, .. }) = found(Family::Corrected, usize::MAX).best.contender
         else {
             panic!("the corrected law was looked at")
         };

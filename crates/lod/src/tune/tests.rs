@@ -4,7 +4,7 @@ use super::measures::Measures;
 use super::plant::Plant;
 use super::plant::tests::{plant_of, tube_alone};
 use super::play::{Beat, Start, Trial, play};
-use super::{Contender, Disturbance, Loop};
+use super::{Candidate, Disturbance, Loop};
 use crate::control::Law;
 
 const FIXED_S: f64 = 5e-3;
@@ -20,7 +20,7 @@ fn plant(dead_time: usize, n: (u8, u8)) -> Plant {
     Plant { dead_time, ..plant_of(vec![view], FIXED_S, POLYGON_S) }
 }
 
-fn played(plant: &Plant, contender: impl Into<Contender>, rate: f64, seconds: f64) -> Vec<Beat> {
+fn played(plant: &Plant, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Vec<Beat> {
     play(plant, &Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, TARGET_HZ) })
 }
 
@@ -88,7 +88,7 @@ fn the_printed_law_swings_from_the_boundary_of_its_slope_on() {
     assert!(!swings(0.9 * boundary), "below {boundary}");
     assert!(swings(1.15 * boundary), "above {boundary}");
     let law = Law::Printed { alpha: 0.5 * boundary, beta: 5.0 };
-    let near = Contender::from(law).local_loop(&plant(0, (2, 2)), TARGET_HZ, 1.0).unwrap();
+    let near = Candidate::from(law).local_loop(&plant(0, (2, 2)), TARGET_HZ, 1.0).unwrap();
     assert!((near.gain_margin() - 2.0).abs() < 0.1, "{} and 2", near.gain_margin());
 }
 
@@ -131,7 +131,7 @@ fn a_clamp_is_left_as_soon_as_by_a_loop_that_never_was_there() {
 fn the_policy_that_predicts_corrects_what_its_filter_s_variance_says() {
     // steady state of the filter: p⁻ g = Q and g = p⁻/(p⁻ + R), iterated instead of solved
     let plant = plant(0, (0, 5));
-    let near = Contender::ADAPTIVE.local_loop(&plant, TARGET_HZ, 1.0).unwrap();
+    let near = Candidate::ADAPTIVE.local_loop(&plant, TARGET_HZ, 1.0).unwrap();
     let table = (0.98 / TARGET_HZ - FIXED_S) * TARGET_HZ;
     let noise = (0.01 / table) * (0.01 / table);
     let (mut variance, mut gain) = (0.02, 0.0);
@@ -147,7 +147,7 @@ fn the_policy_that_predicts_corrects_what_its_filter_s_variance_says() {
 fn the_policy_that_predicts_comes_to_the_time_it_promises_on_machines_of_other_speeds() {
     for (speed, rate) in [(1.0, 0.4), (1.0, 2.5), (2.0, 0.4), (0.5, 2.5)] {
         let trial =
-            Trial { speed, start: Start::Rate(rate), seconds: 3.0, ..Trial::calm(Contender::ADAPTIVE, TARGET_HZ) };
+            Trial { speed, start: Start::Rate(rate), seconds: 3.0, ..Trial::calm(Candidate::ADAPTIVE, TARGET_HZ) };
         let measured = Measures::of(&play(&plant(0, (0, 5)), &trial));
         assert!(
             measured.settle_s.is_some_and(|s| s <= 1.0) && measured.cycle.is_none(),
@@ -158,7 +158,7 @@ fn the_policy_that_predicts_comes_to_the_time_it_promises_on_machines_of_other_s
 
 #[test]
 fn both_parts_of_a_pi_law_count_in_its_margins() {
-    let near = Contender::from(Law::Corrected { kappa: 0.2, lead: 0.3, margin: 0.1 });
+    let near = Candidate::from(Law::Corrected { kappa: 0.2, lead: 0.3, margin: 0.1 });
     let near = near.local_loop(&plant(0, (0, 5)), TARGET_HZ, 1.0).unwrap();
     let share = 1.0 - FIXED_S / (0.9 / TARGET_HZ);
     assert_eq!(near.dead_time, 0);

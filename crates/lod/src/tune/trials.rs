@@ -3,7 +3,7 @@
 //! In: a plant, a contender, a target. Out: a [`Verdict`] with one number to minimise. Trials are distributed over all cores; the verdict
 //! does not depend on the distribution. Never here: the choice of gains to try.
 
-use super::candidate::Contender;
+use super::candidate::Candidate;
 use super::disturbance::Disturbance;
 use super::margins::Loop;
 use super::measures::Measures;
@@ -35,7 +35,7 @@ impl Extent {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     /// The contender judged.
-    pub contender: Contender,
+    pub contender: Candidate,
     /// The worse of the settling times from 0.4 and from 2.5 times the target rate, wall seconds; `None` if one does not settle.
     pub settle_s: Option<f64>,
     /// The worse overshoot of the two.
@@ -91,7 +91,7 @@ pub fn speeds_in_reach(plant: &Plant, target_hz: f64) -> Vec<f64> {
 
 /// Judges `contender` on `plant` at `target_hz`.
 #[must_use]
-pub fn judge(plant: &Plant, contender: impl Into<Contender>, target_hz: f64, extent: Extent) -> Verdict {
+pub fn judge(plant: &Plant, contender: impl Into<Candidate>, target_hz: f64, extent: Extent) -> Verdict {
     let contender = contender.into();
     let asked = speeds_in_reach(plant, target_hz);
     let far = |speed: f64| libm::fabs(libm::log(speed));

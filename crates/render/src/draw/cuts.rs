@@ -5,7 +5,7 @@
 //! new item is appended; when the buffer is full, all items are dropped and those that the picture uses are written anew.
 
 use super::super::picture::{MeshCorner, MeshKey, Picture};
-use metachron_geometry::{Cut, Model, Tom};
+use metachron_geometry::{Cut, Model, ProgressiveMesh};
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::ops::Range;
@@ -185,7 +185,7 @@ impl<K: Copy + Eq + Hash> Store<K> {
 }
 
 /// Every cut of a picture with its mesh; a cut drawn in two shadings occurs twice.
-fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
+fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &ProgressiveMesh, Cut)> + Clone {
     picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Cut(model, cut) | MeshKey::Glide(model, cut, _) => Some((model, tom(picture, model)?, cut)),
         _ => None,
@@ -193,14 +193,14 @@ fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
 }
 
 /// Every geomorph of a picture with its mesh.
-fn ways(picture: &Picture) -> impl Iterator<Item = (WayKey, &Tom)> + Clone {
+fn ways(picture: &Picture) -> impl Iterator<Item = (WayKey, &ProgressiveMesh)> + Clone {
     picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Glide(model, cut, coarser) => Some(((model, cut.vertices, coarser), tom(picture, model)?)),
         _ => None,
     })
 }
 
-fn tom(picture: &Picture, model: u32) -> Option<&Tom> {
+fn tom(picture: &Picture, model: u32) -> Option<&ProgressiveMesh> {
     match picture.models.get(model as usize)? {
         Model::Mesh(tom) => Some(tom),
         Model::Foliage(_) => None,

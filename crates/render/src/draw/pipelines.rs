@@ -58,7 +58,7 @@ pub struct Pipelines {
 }
 
 /// The settings in which pipelines differ.
-struct Recipe<'a> {
+struct PipelineDesc<'a> {
     label: &'a str,
     vertex: &'a str,
     /// `None` draws depths only.
@@ -69,7 +69,7 @@ struct Recipe<'a> {
 }
 
 /// The settings that the pipelines of a renderer share.
-struct Kitchen<'a> {
+struct PipelineBuilder<'a> {
     device: &'a Device,
     layouts: [wgpu::PipelineLayout; 2],
     /// Layout of the picture's bind group and a texture's.
@@ -118,7 +118,7 @@ impl Pipelines {
         };
         let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
         let painted = module("painted", &[SOLID, PAINTED].concat());
-        let kitchen = Kitchen::new(device, layouts, format, options);
+        let kitchen = PipelineBuilder::new(device, layouts, format, options);
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
             layout(16, vertex, &wgpu::vertex_attr_array![0 => Float32x4]),
@@ -132,10 +132,10 @@ impl Pipelines {
         ];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
-            kitchen.cook(&Recipe { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
+            kitchen.cook(&PipelineDesc { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
         };
         let solid = |label, vertex, fragment, topology| {
-            kitchen.cook(&Recipe { label, vertex, fragment, buffers: &solids, topology, module: &solid })
+            kitchen.cook(&PipelineDesc { label, vertex, fragment, buffers: &solids, topology, module: &solid })
         };
         let [stroke, stroke_shadow] = kitchen.strokes(&module("stroke", &[SOLID, STROKE].concat()));
         let lean = |entry: [&'static str; 2]| entry[usize::from(options.lean)];
@@ -198,7 +198,7 @@ impl Pipelines {
     }
 }
 
-impl<'a> Kitchen<'a> {
+impl<'a> PipelineBuilder<'a> {
     fn new(device: &'a Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
         let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -231,7 +231,7 @@ impl<'a> Kitchen<'a> {
         (vertex, fragment): (&str, &str),
         topology: wgpu::PrimitiveTopology,
     ) -> RenderPipeline {
-        self.cook(&Recipe { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
+        self.cook(&PipelineDesc { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
     }
 
     /// Pipelines for points and lines, in the picture and in the shadow map.
@@ -243,7 +243,7 @@ impl<'a> Kitchen<'a> {
         ];
         let topology = wgpu::PrimitiveTopology::TriangleList;
         [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
-            self.cook(&Recipe { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
+            self.cook(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
         })
     }
 
@@ -255,14 +255,17 @@ impl<'a> Kitchen<'a> {
     ) -> RenderPipeline {
         let (vertex, fragment) = ("vs_painted", Some(fragment));
         let topology = wgpu::PrimitiveTopology::TriangleList;
-        self.cook_in(&Recipe { label: "painted", vertex, fragment, buffers, topology, module }, &self.with_texture)
+        self.cook_in(
+            &PipelineDesc { label: "painted", vertex, fragment, buffers, topology, module },
+            &self.with_texture,
+        )
     }
 
-    fn cook(&self, recipe: &Recipe<'_>) -> RenderPipeline {
+    fn cook(&self, recipe: &PipelineDesc<'_>) -> RenderPipeline {
         self.cook_in(recipe, &self.layouts[usize::from(recipe.fragment.is_some())])
     }
 
-    fn cook_in(&self, recipe: &Recipe<'_>, layout: &wgpu::PipelineLayout) -> RenderPipeline {
+    fn cook_in(&self, recipe: &PipelineDesc<'_>, layout: &wgpu::PipelineLayout) -> RenderPipeline {
         let lines = recipe.topology == wgpu::PrimitiveTopology::LineList;
         let shadow = recipe.fragment.is_none();
         let flag = |on: bool| f64::from(u8::from(on));

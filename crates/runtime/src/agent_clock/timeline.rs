@@ -1,7 +1,7 @@
 //! The scene's common timeline: maps wall time to simulated time.
 //!
 //! In: pause, run, speed, single step. Out: an immutable [`Timeline`] that every thread reads without waiting.
-//! Never here: an agent's own time ([`super::Pace`] has it), sleeping.
+//! Never here: an agent's own time ([`super::AgentClock`] has it), sleeping.
 
 use arc_swap::ArcSwap;
 use metachron_core::{SimSpan, SimTime};

@@ -7,12 +7,12 @@
 
 use super::super::fellows::{Fellows, World};
 use super::published_bounds::{Reach, Seen};
-use super::{Crowd, SPEED_LEAST_M_S};
+use super::{BroadPhase, SPEED_LEAST_M_S};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 
 /// Knowledge of one agent about the boxes of the others.
 #[derive(Debug)]
-pub(in super::super) struct Sight {
+pub(in super::super) struct NeighbourList {
     me: AgentId,
     mine: Option<Reach>,
     /// The speed at the end of the previous step, m/s: the motion to the newest state may have started with it.
@@ -61,7 +61,7 @@ const LISTED: usize = 8;
 /// An appointment that is never due: both are at rest, apart.
 const NEVER: SimTime = SimTime::from_nanos(u64::MAX);
 
-impl Sight {
+impl NeighbourList {
     /// The candidate list of `me`.
     pub fn new(me: AgentId) -> Self {
         Self {
@@ -84,7 +84,7 @@ impl Sight {
     }
 
     /// Publishes to the crowd that this agent is inside `bounds` at its time `time` (`None`: without bounds).
-    pub fn stand(&mut self, crowd: &Crowd, bounds: Option<&Bounds>, time: SimTime) {
+    pub fn stand(&mut self, crowd: &BroadPhase, bounds: Option<&Bounds>, time: SimTime) {
         let said = self.mine.map_or(0.0, |mine| mine.speed_m_s);
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
             let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
@@ -101,7 +101,7 @@ impl Sight {
     /// `may_touch` are near; members of its own island (`fellows`) are skipped.
     pub fn look(
         &mut self,
-        crowd: &Crowd,
+        crowd: &BroadPhase,
         (now, dt): (SimTime, SimSpan),
         fellows: &Fellows,
         may_touch: impl Fn(AgentId) -> bool,
@@ -134,7 +134,7 @@ impl Sight {
     /// Checks the listed peers whose appointment is due; a peer that is distant again falls back to the common appointment.
     fn keep_appointments(
         &mut self,
-        crowd: &Crowd,
+        crowd: &BroadPhase,
         mine: &Reach,
         now: SimTime,
         may_touch: impl Fn(AgentId) -> bool,
@@ -154,7 +154,7 @@ impl Sight {
     /// Checks all agents, and lists those with the earliest appointments.
     fn survey(
         &mut self,
-        crowd: &Crowd,
+        crowd: &BroadPhase,
         mine: &Reach,
         now: SimTime,
         (fellows, may_touch): (&Fellows, impl Fn(AgentId) -> bool),
@@ -198,7 +198,7 @@ impl Sight {
     }
 
     /// Makes the peers that became faster than their published speed due for a check.
-    fn read_notes(&mut self, crowd: &Crowd, fellows: &Fellows) {
+    fn read_notes(&mut self, crowd: &BroadPhase, fellows: &Fellows) {
         let Self { me, listed, soonest, everybody, near, .. } = self;
         let most = 2 * (LISTED + near.len());
         let (next, whole) = crowd.notes(self.unread, |id| {

@@ -51,12 +51,12 @@ pub(super) enum Seen {
 /// One agent's box in shared memory: a cache line of its own, so that writers do not disturb each other's readers.
 #[derive(Debug, Default)]
 #[repr(align(64))]
-pub(super) struct Berth(Seqlock<5>);
+pub(super) struct PublishedBounds(Seqlock<5>);
 
 /// Read attempts while a box is being written. A write takes 10 ns.
 const TRIES: u32 = 8;
 
-impl Berth {
+impl PublishedBounds {
     /// The last written box, for its writer.
     pub fn mine(&self) -> Option<Reach> {
         if let Seen::There(reach) = self.read() { Some(reach) } else { None }
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn what_is_read_holds_what_was_written() {
-        let berth = Berth::default();
+        let berth = PublishedBounds::default();
         assert_eq!(berth.read(), Seen::Nowhere);
         let third = DVec3::new(1.0 / 3.0, -1.0 / 3.0, 1e-9);
         let time = SimTime::from_nanos(u64::MAX - 1);
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_reader_never_sees_half_of_a_writing() {
-        let berth = Berth::default();
+        let berth = PublishedBounds::default();
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let reader = scope.spawn(|| {

@@ -40,10 +40,10 @@ impl Flyer {
 }
 
 /// Everybody's turns in the order of their times; `check` is told who has just looked, before each step.
-fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &Sight)) {
-    let crowd = Crowd::new(flyers.len());
+fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &NeighbourList)) {
+    let crowd = BroadPhase::new(flyers.len());
     let ids = || (0..flyers.len() as u32).map(AgentId);
-    let mut sights: Vec<_> = ids().map(Sight::new).collect();
+    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
     for (flyer, sight) in flyers.iter().zip(&mut sights) {
         sight.stand(&crowd, Some(&flyer.bounds()), flyer.time);
     }
@@ -115,8 +115,8 @@ proptest! {
 fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
     let dt = SimSpan::from_nanos(4_000_000);
     let held = |count: u32| {
-        let crowd = Crowd::new(count as usize);
-        let mut sights: Vec<_> = (0..count).map(AgentId).map(Sight::new).collect();
+        let crowd = BroadPhase::new(count as usize);
+        let mut sights: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
         let measured = allocation_counter::measure(|| {
             for turn in 0..3_u64 {
                 let now = SimTime::from_nanos(turn * dt.as_nanos());
@@ -140,9 +140,9 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
 
 #[test]
 fn a_longer_step_is_looked_ahead_for_at_once() {
-    let crowd = Crowd::new(2);
+    let crowd = BroadPhase::new(2);
     let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
-    let mut sight = Sight::new(AgentId(0));
+    let mut sight = NeighbourList::new(AgentId(0));
     sight.stand(&crowd, Some(&ball(0.0)), SimTime::ZERO);
     crowd.stand(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
@@ -158,15 +158,15 @@ fn a_longer_step_is_looked_ahead_for_at_once() {
 fn who_is_far_is_never_looked_at_and_who_comes_is() {
     let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
     let count = 1000;
-    let crowd = Crowd::new(count);
+    let crowd = BroadPhase::new(count);
     let ids = || (0..count as u32).map(AgentId);
     let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
-    let mut sights: Vec<_> = ids().map(Sight::new).collect();
+    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
     let dt = SimSpan::from_nanos(4_000_000);
     for (k, sight) in sights.iter_mut().enumerate() {
         sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
-    let looks = |sights: &mut [Sight], now: SimTime| -> usize {
+    let looks = |sights: &mut [NeighbourList], now: SimTime| -> usize {
         sights.iter_mut().map(|sight| sight.look(&crowd, (now, dt), &Fellows::default(), |_| true)).sum()
     };
     assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
@@ -188,8 +188,8 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
 #[test]
 fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
     let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
-    let crowd = Crowd::new(count);
-    let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(Sight::new).collect();
+    let crowd = BroadPhase::new(count);
+    let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
     let half = DVec3::splat(0.25);
     // a floor of them, half a metre apart, a metre below those that swing
     for (k, sight) in sights.iter_mut().enumerate().skip(10) {
@@ -216,8 +216,8 @@ fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
 
 #[test]
 fn a_log_that_has_run_over_means_everybody() {
-    let crowd = Crowd::new(3);
-    let mut sight = Sight::new(AgentId(0));
+    let crowd = BroadPhase::new(3);
+    let mut sight = NeighbourList::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
     let dt = SimSpan::from_nanos(1_000_000);
     sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
@@ -235,7 +235,7 @@ fn a_log_that_has_run_over_means_everybody() {
 
 #[test]
 fn a_call_is_heard_once_by_the_one_it_is_for() {
-    let crowd = Crowd::new(200);
+    let crowd = BroadPhase::new(200);
     [130, 3, 64, 3].into_iter().for_each(|from| crowd.call(AgentId(7), AgentId(from)));
     let heard = |id| {
         let mut heard = Vec::new();

@@ -6,7 +6,7 @@
 //! Never here: steps.
 
 use super::super::agent_clock::Timeline;
-use super::super::agent_runner::Actor;
+use super::super::agent_runner::AgentRunner;
 use super::super::fellows::Fellows;
 use super::super::handle::{AgentHandle, Shared};
 use crossbeam::atomic::AtomicCell;
@@ -20,7 +20,7 @@ use std::time::Duration;
 pub(in super::super) struct Seating {
     /// Nobody waits for this lock but at the end of a run: who finds it taken tries again after the next turn.
     door: Mutex<Vec<Guest>>,
-    home: AtomicCell<Option<Box<Actor>>>,
+    home: AtomicCell<Option<Box<AgentRunner>>>,
 }
 
 impl std::fmt::Debug for Seating {
@@ -30,7 +30,7 @@ impl std::fmt::Debug for Seating {
 }
 
 /// Who waits at a door: an agent is far larger than the word that moves it.
-type Guest = Box<Actor>;
+type Guest = Box<AgentRunner>;
 
 /// Those an agent leads.
 #[derive(Default)]
@@ -47,24 +47,24 @@ pub(in super::super) struct Company {
 
 /// One that is led.
 pub(super) struct Seat {
-    pub actor: Box<Actor>,
+    pub actor: Box<AgentRunner>,
     /// Zero while it stays; else it leaves, with those of the same number.
     pub apart: u32,
 }
 
 impl Seating {
     /// The agent, if it has come home.
-    pub fn come_home(&self) -> Option<Box<Actor>> {
+    pub fn come_home(&self) -> Option<Box<AgentRunner>> {
         self.home.take()
     }
 
     /// Somebody who waits at the door.
-    fn knock(&self) -> Option<Box<Actor>> {
+    fn knock(&self) -> Option<Box<AgentRunner>> {
         self.door.try_lock().ok()?.pop()
     }
 
     /// Waits at the door; gives `actor` back if somebody stands in it.
-    fn wait(&self, actor: Box<Actor>) -> Result<(), Box<Actor>> {
+    fn wait(&self, actor: Box<AgentRunner>) -> Result<(), Box<AgentRunner>> {
         match self.door.try_lock() {
             Ok(mut door) => door.push(actor),
             Err(_) => return Err(actor),
@@ -91,12 +91,12 @@ impl Company {
         self.seats.iter().map(|seat| seat.actor.id())
     }
 
-    pub fn each(&mut self, mut visit: impl FnMut(&mut Actor)) {
+    pub fn each(&mut self, mut visit: impl FnMut(&mut AgentRunner)) {
         self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor));
     }
 
     /// Those it leads.
-    pub fn all(&self) -> impl Iterator<Item = &Actor> {
+    pub fn all(&self) -> impl Iterator<Item = &AgentRunner> {
         self.seats.iter().map(|seat| &*seat.actor)
     }
 
@@ -106,7 +106,7 @@ impl Company {
     }
 
     /// Visits those it leads, each with all that step as one.
-    pub fn each_beside(&mut self, mut visit: impl FnMut(&mut Actor, &Fellows)) {
+    pub fn each_beside(&mut self, mut visit: impl FnMut(&mut AgentRunner, &Fellows)) {
         self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor, &self.fellows));
     }
 
@@ -133,7 +133,7 @@ impl Company {
     }
 
     /// Takes in `actor` and all it leads.
-    fn admit(&mut self, mut actor: Box<Actor>) {
+    fn admit(&mut self, mut actor: Box<AgentRunner>) {
         // where it will be when it makes its own turns again nobody knows
         actor.beside = None;
         self.seats.append(&mut actor.company.seats);
@@ -142,7 +142,7 @@ impl Company {
     }
 }
 
-impl Actor {
+impl AgentRunner {
     /// Takes in those who wait at its door and at the doors of those it leads.
     pub fn take_in(&mut self) {
         let mut at = 0;
@@ -162,11 +162,11 @@ impl Actor {
     }
 
     /// Somebody who waits at its door.
-    fn knock(&self) -> Option<Box<Actor>> {
+    fn knock(&self) -> Option<Box<AgentRunner>> {
         self.shared.seating.as_ref()?.knock()
     }
 
-    fn admit(&mut self, actor: Box<Actor>) {
+    fn admit(&mut self, actor: Box<AgentRunner>) {
         let (me, board) = (self.id(), Arc::clone(&self.shared.board));
         std::iter::once(actor.id()).chain(actor.company.ids()).for_each(|id| board.follow(id, Some(me)));
         self.company.admit(actor);
@@ -218,7 +218,7 @@ impl Actor {
     pub fn seek_leader(&self) -> Option<AgentId> {
         self.shared.seating.as_ref()?;
         let led = self.company.seats.iter().map(|seat| &*seat.actor);
-        let leaders = std::iter::once(self).chain(led).filter_map(Actor::bonded_leader);
+        let leaders = std::iter::once(self).chain(led).filter_map(AgentRunner::bonded_leader);
         leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
     }
 
@@ -246,7 +246,7 @@ fn send_home(leaving: Vec<Seat>) {
 }
 
 /// Hands `actor`, and all it leads, over to `leader`; gives it back if that takes nobody in now.
-pub(in super::super) fn move_in(actor: Box<Actor>, leader: AgentId) -> Result<(), Box<Actor>> {
+pub(in super::super) fn move_in(actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
     let (id, board, peers) = (actor.id(), Arc::clone(&actor.shared.board), Arc::clone(&actor.peers));
     let Some(seating) = peers.get(leader).and_then(|peer| peer.shared.seating.as_ref()) else { return Err(actor) };
     board.follow(id, Some(leader));
@@ -256,18 +256,21 @@ pub(in super::super) fn move_in(actor: Box<Actor>, leader: AgentId) -> Result<()
     }
     // the door may have been shut just before: one of the two sides sees who is left outside
     if board.is_closed(leader) {
-        seating.clear().into_iter().for_each(Actor::go_home);
+        seating.clear().into_iter().for_each(AgentRunner::go_home);
     }
     board.wake(leader);
     Ok(())
 }
 
 /// Seats agents that belong `together` before the first step: for each place in the list, the agent that makes turns of its own.
-pub(in super::super) fn assign(actors: Vec<Actor>, together: &[Option<AgentId>]) -> Vec<Option<Box<Actor>>> {
+pub(in super::super) fn assign(
+    actors: Vec<AgentRunner>,
+    together: &[Option<AgentId>],
+) -> Vec<Option<Box<AgentRunner>>> {
     let leaders = leaders(together);
     let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
     for (at, leader) in leaders.into_iter().enumerate().filter(|(at, leader)| at != leader) {
-        let parked = |place: &Option<Box<Actor>>| place.as_ref().is_none_or(|actor| actor.is_parked());
+        let parked = |place: &Option<Box<AgentRunner>>| place.as_ref().is_none_or(|actor| actor.is_parked());
         if !parked(&places[at])
             && !parked(&places[leader])
             && let Some(actor) = places[at].take()
@@ -298,7 +301,7 @@ fn leaders(together: &[Option<AgentId>]) -> Vec<usize> {
 
 /// Sends home those who wait at the door of one whose turns nobody makes any more.
 pub(in super::super) fn empty_door(shared: &Shared) {
-    shared.seating.iter().flat_map(Seating::clear).for_each(Actor::go_home);
+    shared.seating.iter().flat_map(Seating::clear).for_each(AgentRunner::go_home);
 }
 
 /// Ends the lives of those who wait at doors or have come home when nobody looks any more.

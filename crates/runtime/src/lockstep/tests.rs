@@ -4,7 +4,7 @@ use super::super::testing::{Dummy, Fault};
 use super::super::{AgentState, Command, Demand, Governor, SendError, TurnMeasure, state_hash};
 use super::*;
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Anchor, Resolution, SimSpan, SimTime};
 
 const fn ms(n: u64) -> Duration {
@@ -188,7 +188,7 @@ fn a_hand_pulls_until_it_lets_go_and_keeps_the_agent_awake() {
     let sleepy = Dummy { rest_from: Some(1), ..Dummy::new(100.0) };
     let mut run = lockstep(vec![sleepy.at(250.0)]);
     run.wait_until(ms(100));
-    let pull = Pull {
+    let pull = AnchorSpring {
         by: None,
         anchor: Anchor::Local(DVec3::ZERO),
         target: DVec3::X * 1000.0,

@@ -9,7 +9,7 @@
 //! wake-up, which costs more than ten cheap turns. Never here: threads, sleeping, turns.
 
 use super::super::agent_clock::Timeline;
-use super::super::agent_runner::Actor;
+use super::super::agent_runner::AgentRunner;
 use metachron_core::{SimSpan, SimTime};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -47,7 +47,7 @@ struct Place<T> {
 /// An agent whose step is released, and its served time at its arrival.
 struct Released {
     served: SimTime,
-    actor: Box<Actor>,
+    actor: Box<AgentRunner>,
 }
 
 /// An agent whose step will be released.
@@ -71,13 +71,13 @@ impl Queue {
     }
 
     /// Adds `actor`, which comes from outside the queue, to wait for its next turn.
-    pub fn put(&mut self, mut actor: Box<Actor>, now: Duration) {
+    pub fn put(&mut self, mut actor: Box<AgentRunner>, now: Duration) {
         actor.owed = SimSpan::ZERO;
         self.put_back(actor, now);
     }
 
     /// Adds `actor`, whose turn was just made, to wait for its next one.
-    pub fn put_back(&mut self, mut actor: Box<Actor>, now: Duration) {
+    pub fn put_back(&mut self, mut actor: Box<AgentRunner>, now: Duration) {
         actor.served = actor.served.max(self.served - actor.owed);
         actor.owed = actor.owed.min(self.served.since(actor.served));
         let (due, dt) = (actor.pace.due(&self.timeline), actor.pace.dt());
@@ -95,7 +95,7 @@ impl Queue {
     }
 
     /// The most urgent agent whose step is released at `now`; the caller adds the step to its served time.
-    pub fn take(&mut self, now: Duration) -> Option<Box<Actor>> {
+    pub fn take(&mut self, now: Duration) -> Option<Box<AgentRunner>> {
         self.release(now);
         let Released { served, actor } = self.ready.pop()?.of;
         self.served = self.served.max(served);
@@ -122,7 +122,7 @@ impl Queue {
     }
 
     /// All remaining agents, at the end of a run.
-    pub fn drain(&mut self) -> impl Iterator<Item = Box<Actor>> {
+    pub fn drain(&mut self) -> impl Iterator<Item = Box<AgentRunner>> {
         let waiting = self.waiting.drain().map(|place| place.of.then);
         waiting.chain(self.ready.drain().map(|place| place.of)).map(|released| released.actor)
     }
@@ -187,7 +187,7 @@ mod tests {
     }
 
     /// The most urgent agent, with the step for which it is taken added to its served time.
-    fn take(queue: &mut Queue, now: Duration) -> Option<Box<Actor>> {
+    fn take(queue: &mut Queue, now: Duration) -> Option<Box<AgentRunner>> {
         let mut actor = queue.take(now)?;
         actor.served += actor.pace.dt();
         Some(actor)

@@ -6,11 +6,11 @@
 //! Agents at rest are stored in one slot each until they are summoned. Never here: threads, turns.
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
-use super::super::agent_runner::Actor;
+use super::super::agent_runner::AgentRunner;
 use super::super::clock::Clock;
 use super::super::handle::AgentHandle;
 use super::super::island::Seating;
-use super::super::sleep::Switchboard;
+use super::super::sleep::SleepRegistry;
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
 use crossbeam::utils::CachePadded;
@@ -29,29 +29,29 @@ const UNJUST: u64 = 5_000_000;
 const HAUL: usize = 8;
 
 /// State shared by all workers.
-pub(super) struct Hall {
+pub(super) struct PoolState {
     pub clock: Arc<dyn Clock>,
     pub timeline: SharedTimeline,
-    pub board: Arc<Switchboard>,
+    pub board: Arc<SleepRegistry>,
     pub handles: Vec<AgentHandle>,
-    shelves: Vec<CachePadded<Shelf>>,
-    beds: Vec<AtomicCell<Option<Box<Actor>>>>,
+    shelves: Vec<CachePadded<ReturnPlace>>,
+    beds: Vec<AtomicCell<Option<Box<AgentRunner>>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
 #[derive(Default)]
-struct Shelf {
+struct ReturnPlace {
     queue: Mutex<Queue>,
     due: AtomicU64,
     frontier: AtomicU64,
 }
 
-impl Hall {
+impl PoolState {
     pub fn new(
         clock: Arc<dyn Clock>,
-        board: Arc<Switchboard>,
+        board: Arc<SleepRegistry>,
         handles: Vec<AgentHandle>,
-        actors: Vec<Option<Box<Actor>>>,
+        actors: Vec<Option<Box<AgentRunner>>>,
         workers: usize,
     ) -> Self {
         let beds = handles.iter().map(|_| AtomicCell::new(None)).collect();
@@ -71,10 +71,10 @@ impl Hall {
     pub fn exchange(
         &self,
         at: usize,
-        back: Option<Box<Actor>>,
+        back: Option<Box<AgentRunner>>,
         timeline: &Timeline,
         now: Duration,
-    ) -> Option<Box<Actor>> {
+    ) -> Option<Box<AgentRunner>> {
         let taken = self.shelves[at].with(|queue| {
             queue.keep_time(timeline, now);
             back.into_iter().for_each(|actor| queue.put_back(actor, now));
@@ -84,12 +84,12 @@ impl Hall {
     }
 
     /// Adds `actor` to the queue of worker `at`.
-    pub fn put(&self, at: usize, actor: Box<Actor>, now: Duration) {
+    pub fn put(&self, at: usize, actor: Box<AgentRunner>, now: Duration) {
         self.shelves[at].with(|queue| queue.put(actor, now));
     }
 
     /// Stores `actor` at rest; returns it if it has been woken meanwhile.
-    pub fn lay(&self, actor: Box<Actor>) -> Option<Box<Actor>> {
+    pub fn lay(&self, actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let id = actor.id();
         let bed = self.beds.get(id.0 as usize)?;
         // a summons before this found the slot empty: then its mark is seen here; a later one finds the agent
@@ -98,12 +98,12 @@ impl Hall {
     }
 
     /// Takes the agent out of its resting slot.
-    pub fn lift(&self, id: AgentId) -> Option<Box<Actor>> {
+    pub fn lift(&self, id: AgentId) -> Option<Box<AgentRunner>> {
         self.beds.get(id.0 as usize)?.take()
     }
 
     /// The agent that has returned from a leader.
-    pub fn come_home(&self, id: AgentId) -> Option<Box<Actor>> {
+    pub fn come_home(&self, id: AgentId) -> Option<Box<AgentRunner>> {
         self.handles.get(id.0 as usize)?.shared.seating.as_ref().and_then(Seating::come_home)
     }
 
@@ -121,7 +121,7 @@ impl Hall {
     /// Takes over agents that another worker serves worse than worker `at` serves its own.
     pub fn balance(&self, at: usize, timeline: &Timeline, now: Duration) {
         let mine = self.shelves[at].frontier.load(Relaxed);
-        let unjust = |shelf: &Shelf| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
+        let unjust = |shelf: &ReturnPlace| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
         if mine == NEVER || !self.shelves.iter().any(|shelf| unjust(shelf)) {
             return;
         }
@@ -135,16 +135,16 @@ impl Hall {
     }
 
     /// Visits and removes all resting and queued agents, at the end of a run.
-    pub fn clear(&self, mut visit: impl FnMut(Box<Actor>)) {
+    pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
         self.beds.iter().filter_map(AtomicCell::take).for_each(&mut visit);
         self.shelves.iter().for_each(|shelf| shelf.with(|queue| queue.drain().for_each(&mut visit)));
     }
 
     /// An overdue turn of another worker.
-    fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<Actor>> {
+    fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<AgentRunner>> {
         let count = self.shelves.len();
         let others = (1..count).map(|k| &self.shelves[(at + k) % count]);
-        let late = |shelf: &Shelf| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
+        let late = |shelf: &ReturnPlace| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
         others.filter(|shelf| late(shelf)).find_map(|shelf| {
             shelf.try_with(|queue| {
                 queue.keep_time(timeline, now);
@@ -154,7 +154,7 @@ impl Hall {
     }
 }
 
-impl Shelf {
+impl ReturnPlace {
     fn with<R>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
         self.show(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
     }

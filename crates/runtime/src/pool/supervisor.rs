@@ -5,8 +5,8 @@
 
 use super::super::island::{empty_door, empty_rooms};
 use super::super::priority::Priority;
-use super::shared::Hall;
-use super::watchdog::{Desk, Sitting};
+use super::shared::PoolState;
+use super::watchdog::{Sitting, WatchdogWord};
 use super::worker::Worker;
 use metachron_core::AgentId;
 use std::io;
@@ -23,8 +23,8 @@ const PARTING: Duration = Duration::from_millis(400);
 const LOOKS: u32 = 4;
 
 /// All workers and their state.
-pub(super) struct Staff {
-    hall: Arc<Hall>,
+pub(super) struct Supervisor {
+    hall: Arc<PoolState>,
     posts: Vec<Post>,
     hired: u32,
     patience: Duration,
@@ -44,28 +44,28 @@ pub(super) enum Note {
 /// One worker.
 struct Post {
     number: u32,
-    desk: Arc<Desk>,
+    desk: Arc<WatchdogWord>,
     thread: Option<JoinHandle<()>>,
     seen: Option<Sitting>,
     looks: u32,
 }
 
 /// Reports that a worker has ended, for whatever reason.
-struct Farewell {
+struct EndNotice {
     number: u32,
     sender: Sender<Note>,
 }
 
-impl Drop for Farewell {
+impl Drop for EndNotice {
     fn drop(&mut self) {
         // the send fails only after the end, when the report is no longer needed
         let _ = self.sender.send(Note::Ended(self.number));
     }
 }
 
-impl Staff {
+impl Supervisor {
     /// Starts a worker for each of `places`; a step that takes longer than `patience` is given up.
-    pub fn hire(hall: Arc<Hall>, places: usize, patience: Duration, priority: Priority) -> io::Result<Self> {
+    pub fn hire(hall: Arc<PoolState>, places: usize, patience: Duration, priority: Priority) -> io::Result<Self> {
         let (sender, notes) = channel();
         let mut staff = Self { hall, posts: Vec::new(), hired: 0, patience, priority, sender, notes };
         for at in 0..places {
@@ -99,9 +99,9 @@ impl Staff {
     }
 
     fn post(&mut self, at: usize) -> io::Result<Post> {
-        let (number, desk) = (self.hired, Arc::new(Desk::default()));
+        let (number, desk) = (self.hired, Arc::new(WatchdogWord::default()));
         self.hired += 1;
-        let (hall, farewell) = (Arc::clone(&self.hall), Farewell { number, sender: self.sender.clone() });
+        let (hall, farewell) = (Arc::clone(&self.hall), EndNotice { number, sender: self.sender.clone() });
         let body = {
             let (desk, priority) = (Arc::clone(&desk), self.priority);
             move || {
@@ -150,7 +150,7 @@ impl Staff {
 
     /// Parks an agent that is stuck in a turn, and all agents it leads, from outside.
     fn park(&self, id: AgentId, reason: &str) {
-        let Hall { board, handles, .. } = &*self.hall;
+        let PoolState { board, handles, .. } = &*self.hall;
         board.close(id);
         let led = || handles.iter().filter(|agent| board.leader(agent.id()) == id);
         led().for_each(|agent| empty_door(&agent.shared));

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 
 /// State of one worker; a worker that is replaced leaves its state behind.
 #[derive(Debug, Default)]
-pub(super) struct Desk {
+pub(super) struct WatchdogWord {
     /// The turn in progress: its number and, in the low half, the agent's number plus one. [`IDLE`] between turns.
     word: AtomicU64,
 }
@@ -28,7 +28,7 @@ impl Sitting {
     }
 }
 
-impl Desk {
+impl WatchdogWord {
     /// Turn number `turn` begins, of `id`.
     pub fn sit(&self, turn: u32, id: AgentId) -> Sitting {
         let word = (u64::from(turn & 0x7fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn either_the_step_returns_or_the_worker_is_given_up() {
-        let desk = Desk::default();
+        let desk = WatchdogWord::default();
         assert_eq!(desk.sitting(), None);
         let first = desk.sit(1, AgentId(7));
         assert_eq!(desk.sitting().map(Sitting::whose), Some(AgentId(7)));

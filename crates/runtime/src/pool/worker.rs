@@ -4,11 +4,11 @@
 //! no lock except its own queue's, and its only system call is to sleep. Never here: the choice of the next turn.
 
 use super::super::agent_clock::Timeline;
-use super::super::agent_runner::{Actor, Next};
+use super::super::agent_runner::{AgentRunner, Next};
 use super::super::cpu::CpuShare;
 use super::super::island::move_in;
-use super::shared::Hall;
-use super::watchdog::Desk;
+use super::shared::PoolState;
+use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::thread;
@@ -26,9 +26,9 @@ const BALANCE_TURNS: u32 = 64;
 
 /// A worker and its state.
 pub(super) struct Worker {
-    hall: Arc<Hall>,
+    hall: Arc<PoolState>,
     at: usize,
-    desk: Arc<Desk>,
+    desk: Arc<WatchdogWord>,
     cpu: CpuShare,
     turns: u32,
     timeline: Timeline,
@@ -37,11 +37,11 @@ pub(super) struct Worker {
     awake_since: Duration,
     given_up: bool,
     /// The agent of the last turn, if it waits for another one.
-    last: Option<Box<Actor>>,
+    last: Option<Box<AgentRunner>>,
 }
 
 impl Worker {
-    pub fn new(hall: Arc<Hall>, at: usize, desk: Arc<Desk>) -> Self {
+    pub fn new(hall: Arc<PoolState>, at: usize, desk: Arc<WatchdogWord>) -> Self {
         let (now, timeline) = (hall.clock.now(), hall.timeline.read());
         let cpu = CpuShare::new();
         Self { hall, at, desk, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
@@ -71,13 +71,13 @@ impl Worker {
     /// Makes turns of `actor` for as long as it is behind, but for [`SPELL`] at most; returns it if it waits for another one.
     ///
     /// If all agents are behind, the data of one are still in the cache for its second turn, but no longer after the turns of all others.
-    fn spell(&mut self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+    fn spell(&mut self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         let until = self.now + SPELL;
         actor.fetch();
         let mut waiting = self.turn(actor, timeline);
         while self.now < until {
             let now = self.now;
-            let is_behind = |actor: &mut Box<Actor>| actor.pace.due(timeline).is_some_and(|due| due <= now);
+            let is_behind = |actor: &mut Box<AgentRunner>| actor.pace.due(timeline).is_some_and(|due| due <= now);
             let Some(actor) = waiting.take_if(is_behind) else { break };
             waiting = self.turn(actor, timeline);
         }
@@ -85,7 +85,7 @@ impl Worker {
     }
 
     /// Makes a turn of `actor`; returns it if it waits for another one.
-    fn turn(&mut self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+    fn turn(&mut self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
@@ -132,12 +132,12 @@ impl Worker {
     }
 
     /// Stores `actor` at rest, unless it was woken: then returns it to wait for a turn.
-    fn lay(&self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+    fn lay(&self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         self.hall.lay(actor).and_then(|actor| self.wake(actor, timeline))
     }
 
     /// Wakes `actor` if it was woken by a caller; else stores it at rest again.
-    fn wake(&self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+    fn wake(&self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         loop {
             if actor.wakes(timeline, self.now) {
                 return Some(actor);
@@ -169,16 +169,16 @@ impl Worker {
 #[cfg(test)]
 mod tests {
     use super::super::super::agent_clock::Drive;
-    use super::super::super::spawn::{Company, assemble};
+    use super::super::super::spawn::{AssembledRun, assemble};
     use super::super::super::testing::Dummy;
     use super::super::super::{Clock, ManualClock};
     use super::*;
 
     fn worker(spawns: Vec<crate::AgentSpawn>, clock: &Arc<ManualClock>) -> Worker {
-        let Company { actors, handles, board } = assemble(spawns).unwrap();
+        let AssembledRun { actors, handles, board } = assemble(spawns).unwrap();
         board.hire(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
-        let hall = Arc::new(Hall::new(clock, board, handles, actors, 1));
+        let hall = Arc::new(PoolState::new(clock, board, handles, actors, 1));
         hall.timeline.drive(Duration::ZERO, Drive::Run);
         Worker::new(hall, 0, Arc::default())
     }

@@ -8,7 +8,7 @@ use crate::check::{Checker, Place, allowed};
 use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Model, Placement, Tom, proxy};
+use metachron_geometry::{Model, Placement, ProgressiveMesh, proxy};
 use metachron_world::{GROUP_LEVELS_MAX, Look, Scenery};
 use std::sync::Arc;
 
@@ -83,7 +83,7 @@ fn made_of(
     place: &Place,
     members: &[Scenery],
     wanted: Option<&[u32]>,
-) -> Option<(Arc<Tom>, Placement)> {
+) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     let all: f64 = members.iter().map(|m| f64::from(m.model.range().1)).sum();
     let usual = (SHARE * all).round().clamp(f64::from(TRIANGLES.0), f64::from(TRIANGLES.1)) as u32;
     let finest = wanted.and_then(<[u32]>::last).copied().unwrap_or(usual);
@@ -99,7 +99,7 @@ fn made_of(
 }
 
 /// The triangles that the mesh has at each level; `None` where two levels are equal or one is below its coarsest, which is reported.
-fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Tom)) -> Option<Vec<u32>> {
+fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &ProgressiveMesh)) -> Option<Vec<u32>> {
     let (least, most) = tom.range();
     let mut made: Vec<u32> = Vec::with_capacity(levels.len());
     for (at, count) in levels.iter().enumerate() {
@@ -118,7 +118,7 @@ fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Tom)) -
 }
 
 /// Default levels: all triangles of the mesh, then coarser levels as long as they have enough triangles to show a shape.
-fn usual(tom: &Tom) -> Vec<u32> {
+fn usual(tom: &ProgressiveMesh) -> Vec<u32> {
     let (least, most) = tom.range();
     let coarser = |count: &u32| Some(count / COARSER).filter(|count| *count >= TRIANGLES.0.max(least));
     let mut levels: Vec<u32> = std::iter::successors(Some(most), coarser).take(GROUP_LEVELS_MAX).collect();

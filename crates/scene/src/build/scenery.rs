@@ -12,7 +12,9 @@ use crate::check::{Checker, Place, allowed};
 use crate::format::{GeneratorKind, MeshFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, geodesic_edges, painted_mesh, tree};
+use metachron_geometry::{
+    Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
+};
 use metachron_world::kinds::Material;
 use metachron_world::{Look, Scenery};
 use std::collections::BTreeMap;
@@ -31,7 +33,7 @@ const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
 /// Meshes already made and their greatest coordinate in their own unit, by what they were made from: equal ones are shared.
-type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<Tom>, f64)>;
+type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<ProgressiveMesh>, f64)>;
 
 /// Reads every mesh and tree.
 pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
@@ -69,7 +71,7 @@ pub(super) fn mesh_model(
     place: &Place,
     file: &MeshFile,
     source: &Source,
-) -> Option<(Arc<Tom>, Placement)> {
+) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     if file.dome_m.is_some() {
         c.wrong(place, "dome_m", "makes many of one proxy", "expected a single mesh");
     }
@@ -81,7 +83,7 @@ fn mesh_of(
     place: &Place,
     file: &MeshFile,
     (source, made): (&Source, &mut Made),
-) -> Option<(Arc<Tom>, Placement)> {
+) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     let count = |n: u32| f64::from(n);
     let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
     let least =
@@ -109,8 +111,10 @@ fn mesh_of(
     }
     let made_now = match (&file.file, file.generate) {
         (Some(name), _) => from_file(name, source, scale),
-        (None, kind) => Tom::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
-            .map_err(|why| why.to_string()),
+        (None, kind) => {
+            ProgressiveMesh::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
+                .map_err(|why| why.to_string())
+        }
     };
     match made_now {
         Ok(tom) => {
@@ -132,13 +136,13 @@ fn mesh_of(
     }
 }
 
-fn from_file(name: &str, source: &Source, scale: f64) -> Result<Tom, String> {
+fn from_file(name: &str, source: &Source, scale: f64) -> Result<ProgressiveMesh, String> {
     let mesh = mesh::read(&source.sibling(name)?, scale)?;
-    Tom::new(&painted_mesh(&mesh.points, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
+    ProgressiveMesh::new(&painted_mesh(&mesh.points, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
 }
 
 /// The greatest coordinate of a mesh, in its own unit.
-fn reach(tom: &Tom) -> f64 {
+fn reach(tom: &ProgressiveMesh) -> f64 {
     tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
 }
 

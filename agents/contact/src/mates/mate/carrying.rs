@@ -6,7 +6,7 @@
 use super::Mate;
 use crate::Contact;
 use crate::crowd::touches;
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::Foot;
 
@@ -46,7 +46,7 @@ impl Mate {
 
 /// Whether somebody who started lower owns a contact with `neighbour` and has pressed it within a second: what carries it is told by that
 /// contact, not by where it touches something fixed.
-pub(super) fn is_lifted(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+pub(super) fn is_lifted(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
     let height = |n: &Neighbour| n.form.as_ref().map(|form| form.height_j_kg());
     around.neighbours.iter().any(|n| touches(n, neighbour.id) && height(n) < height(neighbour))
 }

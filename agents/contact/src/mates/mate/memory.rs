@@ -6,7 +6,7 @@
 use super::super::tanks::Tanks;
 use super::Mate;
 use crate::{Exchange, PUSH_OUT_SHARE};
-use crate::{Neighbour, Surroundings};
+use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::SimTime;
 
@@ -38,7 +38,7 @@ impl Mate {
 
     /// Divides a rigid body among those who press on it, once this owner is one of them, but for one that lies on this owner, who answers
     /// alone for all that presses it (docs/theory/coupling.md, eq. 6c, 7l).
-    pub fn divide(&mut self, exchange: &Exchange, tanks: &mut Tanks, around: &Surroundings<'_>) {
+    pub fn divide(&mut self, exchange: &Exchange, tanks: &mut Tanks, around: &StepContext<'_>) {
         let Some(it) = self.other.neighbour().filter(|_| !self.other.is_many()) else { return };
         let bears = it.snapshot.lies.get().is_some_and(|lies| lies.on == around.me);
         if bears || !tanks.get(it.id).is_some_and(|account| account.presses()) {

@@ -191,7 +191,7 @@ fn crossed_cylinders_are_as_far_as_their_axes_say() {
 
 #[test]
 fn a_mesh_that_is_not_divided_touches_as_its_hull() {
-    let FormKind::Solid(SolidForm { solid: faces, .. }) = hull(DVec3::splat(0.05)).kind else { unreachable!() };
+    let ShapeKind::Solid(SolidShape { solid: faces, .. }) = hull(DVec3::splat(0.05)).kind else { unreachable!() };
     let Solid::Hull { points_m } = faces else { unreachable!() };
     let triangles = crate::hull_triangles(&points_m).unwrap();
     let mesh = Solid::Mesh { points_m: triangles.points.into(), triangles: triangles.triangles.into() };
@@ -202,8 +202,8 @@ fn a_mesh_that_is_not_divided_touches_as_its_hull() {
 
 #[test]
 fn a_compound_touches_with_each_of_its_parts() {
-    let Form { kind, .. } = cuboid(DVec3::new(0.2, 0.05, 0.05));
-    let FormKind::Solid(SolidForm { solid: table, .. }) = kind else { unreachable!() };
+    let CollisionShape { kind, .. } = cuboid(DVec3::new(0.2, 0.05, 0.05));
+    let ShapeKind::Solid(SolidShape { solid: table, .. }) = kind else { unreachable!() };
     // two feet, 0.2 m apart
     let foot = |x: f32| {
         let at = rapier3d::parry::math::Pose::from_parts(glam::Vec3::new(x, 0.0, 0.0), Default::default());
@@ -211,8 +211,8 @@ fn a_compound_touches_with_each_of_its_parts() {
     };
     let shape = rapier3d::parry::shape::SharedShape::compound(vec![foot(-0.1), foot(0.1)]);
     let kind =
-        FormKind::Solid(SolidForm { solid: table, shape, com_local: DVec3::new(0.0, 0.0, 0.01), radius_m: 0.25 });
-    let feet = Form { kind, friction: 0.0, restitution: 0.0 };
+        ShapeKind::Solid(SolidShape { solid: table, shape, com_local: DVec3::new(0.0, 0.0, 0.01), radius_m: 0.25 });
+    let feet = CollisionShape { kind, friction: 0.0, restitution: 0.0 };
     let floor = cuboid(DVec3::new(0.5, 0.5, 0.05));
     let standing = at(&feet, DVec3::Z * 0.11, DQuat::IDENTITY);
     let found = all(&standing, &at(&floor, DVec3::ZERO, DQuat::IDENTITY), 1e-3);

@@ -3,19 +3,19 @@
 use super::*;
 
 /// One of each kind, with its place.
-fn cast() -> Vec<Form> {
+fn cast() -> Vec<CollisionShape> {
     let half = DVec3::new(0.02, 0.03, 0.04);
     vec![ball(0.03), capsule(0.02, 0.04), cuboid(half), cylinder(0.02, 0.04), hull(half), chain(), tool()]
 }
 
-fn place<'a>(form: &'a Form, (position, rotation): (DVec3, DQuat), nodes: &'a [DVec3]) -> Placed<'a> {
+fn place<'a>(form: &'a CollisionShape, (position, rotation): (DVec3, DQuat), nodes: &'a [DVec3]) -> PlacedShape<'a> {
     let view = match form.kind {
-        FormKind::Solid(_) => View::Solid { position, rotation },
-        FormKind::Chain { .. } => View::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
-        FormKind::Tool(_) => View::Tool { tip: position, rotation, jaw: 0.3 },
-        FormKind::Surface(_) => View::Surface(nodes),
+        ShapeKind::Solid(_) => ShapePose::Solid { position, rotation },
+        ShapeKind::Chain { .. } => ShapePose::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
+        ShapeKind::Tool(_) => ShapePose::Tool { tip: position, rotation, jaw: 0.3 },
+        ShapeKind::Surface(_) => ShapePose::Surface(nodes),
     };
-    Placed { form, view }
+    PlacedShape { form, view }
 }
 
 const RADII: [f64; 8] = [8e-3; 8];
@@ -26,8 +26,8 @@ fn curved((position, rotation): (DVec3, DQuat)) -> Vec<DVec3> {
     (-3..=4).map(|i| position + rotation * node(i)).collect()
 }
 
-fn is_cylinder(form: &Form) -> bool {
-    matches!(&form.kind, FormKind::Solid(form) if matches!(form.solid, Solid::Cylinder { .. }))
+fn is_cylinder(form: &CollisionShape) -> bool {
+    matches!(&form.kind, ShapeKind::Solid(form) if matches!(form.solid, Solid::Cylinder { .. }))
 }
 
 proptest! {
@@ -143,9 +143,10 @@ fn places_that_are_not_finite_and_views_of_another_kind_touch_nothing() {
             assert!(nearest(&a, &b, 1e-3).is_none_or(|(n, g)| n.is_finite() && g.is_finite()));
         }
     }
-    let wrong = Placed { form: &cast[5], view: View::Solid { position: DVec3::ZERO, rotation: DQuat::IDENTITY } };
+    let wrong =
+        PlacedShape { form: &cast[5], view: ShapePose::Solid { position: DVec3::ZERO, rotation: DQuat::IDENTITY } };
     assert!(all(&wrong, &place(&cast[0], (DVec3::ZERO, DQuat::IDENTITY), &v), 1.0).is_empty());
-    let short = Placed { form: &cast[5], view: View::Chain { positions: &v, radii_m: &RADII[..3] } };
+    let short = PlacedShape { form: &cast[5], view: ShapePose::Chain { positions: &v, radii_m: &RADII[..3] } };
     assert!(all(&short, &place(&cast[0], (DVec3::ZERO, DQuat::IDENTITY), &v), 1.0).is_empty());
 }
 
@@ -153,7 +154,7 @@ fn places_that_are_not_finite_and_views_of_another_kind_touch_nothing() {
 fn nothing_is_allocated_once_everything_is_known() {
     let cast = cast();
     let v = curved((DVec3::ZERO, DQuat::IDENTITY));
-    let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+    let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
     let mut run = |lift: f64, known: bool| {
         for first in &cast {
             for second in &cast {

@@ -1,15 +1,15 @@
 //! The skins of soft bodies against brute force and closed forms.
 
 use super::*;
-use crate::SurfaceForm;
-use crate::narrow_phase::Fans;
+use crate::SurfaceShape;
+use crate::narrow_phase::VoronoiRegions;
 use crate::near_triangle;
 
 const CELLS: u32 = 4;
 const EDGE: f64 = 0.05;
 
 /// A wavy grid of triangles of 1 mm half thickness, from the origin on.
-fn sheet() -> (Form, Vec<DVec3>) {
+fn sheet() -> (CollisionShape, Vec<DVec3>) {
     let at = |i: u32, j: u32| i * (CELLS + 1) + j;
     let places = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| (i, j)));
     let point = |(i, j): (u32, u32)| {
@@ -24,8 +24,8 @@ fn sheet() -> (Form, Vec<DVec3>) {
         triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| [a.min(b), a.max(b)]).collect();
     edges.sort_unstable();
     edges.dedup();
-    let surface = SurfaceForm {
-        fans: Fans::of(&edges, &triangles).into(),
+    let surface = SurfaceShape {
+        fans: VoronoiRegions::of(&edges, &triangles).into(),
         vertices: (0..(CELLS + 1).pow(2)).collect(),
         edges: edges.into(),
         triangles: triangles.into(),
@@ -35,12 +35,12 @@ fn sheet() -> (Form, Vec<DVec3>) {
         closed: false,
         held: false,
     };
-    (Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
+    (CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
 }
 
 /// The distance of a point from the nearest triangle.
-fn apart(form: &Form, positions: &[DVec3], point: DVec3) -> f64 {
-    let FormKind::Surface(surface) = &form.kind else { panic!("a surface") };
+fn apart(form: &CollisionShape, positions: &[DVec3], point: DVec3) -> f64 {
+    let ShapeKind::Surface(surface) = &form.kind else { panic!("a surface") };
     let corners = surface.triangles.iter().map(|triangle| triangle.map(|vertex| positions[vertex as usize]));
     corners.map(|corners| near_triangle(point, corners).distance(point)).fold(f64::INFINITY, f64::min)
 }
@@ -51,11 +51,11 @@ proptest! {
     #[test]
     fn a_ball_and_a_box_s_corner_touch_where_they_are_nearest(x in 0.01_f64..0.19, y in 0.01_f64..0.19, z in 0.03_f64..0.06) {
         let (form, positions) = sheet();
-        let (mut room, mut list) = (TouchRoom::default(), vec![]);
-        let here = Placed { form: &form, view: View::Surface(&positions) };
+        let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+        let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
         let at = DVec3::new(x, y, z);
         let round = ball(0.02);
-        let there = Placed { form: &round, view: View::Solid { position: at, rotation: DQuat::IDENTITY } };
+        let there = PlacedShape { form: &round, view: ShapePose::Solid { position: at, rotation: DQuat::IDENTITY } };
         touches(&here, &there, 0.1, &mut room, &mut list);
         let nearest = lowest(&list);
         let wanted = apart(&form, &positions, at) - 0.02 - 1e-3;
@@ -78,8 +78,8 @@ proptest! {
     fn on_a_flat_skin_every_place_pushes_straight_out_of_it(x in 0.05_f64..0.15, y in 0.05_f64..0.15, lean in -0.05_f64..0.05) {
         let (form, mut positions) = sheet();
         positions.iter_mut().for_each(|x| x.z = 0.0);
-        let (mut room, mut list) = (TouchRoom::default(), vec![]);
-        let here = Placed { form: &form, view: View::Surface(&positions) };
+        let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+        let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
         for (solid, height) in [
             (ball(0.02), 0.02),
             (cuboid(DVec3::new(0.03, 0.04, 0.02)), 0.02 + 0.04 * lean.abs()),
@@ -92,7 +92,7 @@ proptest! {
             // what is beneath a face pushes along that
             let face = rotation * DVec3::NEG_Z;
             // of a ball the slack of eq. 15a stays: a thousandth of a diagonal over its radius
-            let off = if matches!(solid.kind, FormKind::Solid(SolidForm { solid: Solid::Ball { .. }, .. })) { 1.5e-3 * EDGE / 0.02 } else { 1e-9 };
+            let off = if matches!(solid.kind, ShapeKind::Solid(SolidShape { solid: Solid::Ball { .. }, .. })) { 1.5e-3 * EDGE / 0.02 } else { 1e-9 };
             let straight = |normal: DVec3| normal.distance(DVec3::NEG_Z) < off || normal.distance(face) < off;
             prop_assert!(list.iter().all(|touch| straight(touch.normal)), "{list:?}");
         }
@@ -103,14 +103,14 @@ proptest! {
 fn a_box_s_corner_over_a_triangle_touches_inside_it() {
     let (form, mut positions) = sheet();
     positions.iter_mut().for_each(|x| x.z = 0.0);
-    let (mut room, mut list) = (TouchRoom::default(), vec![]);
+    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let cube = cuboid(DVec3::splat(0.02));
     // a corner down: half a diagonal under the middle
     let down = DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::NEG_Z);
     let (x, y) = (0.068, 0.06);
     let position = DVec3::new(x, y, 0.02 * 3.0_f64.sqrt() + 0.003);
-    let there = Placed { form: &cube, view: View::Solid { position, rotation: down } };
-    touches(&Placed { form: &form, view: View::Surface(&positions) }, &there, 0.01, &mut room, &mut list);
+    let there = PlacedShape { form: &cube, view: ShapePose::Solid { position, rotation: down } };
+    touches(&PlacedShape { form: &form, view: ShapePose::Surface(&positions) }, &there, 0.01, &mut room, &mut list);
     let nearest = lowest(&list);
     assert!((nearest.gap_m - 0.002).abs() < 1e-4, "{nearest:?}"); // eight projections from the middle of the triangle
     assert!(matches!(nearest.on_a, Place::Surface { shares, .. } if shares.iter().all(|share| *share > 0.02)));
@@ -122,8 +122,8 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
     let positions = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
     let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-    let surface = SurfaceForm {
-        fans: Fans::of(&edges, &triangles).into(),
+    let surface = SurfaceShape {
+        fans: VoronoiRegions::of(&edges, &triangles).into(),
         vertices: [0, 1, 2, 3].into(),
         edges: edges.into(),
         triangles: triangles.into(),
@@ -133,13 +133,13 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         closed: true,
         held: false,
     };
-    let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 };
-    let (mut room, mut list) = (TouchRoom::default(), vec![]);
+    let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
+    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
         let position = DVec3::new(0.2, 0.2, depth);
-        let there = Placed { form: &round, view: View::Solid { position, rotation: DQuat::IDENTITY } };
-        touches(&Placed { form: &form, view: View::Surface(&positions) }, &there, 0.0, &mut room, &mut list);
+        let there = PlacedShape { form: &round, view: ShapePose::Solid { position, rotation: DQuat::IDENTITY } };
+        touches(&PlacedShape { form: &form, view: ShapePose::Surface(&positions) }, &there, 0.0, &mut room, &mut list);
         let nearest = lowest(&list);
         // the surface is above the ball, which has to go down, whichever side its middle is on
         assert!(nearest.normal.distance(DVec3::Z) < 1e-12, "{depth}: {nearest:?}");

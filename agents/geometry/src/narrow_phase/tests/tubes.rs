@@ -72,7 +72,7 @@ proptest! {
         let half = DVec3::new(0.02, 0.03, 0.04);
         let (tube, solids) = (chain(), [cuboid(half), cylinder(0.02, 0.04), hull(half)]);
         for form in &solids {
-            let FormKind::Solid(SolidForm { solid, .. }) = &form.kind else { unreachable!() };
+            let ShapeKind::Solid(SolidShape { solid, .. }) = &form.kind else { unreachable!() };
             let field = Field::of(solid).unwrap();
             let mut expected = f64::INFINITY;
             for k in 0..11 {
@@ -115,7 +115,7 @@ fn the_pairs_looked_at_grow_with_the_length_of_the_tubes() {
     let tried = |segments: usize| {
         let (a, b) = (helix(segments, 0.0), helix(segments, std::f64::consts::PI));
         let radii = vec![8e-3; segments + 1];
-        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
         assert!(found.len() > segments, "the strands of a double helix lie side by side");
         room.chains.tried
@@ -131,7 +131,7 @@ fn tubes_far_apart_look_at_no_pairs() {
     let form = chain();
     let (a, radii) = (helix(400, 0.0), vec![8e-3; 401]);
     let b: Vec<_> = a.iter().map(|p| *p + DVec3::X).collect();
-    let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+    let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
     touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
     assert!(found.is_empty() && room.chains.tried == 0);
 }
@@ -142,8 +142,8 @@ fn shut_jaws_hold_a_tube_from_both_sides() {
     let nodes: Vec<_> = (-3..=3).map(|i| DVec3::Y * 0.01 * f64::from(i)).collect();
     let radii = [2e-3; 7];
     let held = |jaw: f64| {
-        let view = View::Tool { tip: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw };
-        all(&along(&tube, &nodes, &radii), &Placed { form: &grasper, view }, 1e-3)
+        let view = ShapePose::Tool { tip: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw };
+        all(&along(&tube, &nodes, &radii), &PlacedShape { form: &grasper, view }, 1e-3)
     };
     assert!(held(1.0).is_empty(), "wide open they pass by");
     let shut = held(0.1);
@@ -155,8 +155,8 @@ fn shut_jaws_hold_a_tube_from_both_sides() {
 fn a_tube_lying_on_a_shaft_touches_its_side() {
     let (tube, grasper) = (chain(), tool());
     let nodes: Vec<_> = (-3..=3).map(|i| DVec3::new(0.01 * f64::from(i) + 1e-3, 4e-3 + 2.5e-3, -0.1)).collect();
-    let view = View::Tool { tip: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw: 0.0 };
-    let found = all(&along(&tube, &nodes, &[4e-3; 7]), &Placed { form: &grasper, view }, 1e-3);
+    let view = ShapePose::Tool { tip: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw: 0.0 };
+    let found = all(&along(&tube, &nodes, &[4e-3; 7]), &PlacedShape { form: &grasper, view }, 1e-3);
     let touch = lowest(&found);
     assert!(touch.gap_m.abs() < 1e-7 && (touch.normal - DVec3::Y).length() < 1e-3, "{found:?}"); // parts are single precision
     assert!(axis(touch.on_b, &[]).0.distance(DVec3::new(0.0, 2.5e-3, -0.1)) < 1e-5);

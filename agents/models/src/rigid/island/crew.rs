@@ -3,13 +3,13 @@
 //! In: the leader, its companions and what each of them sees. Out: access by seat. Never here: physics.
 
 use crate::rigid::RigidBody;
-use metachron_contact::{Companion, Surroundings};
+use metachron_contact::{Companion, StepContext};
 use metachron_core::{AgentId, StepError};
 
 /// Everybody who shares the step: seat 0 leads, seat k is the k-th companion.
 pub(super) struct Crew<'a, 'c> {
     leader: &'a mut RigidBody,
-    around: &'a Surroundings<'a>,
+    around: &'a StepContext<'a>,
     others: &'a mut [Companion<'c>],
 }
 
@@ -18,7 +18,7 @@ impl<'a, 'c> Crew<'a, 'c> {
     /// [`StepError::Alone`] where a companion is no rigid body.
     pub(super) fn new(
         leader: &'a mut RigidBody,
-        around: &'a Surroundings<'a>,
+        around: &'a StepContext<'a>,
         others: &'a mut [Companion<'c>],
     ) -> Result<Self, StepError> {
         if others.iter_mut().all(|other| rigid(other).is_some()) {
@@ -39,7 +39,7 @@ impl<'a, 'c> Crew<'a, 'c> {
     }
 
     /// The body in `seat`, and what it sees.
-    pub(super) fn body(&mut self, seat: usize) -> (&mut RigidBody, &Surroundings<'_>) {
+    pub(super) fn body(&mut self, seat: usize) -> (&mut RigidBody, &StepContext<'_>) {
         if seat == 0 {
             return (self.leader, self.around);
         }

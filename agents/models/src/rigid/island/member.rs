@@ -2,12 +2,12 @@
 //!
 //! In: a [`RigidBody`] and the obstacles of its spec. Out: what both solvers need of them. Never here: how anything moves.
 
-use super::super::mass_properties::Spread;
+use super::super::mass_properties::MassDistribution;
 use super::super::motion::Motion;
 use super::super::{RigidBody, RigidError};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
-use metachron_core::{Six, Twist};
+use metachron_core::{Mat6, Twist};
 use metachron_geometry::{Obstacle, Solid};
 use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
@@ -20,7 +20,7 @@ pub(super) struct Member {
     /// Where its body is in the crew: 0 leads, k is the k-th companion.
     pub seat: usize,
     /// Its mass.
-    pub spread: Spread,
+    pub spread: MassDistribution,
     /// Its shape, in its own axes.
     pub shape: SharedShape,
     /// No point of it is farther from the centre of mass, metres.
@@ -36,7 +36,7 @@ pub(super) struct Member {
     /// Gravity of the part being solved, m/s²; zero where a spring's solution has it already.
     pub gravity: DVec3,
     /// How springs on it, and tools that press it, resist what the island does to it in the part being solved, about its centre of mass.
-    pub springs: Option<Six>,
+    pub springs: Option<Mat6>,
     /// By how much the island changed its velocities in the last part, for those springs and tools.
     pub bent: Twist,
     /// Nothing but gravity and the island moves it in this step: its body is asked for nothing between the parts.
@@ -44,7 +44,7 @@ pub(super) struct Member {
     /// Whether one that bends presses it, and wants to know how it answers among its fellows,
     pub asked: bool,
     /// and how it does, where that is known: its inverse mass about its centre.
-    pub answer: Option<Six>,
+    pub answer: Option<Mat6>,
     /// Whether it touched anything in the last part.
     pub touching: bool,
     /// How deep it sank into anything in the last part, metres, ≥ 0.

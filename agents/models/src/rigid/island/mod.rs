@@ -24,8 +24,8 @@ use direct::{Direct, Reach};
 use glam::DVec3;
 use member::{Ground, Member};
 use metachron_contact::beside::may_press;
-use metachron_contact::{Companion, Surroundings};
-use metachron_core::Six;
+use metachron_contact::{Companion, StepContext};
+use metachron_core::Mat6;
 use metachron_core::{AgentId, SimSpan, StepError, StepReport, check_span};
 use pile::Pile;
 use std::sync::Arc;
@@ -90,7 +90,7 @@ const LOOK_S: f64 = 1.0 / 30.0;
 pub(super) fn lead(
     leader: &mut RigidBody,
     dt: SimSpan,
-    around: &Surroundings<'_>,
+    around: &StepContext<'_>,
     others: &mut [Companion<'_>],
     apart: &mut Vec<u32>,
 ) -> Result<StepReport, StepError> {
@@ -105,7 +105,7 @@ pub(super) fn lead(
 }
 
 /// The sum of two resistances.
-fn both(one: Option<Six>, other: Option<Six>) -> Option<Six> {
+fn both(one: Option<Mat6>, other: Option<Mat6>) -> Option<Mat6> {
     match (one, other) {
         (Some(mut sum), Some(other)) => {
             sum.add(&other, 1.0);

@@ -230,7 +230,7 @@ fn drop_on_spring(slow_hz: f64, faults: Faults, restitution: f64) -> Drop {
     let mounted = stage.add(RigidBody::new(part(masses[0], 0.0)).unwrap(), 1000.0);
     let falling = stage.add(RigidBody::new(part(masses[1], 0.09)).unwrap(), slow_hz);
     let target = UP * (masses[0] * G / stiffness);
-    stage.hold(mounted, Pull { damping_n_s_m: 0.5, ..hand(target, stiffness) });
+    stage.hold(mounted, AnchorSpring { damping_n_s_m: 0.5, ..hand(target, stiffness) });
     let start = masses[1] * G * 0.09 + 0.5 * stiffness * target.length_squared();
     let mut drop = Drop { raw: 0.0, common: 0.0, raw_depth_m: 0.0, depth_m: 0.0 };
     stage.run(3.0, |stage| {

@@ -11,7 +11,7 @@ fn steps(dt: f64) -> u32 {
 /// What it says after it has made steps of `dt` for a tenth of a second, and how far it then is from `exact` of how it began.
 fn said_and_true(
     body: &mut RigidBody,
-    (dt, pull): (f64, Option<Pull>),
+    (dt, pull): (f64, Option<AnchorSpring>),
     exact: impl Fn(DVec3, DVec3) -> DVec3,
 ) -> [f64; 2] {
     let start = state(body);
@@ -46,7 +46,7 @@ fn the_error_of_a_spring_is_told_to_a_fifth() {
         let free = RigidSpec { gravity: DVec3::ZERO, ..ball(1.0, 0.0) };
         let mut body = RigidBody::new(RigidSpec { obstacles: [].into(), ..free }).unwrap();
         let target = state(&body).position + DVec3::X;
-        let pull = Pull { damping_n_s_m: 0.0, ..hand(target, stiffness) };
+        let pull = AnchorSpring { damping_n_s_m: 0.0, ..hand(target, stiffness) };
         (0..steps(dt)).for_each(|_| {
             drag(&mut body, dt, pull).unwrap();
         });

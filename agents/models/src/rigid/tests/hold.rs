@@ -21,11 +21,11 @@ fn at(seconds: f64) -> SimTime {
     SimTime::ZERO + SimSpan::from_secs_f64(seconds).unwrap()
 }
 
-fn springs(stiffness_n_m: f64) -> Vec<Pull> {
+fn springs(stiffness_n_m: f64) -> Vec<AnchorSpring> {
     let corners = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
     let spring = |[b, c]: [f64; 2]| {
         let corner = DVec3::new(0.0, b * 0.03, c * 0.02);
-        Pull {
+        AnchorSpring {
             by: None,
             anchor: Anchor::Local(corner),
             target: corner + UP * (0.1 * G / (4.0 * stiffness_n_m)),
@@ -46,17 +46,17 @@ impl Held {
 
     /// The owner goes on by `h` seconds, through which it pushes evenly.
     fn push(&mut self, impulse: Impulse, h: f64) {
-        self.owner.open(&Surroundings::alone(OWNER, self.owner_time));
+        self.owner.open(&StepContext::alone(OWNER, self.owner_time));
         self.owner.give(ME, Site::Whole, 0.5 * h, impulse);
         self.owner_time += SimSpan::from_secs_f64(h).unwrap();
     }
 
-    fn step(&mut self, h: f64, hands: &[Pull]) {
+    fn step(&mut self, h: f64, hands: &[AnchorSpring]) {
         let mut owner = Snapshot { time: self.owner_time, ..Snapshot::default() };
         self.owner.write(&mut owner);
         let form = self.body.form();
         let neighbours = [Neighbour { form, ..Neighbour::seen(OWNER, Arc::new(owner)) }];
-        let around = Surroundings { me: ME, time: self.time, neighbours: &neighbours, hands, links: &[] };
+        let around = StepContext { me: ME, time: self.time, neighbours: &neighbours, hands, links: &[] };
         let dt = SimSpan::from_secs_f64(h).unwrap();
         self.body.step(dt, &around).unwrap();
         self.time += dt;
@@ -73,7 +73,7 @@ impl Held {
     fn expected(&self) -> (DVec3, DVec3, DVec3) {
         let mut other = Other::default();
         let seen = Neighbour::seen(ME, Arc::new(self.snapshot()));
-        assert!(other.meet(&seen, &Surroundings::alone(OWNER, self.owner_time), &self.owner, None));
+        assert!(other.meet(&seen, &StepContext::alone(OWNER, self.owner_time), &self.owner, None));
         let (place, _) = other.point(Anchor::Local(DVec3::ZERO)).unwrap();
         (place, other.velocities()[0], other.velocities()[1])
     }

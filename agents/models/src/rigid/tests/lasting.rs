@@ -5,7 +5,7 @@ use crate::harness::{Faults, Stage};
 use metachron_contact::{Exchange, Law, Link};
 use metachron_core::ToolState;
 use metachron_geometry::ToolShape;
-use metachron_geometry::{Form, FormKind};
+use metachron_geometry::{CollisionShape, ShapeKind};
 
 const RADIUS: f64 = 0.05;
 
@@ -152,7 +152,7 @@ impl Agent for Pusher {
         "instrument"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         self.exchange.open(around);
         let taken = &mut self.taken;
         self.exchange.take(around, around.time + dt, |_, _, sum, _| *taken += sum.linear);
@@ -161,16 +161,16 @@ impl Agent for Pusher {
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 
-    fn form(&self) -> Option<Arc<Form>> {
-        let kind = FormKind::Tool(ToolShape { shaft_radius_m: 5e-3, shaft_length_m: 0.3 });
-        Some(Arc::new(Form { kind, friction: 0.3, restitution: 0.0 }))
+    fn form(&self) -> Option<Arc<CollisionShape>> {
+        let kind = ShapeKind::Tool(ToolShape { shaft_radius_m: 5e-3, shaft_length_m: 0.3 });
+        Some(Arc::new(CollisionShape { kind, friction: 0.3, restitution: 0.0 }))
     }
 
     fn resolution(&self) -> Option<metachron_core::Resolution> {
         None
     }
 
-    fn retune(&mut self, _wanted: metachron_core::Resolution) {}
+    fn set_resolution(&mut self, _wanted: metachron_core::Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.body = Body::Tool(self.state);

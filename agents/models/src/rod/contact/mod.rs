@@ -11,7 +11,7 @@ mod static_contact;
 use super::company::Company;
 use glam::DVec3;
 use metachron_contact::{Contact, Solver};
-use metachron_core::Slots;
+use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase;
 use metachron_geometry::signed_distance::Ball;
 use metachron_geometry::{Obstacle, ShapeError};
@@ -141,7 +141,7 @@ impl TubeContacts {
     }
 
     /// Contacts in which fixed solids pressed in the last solve: slots and normal of each.
-    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
+    pub fn footholds(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
@@ -222,7 +222,7 @@ fn is_fixed(contact: &Contact) -> bool {
 
 /// Self-contact: facing points of two segments, and arms to the middle of the gap (eq. 20).
 fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
-    let mut slots = Slots::default();
+    let mut slots = ContactJacobian::default();
     for (side, sign) in [(0, 1.0), (1, -1.0)] {
         let (segment, share) = (meeting.segments[side] as usize, meeting.shares[side]);
         slots.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
@@ -247,7 +247,7 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
 
 /// Contact with a wall, at a node or inside a segment (eq. 21).
 fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
-    let mut slots = Slots::default();
+    let mut slots = ContactJacobian::default();
     let index = touch.index as usize;
     let arm = touch.normal * -touch.radius_m;
     if let Some(share) = touch.share {

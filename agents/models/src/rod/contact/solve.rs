@@ -6,8 +6,8 @@
 use super::{KIN, KIN_OWN, Skin, TubeContacts, node_slot, segment_slot};
 use crate::rod::banded_ldl::{Factor, Row};
 use crate::rod::company::Company;
-use crate::rod::discretization::Division;
-use crate::rod::state::Matter;
+use crate::rod::discretization::Discretization;
+use crate::rod::state::RodMaterial;
 use glam::DVec3;
 use metachron_contact::{Owner, Problem, Settings};
 
@@ -19,9 +19,9 @@ const SETTINGS: Settings = Settings { iterations: 300, tolerance_m_s: 1e-5 };
 #[derive(Clone, Copy)]
 pub(crate) struct Solved<'a> {
     /// The material.
-    pub matter: &'a Matter,
+    pub matter: &'a RodMaterial,
     /// The division.
-    pub division: &'a Division,
+    pub division: &'a Discretization,
     /// The matrix.
     pub rows: &'a [Row],
     /// Its factor.

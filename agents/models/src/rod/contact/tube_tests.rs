@@ -5,7 +5,7 @@ use crate::rod::Tube;
 use crate::rod::TubeSpec;
 use crate::rod::tests::{carried, millis, reference_spec, run};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 
@@ -54,7 +54,7 @@ fn a_dropped_tube_comes_to_rest_on_a_plane() {
         let mut time = SimTime::ZERO;
         let mut deepest = 0.0_f64;
         for _ in 0..500 {
-            tube.step(dt, &Surroundings::alone(AgentId(0), time)).unwrap();
+            tube.step(dt, &StepContext::alone(AgentId(0), time)).unwrap();
             time += dt;
             // the push-out of the depth that a landing leaves may lift: its weight times a millimetre at most
             let slack = tube.mass_kg() * 9.81 * 1e-4;
@@ -96,7 +96,7 @@ fn a_tube_that_lies_on_a_plane_falls_asleep() {
     let dt = millis(4.0);
     let mut time = SimTime::ZERO;
     let slept = (0..1500).any(|_| {
-        let report = tube.step(dt, &Surroundings::alone(AgentId(0), time)).unwrap();
+        let report = tube.step(dt, &StepContext::alone(AgentId(0), time)).unwrap();
         time += dt;
         report.at_rest
     });
@@ -232,7 +232,7 @@ fn a_folded_tube_comes_to_rest_on_itself() {
         Tube::new(TubeSpec { damping_per_s: 2.0, sleep: true, ..hairpin(5e4, GRAVITY).spec().clone() }).unwrap();
     let mut time = SimTime::ZERO;
     let slept = (0..2500).any(|_| {
-        let report = tube.step(millis(4.0), &Surroundings::alone(AgentId(0), time)).unwrap();
+        let report = tube.step(millis(4.0), &StepContext::alone(AgentId(0), time)).unwrap();
         time += millis(4.0);
         report.at_rest
     });

@@ -21,18 +21,18 @@ mod tools;
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Exchange;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{
     Body, Bounds, Inertia, Resolution, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport,
 };
 use metachron_geometry::Solid;
-use metachron_geometry::{Form, FormKind, SolidForm};
+use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use std::sync::Arc;
 
 /// A solid that owns no pair: it takes what it is given, exactly.
 #[derive(Clone)]
 pub struct Prop {
-    form: Arc<Form>,
+    form: Arc<CollisionShape>,
     exchange: Exchange,
     state: RigidState,
     mass_kg: f64,
@@ -53,10 +53,10 @@ pub struct Prop {
 impl Prop {
     /// A solid of this mass (infinite: immovable) at `position`, the same about every axis.
     pub fn new(solid: Solid, mass_kg: f64, position: DVec3, friction: f64) -> Self {
-        let form = SolidForm::new(solid, DVec3::ZERO).unwrap();
+        let form = SolidShape::new(solid, DVec3::ZERO).unwrap();
         let moment = 0.4 * mass_kg * form.radius_m * form.radius_m;
         Self {
-            form: Arc::new(Form { kind: FormKind::Solid(form), friction, restitution: 0.0 }),
+            form: Arc::new(CollisionShape { kind: ShapeKind::Solid(form), friction, restitution: 0.0 }),
             exchange: Exchange::default(),
             state: RigidState { position, ..RigidState::default() },
             mass_kg,
@@ -79,7 +79,7 @@ impl Prop {
         self.mass_kg.is_infinite()
     }
 
-    fn receive(&mut self, around: &Surroundings<'_>, until: SimTime) {
+    fn receive(&mut self, around: &StepContext<'_>, until: SimTime) {
         let wi = self.inverse_inertia();
         let Self { exchange, state, given, mass_kg, .. } = self;
         let w = mass_kg.recip();
@@ -113,7 +113,7 @@ impl Agent for Prop {
         "instrument"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
         let h = dt.as_secs_f64();
         self.receive(around, around.time + dt);
         if !self.is_held() {
@@ -133,7 +133,7 @@ impl Agent for Prop {
         None
     }
 
-    fn retune(&mut self, _wanted: Resolution) {}
+    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
@@ -151,7 +151,7 @@ impl Agent for Prop {
             into.acceleration = self.acceleration;
             Inertia::Rigid { inverse_mass: self.mass_kg.recip(), inverse_inertia: self.inverse_inertia() }
         };
-        let FormKind::Solid(solid) = &self.form.kind else { unreachable!("made of a solid") };
+        let ShapeKind::Solid(solid) = &self.form.kind else { unreachable!("made of a solid") };
         let speed_m_s = self.state.velocity.length() + self.state.spin.length() * solid.radius_m;
         let (at, reach) = (self.state.position, DVec3::splat(solid.radius_m));
         into.bounds = Some(Bounds { low: at - reach, high: at + reach, speed_m_s });
@@ -171,7 +171,7 @@ impl Agent for Prop {
         self.mass_kg
     }
 
-    fn form(&self) -> Option<Arc<Form>> {
+    fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
     }
 }

@@ -82,7 +82,7 @@ fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
         for _ in 0..960 {
             unwatched.steps = 0; // none of the first is made twice
             for (tube, work) in [(&mut tube, &mut work), (&mut unwatched, &mut plain)] {
-                let around = Surroundings::alone(AgentId(0), SimTime::ZERO);
+                let around = StepContext::alone(AgentId(0), SimTime::ZERO);
                 *work += tube.step(millis(dt_ms), &around).unwrap().work;
             }
         }
@@ -98,7 +98,7 @@ fn alike_tubes_do_not_make_their_dear_steps_at_once() {
     for dear in &mut dear {
         // all move alike: a step of one that takes more than the least of all is made twice
         let step = |(tube, me): (&mut Tube, AgentId)| {
-            tube.step(millis(2.0), &Surroundings::alone(me, SimTime::ZERO)).unwrap().work
+            tube.step(millis(2.0), &StepContext::alone(me, SimTime::ZERO)).unwrap().work
         };
         let work: Vec<f64> = tubes.iter_mut().zip((0..).map(AgentId)).map(step).collect();
         let least = work.iter().copied().fold(f64::INFINITY, f64::min);

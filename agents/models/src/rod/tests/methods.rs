@@ -1,7 +1,7 @@
 //! Every integrator of the tube, against independent answers.
 
 use super::anchor_springs::Tie;
-use super::state::Config;
+use super::state::RodState;
 use super::step::{Setting, Stepper};
 use super::*;
 use glam::DVec3;
@@ -124,7 +124,7 @@ fn the_explicit_limit_lies_just_below_where_the_tube_blows_up() {
             tube.set_state(state);
             let start = tube.energy_j();
             // past the refusal: the stepper itself takes any span
-            let whole = |stepper: &mut Stepper, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie]| {
+            let whole = |stepper: &mut Stepper, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]| {
                 stepper.step(now, &Setting { longest_s: f64::INFINITY, ..*setting }, ties)
             };
             let steps = (0..3000).take_while(|_| {
@@ -145,7 +145,7 @@ fn a_step_that_is_too_long_is_refused_and_leaves_every_bit() {
     for integrator in [Integrator::SymplecticEuler, Integrator::Xpbd] {
         let mut tube = Tube::new(TubeSpec { integrator, ..reference_spec(1e6, 16) }).unwrap();
         let limit_s = tube.longest_substep_s().unwrap();
-        let (before, around) = (tube.state().x.clone(), Surroundings::alone(AgentId(0), SimTime::ZERO));
+        let (before, around) = (tube.state().x.clone(), StepContext::alone(AgentId(0), SimTime::ZERO));
         let error = tube.step(millis(1.01e3 * limit_s), &around).unwrap_err();
         assert!(matches!(error, metachron_core::StepError::Unstable { segments: 16, .. }), "{error}");
         assert!(error.to_string().contains(integrator.name()), "{error}");
@@ -189,7 +189,7 @@ fn the_work_of_a_step_is_what_was_solved_for_it() {
         let spec = TubeSpec { integrator, gravity: DVec3::NEG_Z * 9.81, ..reference_spec(1e5, 16) };
         let mut tube = Tube::new(TubeSpec { pin: [true, false], ..spec }).unwrap();
         for _ in 0..40 {
-            let report = tube.step(millis(0.2), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+            let report = tube.step(millis(0.2), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
             let solves = report.work / 16.0 / f64::from(report.substeps);
             assert!((least..=most).contains(&solves), "{}: {solves} solves a substep", integrator.name());
         }

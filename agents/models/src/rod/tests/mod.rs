@@ -10,10 +10,10 @@ mod statics;
 mod strained;
 mod violent;
 
-use super::state::Config;
+use super::state::RodState;
 use super::*;
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime};
 
 /// The reference tube of `tests/reference/cosserat_tube.json` with this modulus, along +x from the origin, 1 m.
@@ -45,7 +45,7 @@ pub fn carried(spec: TubeSpec, dt_ms: f64) -> TubeSpec {
 }
 
 /// A state of `tube` moved and turned at random (a fixed sequence), strains up to date.
-pub fn shake(tube: &Tube, seed: u64) -> Config {
+pub fn shake(tube: &Tube, seed: u64) -> RodState {
     let mut random = Random(seed);
     let mut state = tube.state().clone();
     state.u.iter_mut().for_each(|u| *u = random.vector() * 2.0);
@@ -82,7 +82,7 @@ pub fn run(tube: &mut Tube, dt_ms: f64, seconds: f64) -> u32 {
     let mut time = SimTime::ZERO;
     let mut substeps = 0;
     for _ in 0..steps {
-        substeps += tube.step(dt, &Surroundings::alone(AgentId(0), time)).unwrap().substeps;
+        substeps += tube.step(dt, &StepContext::alone(AgentId(0), time)).unwrap().substeps;
         time += dt;
     }
     substeps

@@ -2,7 +2,7 @@
 
 use super::*;
 use glam::{DQuat, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::Snapshot;
 
 fn snapshot(tube: &Tube) -> Snapshot {
@@ -129,7 +129,7 @@ fn the_same_calls_give_the_same_bits() {
         spec.gravity = DVec3::new(1.0, 2.0, -9.81);
         let mut tube = Tube::new(spec).unwrap();
         run(&mut tube, 20.0, 1.0);
-        tube.retune(Resolution { eps_m: 0.013, n: 2 });
+        tube.set_resolution(Resolution { eps_m: 0.013, n: 2 });
         run(&mut tube, 7.0, 0.7);
         snapshot(&tube).fold_hash(metachron_core::HASH_START)
     };
@@ -143,13 +143,13 @@ fn a_refused_step_leaves_every_bit() {
     tube.set_state(state);
     let before = snapshot(&tube).fold_hash(metachron_core::HASH_START);
     for bad in [SimSpan::ZERO, SimSpan::from_secs_f64(2.0).unwrap()] {
-        assert!(tube.step(bad, &Surroundings::alone(AgentId(0), SimTime::ZERO)).is_err());
+        assert!(tube.step(bad, &StepContext::alone(AgentId(0), SimTime::ZERO)).is_err());
         assert_eq!(snapshot(&tube).fold_hash(metachron_core::HASH_START), before);
     }
 }
 
-fn pull(arc_m: f64, target: DVec3) -> Pull {
-    Pull {
+fn pull(arc_m: f64, target: DVec3) -> AnchorSpring {
+    AnchorSpring {
         by: None,
         anchor: metachron_core::Anchor::Arc(arc_m),
         target,
@@ -170,7 +170,7 @@ fn published_force_moves(integrator: Integrator) {
     let mut time = SimTime::ZERO;
     for _ in 0..100 {
         let before = tube.momentum().0;
-        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
         tube.step(millis(8.0), &around).unwrap();
         let force: DVec3 = snapshot(&tube).grips.iter().map(|g| g.force_n).sum();
         let gained = (tube.momentum().0 - before) / 8e-3;
@@ -189,7 +189,7 @@ fn a_tube_held_by_a_spring_hangs_where_its_weight_says() {
     let hands = [pull(0.5, DVec3::new(0.5, 0.0, 0.0))];
     let mut time = SimTime::ZERO;
     for _ in 0..2000 {
-        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
         tube.step(millis(10.0), &around).unwrap();
         time += millis(10.0);
     }
@@ -227,13 +227,13 @@ fn a_tube_at_rest_says_so_and_wakes_when_pulled() {
     let mut time = SimTime::ZERO;
     let mut asleep = false;
     for _ in 0..1500 {
-        asleep = tube.step(millis(10.0), &Surroundings::alone(AgentId(0), time)).unwrap().at_rest;
+        asleep = tube.step(millis(10.0), &StepContext::alone(AgentId(0), time)).unwrap().at_rest;
         time += millis(10.0);
         assert!(!asleep || time > SimTime::from_nanos(500_000_000));
     }
     assert!(asleep);
     let hands = [pull(1.0, DVec3::new(1.0, 0.0, 0.0))];
-    let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+    let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
     assert!(!tube.step(millis(10.0), &around).unwrap().at_rest);
 }
 
@@ -270,8 +270,8 @@ fn the_inverse_mass_of_a_point_says_what_a_pull_does_to_it() {
     assert_eq!(still.inverse_mass(0.7), None);
     run(&mut still, 4.0, 0.004);
     // a spring so soft and far that it is a force of 1 mN along y
-    let hands = [Pull { stiffness_n_m: 1e-9, damping_n_s_m: 0.0, ..pull(0.7, DVec3::new(0.7, 1e6, 0.0)) }];
-    let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+    let hands = [AnchorSpring { stiffness_n_m: 1e-9, damping_n_s_m: 0.0, ..pull(0.7, DVec3::new(0.7, 1e6, 0.0)) }];
+    let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
     pulled.step(millis(4.0), &around).unwrap();
     let moved = snapshot(&pulled).body.point(metachron_core::Anchor::Arc(0.7)).unwrap().1;
     let want = still.inverse_mass(0.7).unwrap() * DVec3::Y * 1e-3 * 4e-3;

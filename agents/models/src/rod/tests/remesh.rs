@@ -26,7 +26,7 @@ fn moving(segments: usize, seed: u64, held: [bool; 2]) -> Tube {
 
 fn retuned(tube: &Tube, segments: usize) -> Tube {
     let mut other = tube.clone();
-    other.retune(Resolution { eps_m: 1.0 / segments as f64, n: 1 });
+    other.set_resolution(Resolution { eps_m: 1.0 / segments as f64, n: 1 });
     other
 }
 
@@ -92,7 +92,7 @@ fn a_stress_free_curved_tube_stays_stress_free() {
     let mut tube = Tube::new(spec).unwrap();
     for segments in [80, 13, 200, 40] {
         let length = tube.length_m();
-        tube.retune(Resolution { eps_m: length / segments as f64, n: 1 });
+        tube.set_resolution(Resolution { eps_m: length / segments as f64, n: 1 });
         assert_eq!(tube.segments(), segments);
         assert!(tube.energy_j() < 1e-18, "{segments}: {} J", tube.energy_j()); // rounding, squared, times EA
     }
@@ -123,11 +123,11 @@ fn a_fixed_spacing_is_never_divided_anew_and_odd_wishes_get_the_nearest() {
     let mut spec = reference_spec(1e6, 10);
     spec.range = ResolutionRange { eps_m: (0.05, 0.05), n: (0, 5) };
     let mut fixed = Tube::new(spec).unwrap();
-    fixed.retune(Resolution { eps_m: 0.01, n: 4 });
+    fixed.set_resolution(Resolution { eps_m: 0.01, n: 4 });
     assert_eq!((fixed.segments(), fixed.resolution().unwrap().n), (10, 4));
     let mut tube = free_tube(10);
     for (eps_m, segments) in [(f64::NAN, 2), (1e9, 2), (0.0, SEGMENTS_MAX), (-1.0, SEGMENTS_MAX), (0.25, 4)] {
-        tube.retune(Resolution { eps_m, n: 1 });
+        tube.set_resolution(Resolution { eps_m, n: 1 });
         assert_eq!(tube.segments(), segments, "{eps_m}");
         run(&mut tube, 10.0, 0.02);
     }

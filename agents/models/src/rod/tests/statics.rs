@@ -90,7 +90,7 @@ fn a_cantilever_with_a_load_at_its_tip_is_the_elastica() {
         spec.damping_per_s = 6.0;
         let load = alpha * spec.section.ei_n_m2;
         // a spring so soft and far away that it is a dead load to 1e-9
-        let hand = metachron_contact::Pull {
+        let hand = metachron_contact::AnchorSpring {
             by: None,
             anchor: metachron_core::Anchor::Arc(1.0),
             target: DVec3::NEG_Z * (load * 1e9),
@@ -100,7 +100,7 @@ fn a_cantilever_with_a_load_at_its_tip_is_the_elastica() {
         };
         let mut tube = Tube::new(spec).unwrap();
         for _ in 0..1000 {
-            let around = Surroundings { hands: &[hand], ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+            let around = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
             tube.step(millis(10.0), &around).unwrap();
         }
         let error = (*tube.state().x.last().unwrap() - want).length();

@@ -50,11 +50,11 @@ fn a_twist_survives_a_change_of_division() {
     let mut tube = Tube::new(twisted(3.0, 20)).unwrap();
     let before = tube.energy_j();
     for count in [60.0, 11.0, 33.0] {
-        tube.retune(Resolution { eps_m: 1.0 / count, n: 3 });
+        tube.set_resolution(Resolution { eps_m: 1.0 / count, n: 3 });
         assert!((tube.energy_j() / before - 1.0).abs() < 1e-12, "{count} segments: {}", tube.energy_j());
     }
     // no joint is ever turned past 60°, however coarse the division that is asked for
-    tube.retune(Resolution { eps_m: 1.0, n: 3 });
+    tube.set_resolution(Resolution { eps_m: 1.0, n: 3 });
     assert!(tube.segments() >= 3 && (tube.energy_j() / before - 1.0).abs() < 1e-12);
 }
 

@@ -66,7 +66,7 @@ fn of_many_steps_a_twenty_fourth_is_made_again() {
         let mut body = shaken(shape);
         let (mut work, mut plain) = (0.0, 0.0);
         for _ in 0..960 {
-            let report = body.step(dt(1e-3), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+            let report = body.step(dt(1e-3), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
             work += report.work;
             plain += body.work() * f64::from(report.substeps);
         }

@@ -32,7 +32,7 @@ fn told(body: &SoftBody) -> SoftInertia {
 fn a_step_that_was_divided_foretells_a_whole_one() {
     let h = 1.0 / 60.0;
     let beside = [another(false, 0.0)];
-    let around = Surroundings { neighbours: &beside, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+    let around = StepContext { neighbours: &beside, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
     let mut shaken = shaken(BALL);
     shaken.velocities.iter_mut().for_each(|v| *v *= 100.0);
     let report = shaken.step(dt(h), &around).unwrap();
@@ -65,7 +65,7 @@ fn who_pushes_a_soft_body_is_no_farther_ahead_of_it_than_it_foretells() {
         [(1e-3, 0.9e-3, false), (1e-3, 1.1e-3, true), (0.01, 0.009, false), (0.01, 0.011, true), (0.0, 0.018, false)]
     {
         let time = SimTime::ZERO + dt(ahead_s);
-        let around = Surroundings { links: &link, ..Surroundings::alone(AgentId(0), time) };
+        let around = StepContext { links: &link, ..StepContext::alone(AgentId(0), time) };
         let neighbour = another(true, told_s);
         let found = leaves_behind(&neighbour, (dt(1.0 / 60.0), neighbour.step_s), &around, || None);
         assert_eq!(found, waits, "{ahead_s} s ahead of steps of {told_s} s");

@@ -6,7 +6,7 @@ use crate::rigid::RigidBody;
 use crate::rigid::RigidSpec;
 use crate::rod::Tube;
 use crate::rod::{Material, Section, TubeSpec};
-use metachron_contact::{Agent, Pull};
+use metachron_contact::{Agent, AnchorSpring};
 use metachron_contact::{Law, Link};
 use metachron_core::Anchor;
 use metachron_geometry::Solid;
@@ -127,8 +127,9 @@ fn ball_hangs(rates: Option<(f64, f64)>) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     let mut note = |way_m: f64| range = [range[0].min(way_m), range[1].max(way_m)];
     let Some(rates) = rates else {
-        let hands = [Pull { by: None, anchor, target: at, target_velocity: DVec3::ZERO, stiffness_n_m, damping_n_s_m }];
-        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+        let hands =
+            [AnchorSpring { by: None, anchor, target: at, target_velocity: DVec3::ZERO, stiffness_n_m, damping_n_s_m }];
+        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
         for step in 0..720 {
             ball.step(dt(1.0 / 240.0), &around).unwrap();
             if step > 360 {

@@ -174,7 +174,7 @@ fn what_falls_on_the_ground_comes_to_rest() {
         let made = SoftSpec { gravity: G, obstacles: [floor()].into(), position: DVec3::Z * 0.15, sleep: true, ..spec };
         let mut body = SoftBody::new(made).unwrap();
         let slept = (0..1000).any(|_| {
-            let around = Surroundings::alone(AgentId(0), SimTime::ZERO);
+            let around = StepContext::alone(AgentId(0), SimTime::ZERO);
             body.step(dt(0.005), &around).unwrap().at_rest
         });
         let lowest = state(&body).positions.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);

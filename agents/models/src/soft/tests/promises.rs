@@ -3,7 +3,7 @@
 use super::*;
 use crate::conformance::fall_deviation;
 use crate::conformance::{Suite, check};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
 
 #[test]
@@ -14,7 +14,7 @@ fn every_promise_of_an_agent_is_kept() {
             Box::new(made) as Box<dyn Agent>
         };
         let fall = |agent: &dyn Agent, t: f64| fall_deviation(agent, G, t);
-        let pull = Pull {
+        let pull = AnchorSpring {
             by: None,
             anchor: Anchor::Vertex(7),
             target: DVec3::new(0.1, 0.1, 0.1),
@@ -22,7 +22,7 @@ fn every_promise_of_an_agent_is_kept() {
             stiffness_n_m: 10.0,
             damping_n_s_m: 0.1,
         };
-        let absurd = [1e300, f64::NAN, f64::INFINITY].map(|x| Pull { target: DVec3::X * x, ..pull }).to_vec();
+        let absurd = [1e300, f64::NAN, f64::INFINITY].map(|x| AnchorSpring { target: DVec3::X * x, ..pull }).to_vec();
         let count = |f: &mut dyn FnMut()| allocation_counter::measure(f).count_total;
         let suite = Suite {
             steps: 60,

@@ -1,8 +1,8 @@
 //! Where the skins of two soft bodies touch: flat faces, whose gaps are known.
 
 use super::*;
-use metachron_geometry::narrow_phase::{TouchRoom, touches};
-use metachron_geometry::{Form, Placed, Touch, View};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{CollisionShape, PlacedShape, ShapePose, Touch};
 use proptest::prelude::*;
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ const LEFT_M: f64 = 5e-5;
 const STRAIGHT: f64 = 0.98;
 
 /// A skin where it stands, all of it turned by `turn` about the upright through `middle`.
-fn skin(shape: SoftShape, (middle, turn): (DVec3, f64)) -> (Arc<Form>, Vec<DVec3>) {
+fn skin(shape: SoftShape, (middle, turn): (DVec3, f64)) -> (Arc<CollisionShape>, Vec<DVec3>) {
     let body = SoftBody::new(spec(shape)).unwrap();
     let rest = state(&body).positions;
     let (low, high) = metachron_geometry::bounds(&rest);
@@ -23,14 +23,14 @@ fn skin(shape: SoftShape, (middle, turn): (DVec3, f64)) -> (Arc<Form>, Vec<DVec3
     (body.form().unwrap(), rest.iter().map(|x| middle + turn * (*x - 0.5 * (low + high))).collect())
 }
 
-fn slab(size_m: DVec3, segments: [u32; 3], place: (DVec3, f64)) -> (Arc<Form>, Vec<DVec3>) {
+fn slab(size_m: DVec3, segments: [u32; 3], place: (DVec3, f64)) -> (Arc<CollisionShape>, Vec<DVec3>) {
     skin(SoftShape::Box { size_m, segments }, place)
 }
 
 /// Every place of the two, and that the other side sees the same.
-fn met(a: &(Arc<Form>, Vec<DVec3>), b: &(Arc<Form>, Vec<DVec3>)) -> Vec<Touch> {
-    let placed = [a, b].map(|(form, positions)| Placed { form, view: View::Surface(positions) });
-    let (mut room, mut list) = (TouchRoom::default(), vec![]);
+fn met(a: &(Arc<CollisionShape>, Vec<DVec3>), b: &(Arc<CollisionShape>, Vec<DVec3>)) -> Vec<Touch> {
+    let placed = [a, b].map(|(form, positions)| PlacedShape { form, view: ShapePose::Surface(positions) });
+    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
     touches(&placed[0], &placed[1], REACH_M, &mut room, &mut list);
     list
 }

@@ -7,7 +7,7 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, slender_tube};
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
 
@@ -56,7 +56,7 @@ fn at(play: &Play, arc_m: f64) -> DVec3 {
 }
 
 /// Two opposite pulls across the lever piece whose moment about y bends the tube upwards.
-fn couple(play: &Play, moment: f64) -> [Pull; 2] {
+fn couple(play: &Play, moment: f64) -> [AnchorSpring; 2] {
     let lever = at(play, 1.0 + LEVER) - at(play, 1.0);
     let force = DVec3::NEG_Y.cross(lever) * (moment / lever.length_squared());
     [dead_load(1.0, -force), dead_load(1.0 + LEVER, force)]

@@ -7,7 +7,7 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, metre, reference_tube, slender_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::CurveState;
 use metachron_models::rod::Integrator;
 use metachron_models::rod::TubeSpec;
@@ -93,7 +93,7 @@ impl Mode {
     }
 
     /// Pulls at every node that excite the mode.
-    fn hands(&self, spec: &TubeSpec, nodes: u32) -> Vec<Pull> {
+    fn hands(&self, spec: &TubeSpec, nodes: u32) -> Vec<AnchorSpring> {
         let axis = if self.kind == Kind::Axial { DVec3::X } else { DVec3::Z };
         let force = PULLED_M * spec.mass_per_length_kg_m * (TAU * self.hz(spec)).powi(2) / f64::from(nodes);
         let at = |k: u32| f64::from(k) / f64::from(nodes);

@@ -7,7 +7,7 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, slender_tube};
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_models::rod::Integrator;
 use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
@@ -51,7 +51,7 @@ impl Benchmark for Helix {
         let mut play = Play::new(spec, case)?;
         let length_m = play.curve().arc_m.last().copied()?;
         let share = length_m / f64::from(TURNS);
-        let hands: Vec<Pull> = (0..HANDS)
+        let hands: Vec<AnchorSpring> = (0..HANDS)
             .map(|k| length_m - share * (f64::from(k) + 0.5) / f64::from(HANDS))
             .map(|arc_m| dead_load(arc_m, DVec3::Z * (load_n / f64::from(HANDS))))
             .collect();

@@ -7,7 +7,7 @@ use super::super::stability::common::plain_tube;
 use super::diagram::Case;
 use cpu_time::ThreadTime;
 use glam::DVec3;
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
@@ -72,12 +72,12 @@ impl Play {
     }
 
     /// Steps on for `seconds` under `hands`; whether every step succeeded.
-    pub(super) fn run(&mut self, seconds: f64, hands: &[Pull]) -> bool {
+    pub(super) fn run(&mut self, seconds: f64, hands: &[AnchorSpring]) -> bool {
         let until = self.time.as_secs_f64() + seconds - 0.5 * self.dt.as_secs_f64();
         let start = ThreadTime::now();
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
-            let around = Surroundings { hands, ..Surroundings::alone(AgentId(0), self.time) };
+            let around = StepContext { hands, ..StepContext::alone(AgentId(0), self.time) };
             match self.agent.step(self.dt, &around) {
                 Ok(report) => self.substeps += u64::from(report.substeps),
                 Err(_) => sound = false,

@@ -4,7 +4,7 @@
 
 use super::super::stability::common::{GRAVITY, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Grasp, SimSpan, SimTime, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
@@ -95,6 +95,6 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
 
 /// One step among `neighbours`; `None` where it fails.
 pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
-    let around = Surroundings { neighbours, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+    let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
     tube.step(dt, &around).ok().map(drop)
 }

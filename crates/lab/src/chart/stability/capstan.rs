@@ -9,7 +9,7 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
@@ -188,7 +188,7 @@ fn slips_at(case: &Case) -> Option<f64> {
         }
         let on = (t / (0.5 * SETTLE_S)).min(1.0);
         let hands = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
-        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
         tube.step(dt, &around).ok()?;
         time += dt;
         tube.write_snapshot(&mut snapshot);

@@ -1,7 +1,7 @@
 //! Shared parts of the stability experiments: plain bodies and tubes, and loads.
 
 use glam::DVec3;
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
@@ -22,9 +22,9 @@ pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) 
 }
 
 /// A constant force on the point of a tube at a rest arc length: a spring so soft and long that motion does not change its force.
-pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> Pull {
+pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> AnchorSpring {
     const STIFFNESS_N_M: f64 = 1e-9;
-    Pull {
+    AnchorSpring {
         by: None,
         anchor: Anchor::Arc(arc_m),
         target: force_n / STIFFNESS_N_M,

@@ -10,11 +10,11 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
+use metachron_contact::AnchorSpring;
 use metachron_contact::Law;
-use metachron_contact::Pull;
 use metachron_core::{AgentId, Anchor};
 use metachron_geometry::Solid;
-use metachron_geometry::narrow_phase::TouchRoom;
+use metachron_geometry::narrow_phase::NarrowPhaseScratch;
 use metachron_models::rigid::RigidSpec;
 use serde::{Deserialize, Serialize};
 
@@ -232,9 +232,9 @@ pub(super) struct Pair {
 }
 
 /// A fixed spring at a point of the mounted body, one of `count` that share its load.
-fn mount(at: DVec3, count: f64) -> Pull {
+fn mount(at: DVec3, count: f64) -> AnchorSpring {
     let sag = DVec3::Z * (MOUNTED_KG * GRAVITY / MOUNT_N_M);
-    Pull {
+    AnchorSpring {
         by: None,
         anchor: Anchor::Local(at),
         target: at + sag,
@@ -286,7 +286,7 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
     let start_j = play.raw_j() - zero_j;
     let mut out = Fall { raw: 1.0, common: 1.0, momentum_error: 0.0, depth_m: 0.0 };
     let mut given = [Given::default(); 2];
-    let (mut room, mut pages) = (TouchRoom::default(), 0_u32);
+    let (mut room, mut pages) = (NarrowPhaseScratch::default(), 0_u32);
     let gravity = DVec3::NEG_Z * GRAVITY;
     let ended = play.run(SECONDS, |play, who| {
         let at = play.time();

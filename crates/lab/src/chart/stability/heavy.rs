@@ -5,7 +5,7 @@
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use super::super::lockstep_run::Company;
+use super::super::lockstep_run::LockstepRun;
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
@@ -213,7 +213,7 @@ fn stacked(case: &Case) -> Option<Went> {
         let spec = RigidSpec { friction: 0.5, gravity, obstacles: [ground.clone()].into(), ..plain };
         spawns.push(AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
     }
-    let mut company = Company::start(spawns).ok()?;
+    let mut company = LockstepRun::start(spawns).ok()?;
     company.run_to(SECONDS);
     let states: Vec<RigidState> = company.snapshots().iter().filter_map(|s| rigid(s)).collect();
     let top = states.last()?.position.z;
@@ -246,7 +246,7 @@ fn hung(case: &Case) -> Option<Went> {
         one.together = (i > 0).then_some(AgentId(0));
         spawns.push(one);
     }
-    let mut company = Company::start(spawns).ok()?;
+    let mut company = LockstepRun::start(spawns).ok()?;
     let mut went = Went { value: 0.0, aside_m: 0.0, gain: 0.0, led: 0 };
     let length = 2.0 * HALF_LINK_M * f64::from(LINKS);
     let scale = GRAVITY * length * (case.ratio + 0.5 * f64::from(LINKS - 1));

@@ -2,7 +2,7 @@
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::lockstep_run::{Company, members};
+use super::super::lockstep_run::{LockstepRun, members};
 use super::super::table::Table;
 use super::common::plain_body;
 use glam::DVec3;
@@ -185,7 +185,7 @@ fn meet(case: &Case) -> Option<Met> {
         AgentSpawn::alone("hitting", Box::new(hitting), rate_hitting),
         AgentSpawn::alone("hit", Box::new(hit), rate_hit),
     ];
-    let mut company = Company::start(spawns).ok()?;
+    let mut company = LockstepRun::start(spawns).ok()?;
     company.run_to(SECONDS);
     let snapshots = company.snapshots();
     let members = members(&snapshots);

@@ -5,7 +5,7 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
@@ -139,7 +139,7 @@ fn slid(case: &Case, angle: f64) -> Option<f64> {
     let dt = SimSpan::from_secs_f64(DT_S)?;
     let mut time = SimTime::ZERO;
     while time.as_secs_f64() < SECONDS - 0.5 * DT_S {
-        agent.step(dt, &Surroundings::alone(AgentId(0), time)).ok()?;
+        agent.step(dt, &StepContext::alone(AgentId(0), time)).ok()?;
         time += dt;
     }
     Some((middle(&*agent)? - before).dot(down))

@@ -10,7 +10,7 @@ use super::super::table::Table;
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
 use glam::DVec3;
-use metachron_contact::{Agent, Surroundings};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
@@ -206,7 +206,7 @@ fn fall(case: &Case) -> Fall {
     let start_j = tube.energy_j();
     let (mut time, mut steps, mut substeps) = (SimTime::ZERO, 0_u32, 0_u32);
     while time.as_secs_f64() < SECONDS {
-        match tube.step(dt, &Surroundings::alone(AgentId(0), time)) {
+        match tube.step(dt, &StepContext::alone(AgentId(0), time)) {
             Ok(report) => substeps += report.substeps,
             Err(error) => {
                 out.refused = steps == 0 && matches!(error, StepError::Unstable { .. });

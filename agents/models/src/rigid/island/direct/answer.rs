@@ -7,7 +7,7 @@ use super::super::member::Member;
 use super::newton::Newton;
 use super::row::{Law, Mass, NOBODY, Row, Twist};
 use glam::DVec3;
-use metachron_core::Six;
+use metachron_core::Mat6;
 
 /// The answers in a step.
 #[derive(Default)]
@@ -49,7 +49,7 @@ impl Answers {
             let (who, columns) = &mut self.columns[self.count];
             self.count += 1;
             *who = index;
-            let mut answer = Six::ZERO;
+            let mut answer = Mat6::ZERO;
             for (axis, column) in columns.iter_mut().enumerate() {
                 column.clear();
                 column.resize(6 * bodies, 0.0);

@@ -6,7 +6,7 @@ use super::super::member::Member;
 use super::near::Contact;
 use super::row::{Law, Mass, NOBODY, Row, Twist};
 use glam::{DMat3, DVec3};
-use metachron_core::Six;
+use metachron_core::Mat6;
 
 /// A spring softer than this, as ω²h² of what it pulls, is a force at both ends of the part: it then keeps its energy.
 const SOFT: f64 = 0.1;
@@ -52,7 +52,7 @@ pub(super) fn push(members: &mut [Member], row: &Row, impulse: f64) {
 /// column of L.
 pub(super) fn spring_rows(members: &[Member], free: &[Twist], into: &mut Vec<Row>) {
     for (index, (member, free)) in members.iter().zip(free).enumerate() {
-        for [lin, turn] in member.springs.iter().flat_map(Six::roots) {
+        for [lin, turn] in member.springs.iter().flat_map(Mat6::roots) {
             let bias = -lin.dot(free[0]) - turn.dot(free[1]);
             let law = Law::Spring(1.0);
             let a = index as u32;

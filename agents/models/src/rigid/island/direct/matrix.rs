@@ -5,13 +5,13 @@
 use super::order::Order;
 use super::row::{Mass, NOBODY, Row};
 use glam::DVec3;
-use metachron_core::skyline_cholesky::Envelope;
+use metachron_core::skyline_cholesky::SkylineCholesky;
 
 /// A symmetric positive matrix over the velocities of all bodies; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Matrix {
     order: Order,
-    envelope: Envelope<6>,
+    envelope: SkylineCholesky<6>,
     /// For each place the lowest place that it is joined to.
     first: Vec<u32>,
     ordered: Vec<f64>,
@@ -32,7 +32,7 @@ impl Matrix {
 
     /// What its factorisation costs, in products.
     pub(super) fn work(&self) -> usize {
-        Envelope::<6>::work(&self.first)
+        SkylineCholesky::<6>::work(&self.first)
     }
 
     /// Begins anew with the masses alone.

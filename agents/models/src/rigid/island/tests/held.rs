@@ -20,7 +20,7 @@ fn chain(links: u32, ratio: f64, along: DVec3, (stiffness_n_m, damping_n_s_m): (
         anchor_b_m: DVec3::Z * -0.05,
         ..Joint::new(AgentId(i), Some(AgentId(i - 1)), JointKind::Spherical)
     });
-    let hand = Pull {
+    let hand = AnchorSpring {
         by: None,
         anchor: Anchor::Local(DVec3::Z * 0.05),
         target: DVec3::ZERO,
@@ -115,7 +115,7 @@ impl Hanging {
                 let link = Snapshot { time: self.party.time, ..self.party.snapshot(0) };
                 let form = self.party.bodies[0].form();
                 let near = [Neighbour { form, ..Neighbour::seen(AgentId(0), Arc::new(link)) }];
-                let around = Surroundings { neighbours: &near, ..Surroundings::alone(TOOL, self.time) };
+                let around = StepContext { neighbours: &near, ..StepContext::alone(TOOL, self.time) };
                 let dt = SimSpan::from_secs_f64(tool_s).unwrap();
                 self.tool.step(dt, &around).unwrap();
                 self.time += dt;

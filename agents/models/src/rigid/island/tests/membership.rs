@@ -35,7 +35,7 @@ fn a_body_enters_and_leaves_without_a_jump() {
     third = party.bodies.pop().unwrap();
     party.run(0.01, 0.1);
     assert_eq!(still(&third).0, before, "who has left is not moved by the others");
-    let alone = third.step(SimSpan::from_secs_f64(0.01).unwrap(), &Surroundings::alone(AgentId(2), SimTime::ZERO));
+    let alone = third.step(SimSpan::from_secs_f64(0.01).unwrap(), &StepContext::alone(AgentId(2), SimTime::ZERO));
     alone.unwrap();
 }
 
@@ -86,9 +86,9 @@ fn a_companion_that_is_lost_leaves_everybody_as_before() {
     let before = bits(&party, 0);
     let (leader, others) = party.bodies.split_first_mut().unwrap();
     let id = AgentId(1);
-    let mut others = [Companion { id, agent: &mut others[0], around: Surroundings::alone(id, SimTime::ZERO) }];
+    let mut others = [Companion { id, agent: &mut others[0], around: StepContext::alone(id, SimTime::ZERO) }];
     let dt = SimSpan::from_secs_f64(0.01).unwrap();
-    let error = leader.lead(dt, &Surroundings::alone(AgentId(0), SimTime::ZERO), &mut others, &mut vec![]).unwrap_err();
+    let error = leader.lead(dt, &StepContext::alone(AgentId(0), SimTime::ZERO), &mut others, &mut vec![]).unwrap_err();
     assert!(matches!(error, metachron_core::StepError::Diverged { .. }), "{error}");
     assert_eq!(bits(&party, 0), before);
 }

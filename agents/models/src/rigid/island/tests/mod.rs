@@ -2,7 +2,7 @@
 
 use super::super::{Joint, JointKind, RigidBody, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Companion, Neighbour, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, Companion, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, RigidState, SimSpan, SimTime, Snapshot, StepReport};
 use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ const G: f64 = 9.81;
 /// Bodies 0 … n − 1; the first leads, hands hold it, and it sees who is near.
 struct Party {
     bodies: Vec<RigidBody>,
-    hands: Vec<Pull>,
+    hands: Vec<AnchorSpring>,
     near: Vec<Neighbour>,
     time: SimTime,
     apart: Vec<u32>,
@@ -78,11 +78,11 @@ impl Party {
             .enumerate()
             .map(|(i, body)| {
                 let id = AgentId(i as u32 + 1);
-                Companion { id, agent: body, around: Surroundings::alone(id, self.time) }
+                Companion { id, agent: body, around: StepContext::alone(id, self.time) }
             })
             .collect();
         let around =
-            Surroundings { hands: &self.hands, neighbours: &self.near, ..Surroundings::alone(AgentId(0), self.time) };
+            StepContext { hands: &self.hands, neighbours: &self.near, ..StepContext::alone(AgentId(0), self.time) };
         leader.lead(dt, &around, &mut others, &mut self.apart).unwrap()
     }
 

@@ -55,7 +55,7 @@ fn rise_j((rate_hz, lead_s): (f64, f64), retuned: bool) -> f64 {
     let (first_j, mut most_j) = (energy_j(&stage), f64::MIN);
     for quarter in 1..=11 {
         let eps_m = if quarter % 4 < 2 { 0.08 } else { 0.02 };
-        ids.iter().filter(|_| retuned).for_each(|id| stage.agent_mut(*id).retune(Resolution { eps_m, n: 3 }));
+        ids.iter().filter(|_| retuned).for_each(|id| stage.agent_mut(*id).set_resolution(Resolution { eps_m, n: 3 }));
         // the first touch comes after a second
         stage.run(0.25 * f64::from(quarter), |stage| most_j = most_j.max(energy_j(stage)));
     }

@@ -10,7 +10,7 @@ use crate::rod::Tube;
 use crate::rod::TubeSpec;
 use glam::{DQuat, DVec3};
 use metachron_contact::Law;
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
@@ -174,7 +174,7 @@ fn a_tube_knocks_at_a_sleeper_that_owns_the_pair() {
         let snapshot = Arc::new(Snapshot { at_rest, ..seen.clone() });
         let near = Neighbour { form: sleeper.form(), ..Neighbour::seen(AgentId(3), snapshot) };
         let neighbours = std::slice::from_ref(&near);
-        let around = Surroundings { neighbours, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+        let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
         tube.step(millis(10.0), &around).unwrap();
         let mut shown = Snapshot::default();
         tube.write_snapshot(&mut shown);

@@ -4,7 +4,7 @@ use super::super::{millis, reference_spec};
 use crate::rod::Tube;
 use crate::rod::{Material, Section, TubeSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, SimTime};
 use metachron_geometry::{Obstacle, Solid};
 
@@ -70,7 +70,7 @@ fn ratio(angle: f64, segments: usize) -> f64 {
         let grown = 0.9 + 0.2 * ((t - DRAW_S) / RAMP_S).max(0.0);
         let tension = [1.0, want * grown].map(|share| LOAD_N * share * (t / DRAW_S).min(1.0));
         // a spring so long that its force does not change while the cord slips by millimetres
-        let pull = |anchor, end: usize| Pull {
+        let pull = |anchor, end: usize| AnchorSpring {
             by: None,
             anchor: Anchor::Arc(anchor),
             target: ends[end] + ways[end] * 10.0,
@@ -79,7 +79,7 @@ fn ratio(angle: f64, segments: usize) -> f64 {
             damping_n_s_m: 0.0,
         };
         let hands = [pull(0.0, 0), pull(length, 1)];
-        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
         tube.step(dt, &around).unwrap();
         time += dt;
         let moved = (tube.state().x[0] - ends[0]).dot(ways[0]);

@@ -7,7 +7,7 @@ use crate::rod::Tube;
 use crate::rod::TubeSpec;
 use crate::rod::banded_ldl::Row;
 use glam::{DMat3, DVec3};
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_geometry::Solid;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ fn felt(x_m: f64, young_pa: f64) -> ([f64; 2], f64) {
     ball.write_snapshot(&mut seen);
     let near = Neighbour { form: ball.form(), owned: true, ..Neighbour::seen(AgentId(3), Arc::new(seen)) };
     let neighbours = std::slice::from_ref(&near);
-    tube.step(millis(4.0), &Surroundings { neighbours, ..Surroundings::alone(AgentId(0), SimTime::ZERO) }).unwrap();
+    tube.step(millis(4.0), &StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) }).unwrap();
     let mut told = Snapshot::default();
     tube.write_snapshot(&mut told);
     let rows = tube.step_by(0.004, |stepper, _, _, _| stepper.rows.clone());

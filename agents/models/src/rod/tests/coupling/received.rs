@@ -5,7 +5,7 @@ use crate::rod::CurveInertia;
 use crate::rod::Tube;
 use crate::rod::TubeSpec;
 use glam::DVec3;
-use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, ImpulseResponse, Resolution, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 use std::sync::Arc;
@@ -29,7 +29,7 @@ fn giver(tube: &Tube, seed: u64) -> (Neighbour, DVec3) {
 }
 
 fn step(tube: &mut Tube, time: SimTime, neighbours: &[Neighbour]) {
-    let around = Surroundings { neighbours, ..Surroundings::alone(ME, time) };
+    let around = StepContext { neighbours, ..StepContext::alone(ME, time) };
     tube.step(millis(4.0), &around).unwrap();
 }
 
@@ -40,7 +40,7 @@ fn what_is_given_is_momentum_gained_before_the_first_step_and_after_a_change_of_
         run(&mut tube, 4.0, steps);
         let (giver, total) = giver(&tube, 5);
         if let Some(eps_m) = wanted {
-            tube.retune(Resolution { eps_m, n: 3 });
+            tube.set_resolution(Resolution { eps_m, n: 3 });
         }
         let before = tube.momentum().0;
         step(&mut tube, SimTime::ZERO + millis(4.0), std::slice::from_ref(&giver));

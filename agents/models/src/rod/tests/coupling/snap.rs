@@ -9,7 +9,7 @@ use crate::rigid::RigidSpec;
 use crate::rod::Tube;
 use crate::rod::TubeSpec;
 use glam::{DQuat, DVec3};
-use metachron_contact::Pull;
+use metachron_contact::AnchorSpring;
 use metachron_contact::audit::{Member, audit};
 use metachron_core::{AgentId, Anchor, Body, RigidState};
 use metachron_geometry::Solid;
@@ -26,7 +26,7 @@ const TUBE: AgentId = AgentId(0);
 
 struct Snap {
     stage: Stage,
-    springs: [Vec<Pull>; 2],
+    springs: [Vec<AnchorSpring>; 2],
     spec: TubeSpec,
 }
 
@@ -57,7 +57,7 @@ impl Snap {
             let spring = |[b, c]: [f64; 2]| {
                 let corner = DVec3::new(0.0, b * HALF.y, c * HALF.z);
                 let sag = DVec3::Z * (FINGER_KG * G / (4.0 * SPRING_N_M));
-                Pull {
+                AnchorSpring {
                     by: None,
                     anchor: Anchor::Local(corner),
                     target: at + corner - DVec3::X * (side * PRESS_M) + sag,
@@ -74,13 +74,13 @@ impl Snap {
     }
 
     /// Energy at the earliest own time, joules.
-    fn energy_j(stage: &Stage, springs: &[Vec<Pull>; 2], spec: &TubeSpec) -> f64 {
+    fn energy_j(stage: &Stage, springs: &[Vec<AnchorSpring>; 2], spec: &TubeSpec) -> f64 {
         let (mass_per_length_kg_m, rotary_kg_m) = (spec.mass_per_length_kg_m, spec.section.rotary_kg_m);
         let ids = [TUBE, AgentId(1), AgentId(2)];
         let members = ids.map(|id| Member { id, snapshot: stage.newest(id), mass_per_length_kg_m, rotary_kg_m });
         let at = ids.map(|id| stage.newest(id).time).into_iter().min().unwrap();
         audit(&members, at, &mut |id, state: &RigidState| {
-            let one = |spring: &Pull| {
+            let one = |spring: &AnchorSpring| {
                 let end = Body::Rigid(*state).point(spring.anchor).unwrap().0;
                 0.5 * spring.stiffness_n_m * end.distance_squared(spring.target)
             };

@@ -6,7 +6,7 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use metachron_geometry::{Generator, Tom, generate};
+use metachron_geometry::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -35,9 +35,9 @@ pub(in super::super::super) struct Row {
     rate: f64,
 }
 
-fn mesh() -> Option<&'static Tom> {
-    static MESH: OnceLock<Option<Tom>> = OnceLock::new();
-    MESH.get_or_init(|| Tom::new(&generate(Generator::Blob, 1, TRIANGLES)).ok()).as_ref()
+fn mesh() -> Option<&'static ProgressiveMesh> {
+    static MESH: OnceLock<Option<ProgressiveMesh>> = OnceLock::new();
+    MESH.get_or_init(|| ProgressiveMesh::new(&generate(Generator::Blob, 1, TRIANGLES)).ok()).as_ref()
 }
 
 impl Experiment for Traversal {
