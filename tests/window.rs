@@ -8,7 +8,6 @@ use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_render::{Camera, Gpu, Hit, Picture, Ray};
 use metachron_runtime::AgentState;
-use metachron_scene;
 use metachron_scene::Source;
 use metachron_session::Session;
 use metachron_viewer::ui::{

@@ -3,7 +3,6 @@
 use crate::picture::gpu;
 use metachron_lod::control::{LevelDemand, Policy};
 use metachron_render::{Offscreen, PictureFile, RendererOptions, Size};
-use metachron_scene;
 use metachron_scene::Source;
 use metachron_session::{Drawing, Walk};
 

@@ -8,7 +8,6 @@ use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, 
 use metachron_render::{
     Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, Style,
 };
-use metachron_scene;
 use metachron_scene::Source;
 use metachron_world::Scene;
 use metachron_world::kinds::ShadingKind;

@@ -8,7 +8,6 @@ use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec,
 use metachron_render::{
     Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, States, Style,
 };
-use metachron_scene;
 use metachron_scene::Source;
 use metachron_world::Scene;
 use std::collections::BTreeSet;

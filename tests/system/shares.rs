@@ -2,7 +2,6 @@
 
 use crate::play::Folder;
 use metachron_render::{Camera, Size, Style};
-use metachron_scene;
 use metachron_scene::Source;
 use metachron_session::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
 use std::fmt::Write;

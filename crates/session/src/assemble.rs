@@ -18,10 +18,8 @@ use metachron_lod::control::{
 };
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftShape, SoftSpec};
-use metachron_render;
 use metachron_render::{Actor, Camera, Form, Level, Look, Material, ROPE_LEVEL, SceneView, Seen, StaticObject};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
-use metachron_world;
 use metachron_world::kinds;
 use metachron_world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
 use metachron_world::{Member, Scene, Scenery, Spec, machine};

@@ -4,7 +4,6 @@
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
 use metachron_lod::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};
-use metachron_render;
 use metachron_render::{Drawn, Gpu, RendererOptions};
 use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};

@@ -24,7 +24,6 @@ use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy,
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
-use metachron_runtime;
 use metachron_runtime::{AgentHandle, Command, Drive, Machine, Reader};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
 use metachron_world::{Scene, World, machine};

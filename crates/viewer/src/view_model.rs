@@ -6,7 +6,6 @@ use crate::ui::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
 use metachron_core::{Body, SimTime, Snapshot};
 use metachron_lod::control;
 use metachron_lod::control::Policy;
-use metachron_runtime;
 use metachron_runtime::AgentStats;
 use metachron_session::FrameRecord;
 use metachron_session::Session;

@@ -17,7 +17,6 @@ use metachron_core::{AgentId, SimSpan};
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use metachron_runtime::Drive;
-use metachron_scene;
 use metachron_scene::{SceneError, Source};
 use metachron_session::SessionError;
 use metachron_session::{Finished, Session};

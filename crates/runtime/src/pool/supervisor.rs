@@ -6,7 +6,7 @@
 use super::super::island::{empty_door, empty_rooms};
 use super::super::priority::Priority;
 use super::shared::PoolState;
-use super::watchdog::{Sitting, WatchdogWord};
+use super::watchdog::{TurnUnderWatch, WatchdogWord};
 use super::worker::Worker;
 use metachron_core::AgentId;
 use std::io;
@@ -46,7 +46,7 @@ struct Post {
     number: u32,
     desk: Arc<WatchdogWord>,
     thread: Option<JoinHandle<()>>,
-    seen: Option<Sitting>,
+    seen: Option<TurnUnderWatch>,
     looks: u32,
 }
 

@@ -16,12 +16,12 @@ pub(super) struct WatchdogWord {
 
 /// A turn in progress, as read by the watchdog; equal values are the same turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Sitting(u64);
+pub(super) struct TurnUnderWatch(u64);
 
 const IDLE: u64 = 0;
 const GIVEN_UP: u64 = u64::MAX;
 
-impl Sitting {
+impl TurnUnderWatch {
     /// The agent of the turn.
     pub const fn whose(self) -> AgentId {
         AgentId((self.0 as u32).wrapping_sub(1))
@@ -30,25 +30,25 @@ impl Sitting {
 
 impl WatchdogWord {
     /// Turn number `turn` begins, of `id`.
-    pub fn sit(&self, turn: u32, id: AgentId) -> Sitting {
+    pub fn sit(&self, turn: u32, id: AgentId) -> TurnUnderWatch {
         let word = (u64::from(turn & 0x7fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
         // read by the watchdog only, and its timeout is long
         self.word.store(word, std::sync::atomic::Ordering::Relaxed);
-        Sitting(word)
+        TurnUnderWatch(word)
     }
 
     /// The step of `sitting` has returned; whether the worker has not been given up.
-    pub fn rise(&self, sitting: Sitting) -> bool {
+    pub fn rise(&self, sitting: TurnUnderWatch) -> bool {
         self.word.compare_exchange(sitting.0, IDLE, SeqCst, SeqCst).is_ok()
     }
 
     /// The turn in progress, if there is one.
-    pub fn sitting(&self) -> Option<Sitting> {
-        Some(self.word.load(SeqCst)).filter(|word| *word != IDLE && *word != GIVEN_UP).map(Sitting)
+    pub fn sitting(&self) -> Option<TurnUnderWatch> {
+        Some(self.word.load(SeqCst)).filter(|word| *word != IDLE && *word != GIVEN_UP).map(TurnUnderWatch)
     }
 
     /// Gives the worker up, if `sitting` is still in progress; whether it was.
-    pub fn give_up(&self, sitting: Sitting) -> bool {
+    pub fn give_up(&self, sitting: TurnUnderWatch) -> bool {
         self.word.compare_exchange(sitting.0, GIVEN_UP, SeqCst, SeqCst).is_ok()
     }
 }
@@ -62,7 +62,7 @@ mod tests {
         let desk = WatchdogWord::default();
         assert_eq!(desk.sitting(), None);
         let first = desk.sit(1, AgentId(7));
-        assert_eq!(desk.sitting().map(Sitting::whose), Some(AgentId(7)));
+        assert_eq!(desk.sitting().map(TurnUnderWatch::whose), Some(AgentId(7)));
         assert!(desk.rise(first));
         assert!(!desk.give_up(first), "it is over");
         let second = desk.sit(2, AgentId(7));

@@ -73,7 +73,6 @@ pub fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
 mod tests {
     use super::*;
     use metachron_core::SimTime;
-    use metachron_scene;
     use metachron_scene::Source;
 
     #[test]

@@ -9,7 +9,7 @@ use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::super::super::table::Table;
 use super::super::machine::Noise;
 use super::super::played::walk;
-use super::super::played::walk::Foretold;
+use super::super::played::walk::Predicted;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ pub(in super::super::super) struct Row {
 }
 
 impl Row {
-    fn of(case: &Case, adapter: String, pictures: &[Foretold]) -> Self {
+    fn of(case: &Case, adapter: String, pictures: &[Predicted]) -> Self {
         let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.told_ms, *p.took_ms.first()?))).collect();
         let factor = quantile(pairs.iter().map(|(told, took)| took / told).collect(), 0.5);
         let errors = |by: f64| pairs.iter().map(|(told, took)| (by * told / took - 1.0).abs()).collect::<Vec<_>>();
@@ -83,8 +83,8 @@ impl Row {
 }
 
 /// Deviation from their median that 19 of 20 times of the same picture keep.
-fn scatter95(pictures: &[Foretold]) -> f64 {
-    let about = |picture: &Foretold| {
+fn scatter95(pictures: &[Predicted]) -> f64 {
+    let about = |picture: &Predicted| {
         let middle = quantile(picture.took_ms.clone(), 0.5);
         picture.took_ms.iter().map(|took| (took / middle - 1.0).abs()).collect::<Vec<_>>()
     };
@@ -187,7 +187,7 @@ mod tests {
         let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
         let took = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
         let picture =
-            |k: u32| Foretold { told_ms: f64::from(k), took_ms: vec![took(k), 0.98 * took(k), 1.01 * took(k)] };
+            |k: u32| Predicted { told_ms: f64::from(k), took_ms: vec![took(k), 0.98 * took(k), 1.01 * took(k)] };
         let row = Row::of(&case, String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
         assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
         assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");

@@ -138,7 +138,7 @@ fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> an
 }
 
 /// Predicted time of one picture, and its time at each drawing, milliseconds.
-pub(in super::super) struct Foretold {
+pub(in super::super) struct Predicted {
     pub(in super::super) told_ms: f64,
     pub(in super::super) took_ms: Vec<f64>,
 }
@@ -155,7 +155,7 @@ pub(in super::super) fn predicted(
     paper: Paper,
     policy: Policy,
     (asked, times): (&[(f64, f64)], usize),
-) -> anyhow::Result<(String, Vec<Foretold>)> {
+) -> anyhow::Result<(String, Vec<Predicted>)> {
     let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
     walk.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
@@ -173,7 +173,7 @@ pub(in super::super) fn predicted(
         let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
         walk.session().control().freeze(false);
         let took_ms = took?.iter().map(|record| record.frame_ms).collect();
-        pictures.extend(told.map(|told_ms| Foretold { told_ms, took_ms }));
+        pictures.extend(told.map(|told_ms| Predicted { told_ms, took_ms }));
     }
     Ok((adapter, pictures))
 }
