@@ -1,7 +1,19 @@
 //! metachron: a real-time physics engine in which every object keeps its own time and the frame never waits.
 //!
 //! In: a scene, built in code or read from a file. Out: a [`world::World`] that runs, read from any thread.
-//! Never here: code of its own. This crate re-exports the others; the map of them is `docs/ARCHITECTURE.md`.
+//! Never here: physics. This crate re-exports the others and holds the command; the map of them is `docs/ARCHITECTURE.md`.
+//!
+//! ```
+//! use metachron::prelude::*;
+//!
+//! let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]).restitution(0.0);
+//! let scene = Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).build().unwrap();
+//! let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+//! world.advance(SimSpan::from_millis(2000));
+//! let state = world.latest(world.object("ball").unwrap());
+//! let (position, _) = state.body.probe(0.0).unwrap();
+//! assert!((position.z - 0.05).abs() < 1e-3); // it lies on the floor
+//! ```
 
 #[cfg(feature = "cli")]
 pub mod cli;
@@ -19,7 +31,7 @@ pub use metachron_render as render;
 pub use metachron_runtime as runtime;
 #[cfg(feature = "scene")]
 pub use metachron_scene as scene;
-#[cfg(feature = "scene")]
+#[cfg(any(feature = "render", feature = "cli"))]
 pub use metachron_session as session;
 #[cfg(feature = "viewer")]
 pub use metachron_viewer as viewer;
@@ -29,5 +41,5 @@ pub use metachron_world as world;
 pub mod prelude {
     pub use metachron_core::{AgentId, Anchor, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot};
     pub use metachron_geometry::Solid;
-    pub use metachron_world::{Object, Scene, World, WorldError, kinds::ExecutorKind};
+    pub use metachron_world::{Object, Rigid, Scene, Tube, World, WorldError, kinds::ExecutorKind};
 }

@@ -347,6 +347,7 @@ mod tests {
     use clap::{CommandFactory, FromArgMatches};
 
     fn requested(arguments: &[&str]) -> Request {
+        crate::scenes::provide();
         let all = ["metachron", "run"].iter().chain(arguments);
         let matches = Cli::command().get_matches_from(all);
         let Command::Run(args) = Cli::from_arg_matches(&matches).unwrap().command else { panic!("run was asked for") };

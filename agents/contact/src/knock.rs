@@ -1,7 +1,7 @@
 //! Whom a mover wakes: who owns the contact with it, sleeps, and so does not see it come.
 //!
 //! In: a mover after its step, what is around. Out: the sleepers it may touch next, for [`metachron_core::Snapshot::touches`].
-//! Never here: forces; rigid bodies, who look along their own flight (`rigid/company.rs`), and tubes (`rod/company.rs`).
+//! Never here: forces; rigid bodies, who look along their own flight (`agents/models/src/rigid/company.rs`), and tubes (`agents/models/src/rod/company.rs`).
 
 use super::{Law, Other, WAKE_M_S};
 use crate::{Neighbour, StepContext};

@@ -2,6 +2,22 @@
 //!
 //! In: plain values. Out: types that models write and that contact, drawing and reports read.
 //! Never here: a clock, a thread, a file, the GPU, a model of physics, a shape.
+//!
+//! ```
+//! use metachron_core::{HASH_START, SimSpan, SimTime, Snapshot};
+//!
+//! let step = SimSpan::from_secs_f64(1.0 / 240.0).unwrap();
+//! let mut now = SimTime::ZERO;
+//! for _ in 0..240 {
+//!     now += step;
+//! }
+//! // a span is whole nanoseconds: 240 of them are less than 240 ns from a second
+//! assert!((now.as_secs_f64() - 1.0).abs() < 240e-9);
+//!
+//! let before = Snapshot::default();
+//! let later = Snapshot { time: now, ..Snapshot::default() };
+//! assert_ne!(before.fold_hash(HASH_START), later.fold_hash(HASH_START));
+//! ```
 
 pub mod body;
 pub mod foot;

@@ -54,6 +54,12 @@ impl SimSpan {
     /// The zero span. A step refuses it.
     pub const ZERO: Self = Self(0);
 
+    /// So many milliseconds; the longest span that there is where they are more.
+    #[must_use]
+    pub const fn from_millis(millis: u64) -> Self {
+        Self(millis.saturating_mul(1_000_000))
+    }
+
     /// A span of `nanos` nanoseconds.
     #[must_use]
     pub const fn from_nanos(nanos: u64) -> Self {

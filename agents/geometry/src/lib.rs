@@ -1,4 +1,23 @@
 //! Shapes without physics: solids, skeleton curves, meshes and their levels.
+//!
+//! ```
+//! use glam::{DQuat, DVec3};
+//! use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
+//! use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
+//!
+//! let ball = Solid::Ball { radius_m: 0.5 };
+//! let shape = ball.to_shared_shape().unwrap();
+//! let kind = ShapeKind::Solid(SolidShape { solid: ball, shape, com_local: DVec3::ZERO, radius_m: 0.5 });
+//! let form = CollisionShape { kind, friction: 0.5, restitution: 0.0 };
+//! let at = |x: f64| PlacedShape {
+//!     form: &form,
+//!     view: ShapePose::Solid { position: DVec3::X * x, rotation: DQuat::IDENTITY },
+//! };
+//!
+//! let (normal, gap_m) = gap(&at(1.25), &at(0.0), 1.0, &mut NarrowPhaseScratch::default()).unwrap();
+//! assert!((gap_m - 0.25).abs() < 1e-6); // never larger than the true gap
+//! assert!((normal - DVec3::X).length() < 1e-6);
+//! ```
 
 pub mod capsule_chain;
 pub mod closest_points;

@@ -2,6 +2,27 @@
 //!
 //! In: step lengths and what an agent sees of the others. Out: states, as snapshots.
 //! Never here: a clock, a thread, a file, the GPU. Theory: `docs/theory/rod.md`, `docs/theory/soft.md`.
+//!
+//! ```
+//! use glam::DVec3;
+//! use metachron_contact::{Agent, StepContext};
+//! use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+//! use metachron_geometry::Solid;
+//! use metachron_models::rigid::{RigidBody, RigidSpec};
+//!
+//! let spec = RigidSpec {
+//!     gravity: DVec3::NEG_Z * 9.81,
+//!     ..RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::Z * 5.0, 1.0)
+//! };
+//! let mut ball = RigidBody::new(spec).unwrap();
+//! let step = SimSpan::from_secs_f64(0.1).unwrap();
+//! ball.step(step, &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
+//!
+//! let mut state = Snapshot::default();
+//! ball.write_snapshot(&mut state);
+//! let (position, _) = state.body.probe(0.0).unwrap();
+//! assert!((position.z - (5.0 - 0.5 * 9.81 * 0.01)).abs() < 1e-12); // flight is exact
+//! ```
 
 pub mod conformance;
 #[cfg(test)]

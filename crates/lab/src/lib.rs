@@ -2,6 +2,15 @@
 //!
 //! In: arguments. Out: CSV, SVG, PNG and JSON files, tables on standard output.
 //! Never here: anything that a running scene needs.
+//!
+//! ```
+//! use clap::{Args, Command};
+//! use metachron_lab::args::BenchArgs;
+//!
+//! let command = BenchArgs::augment_args(Command::new("bench"));
+//! let matches = command.try_get_matches_from(["bench", "rod", "--quick"]).unwrap();
+//! assert!(matches.get_flag("quick"));
+//! ```
 
 pub mod args;
 mod bench;

@@ -5,6 +5,25 @@
 //! each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time on a
 //! declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
 //! agents in lasting contact share the turns of one of them (`island`). Never here: a model of physics, a picture, a control law, a file.
+//!
+//! ```
+//! use glam::DVec3;
+//! use metachron_geometry::Solid;
+//! use metachron_models::rigid::{RigidBody, RigidSpec};
+//! use metachron_runtime::{AgentSpawn, Lockstep, Machine, Run};
+//! use std::time::Duration;
+//!
+//! let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 1.0);
+//! let ball = RigidSpec { velocity: DVec3::X, ..ball };
+//! let spawn = AgentSpawn::alone("ball", Box::new(RigidBody::new(ball).unwrap()), 100.0);
+//! let mut run = Lockstep::start(vec![spawn], Machine::two_cores_software()).unwrap();
+//! run.wait_until(Duration::from_secs(2));
+//!
+//! let state = run.agents()[0].latest();
+//! let (position, _) = state.body.probe(0.0).unwrap();
+//! assert!((position.x - state.time.as_secs_f64()).abs() < 1e-9); // 1 m/s for the time it has lived
+//! assert!(state.time.as_secs_f64() >= 1.99);
+//! ```
 
 mod abreast;
 mod agent_clock;

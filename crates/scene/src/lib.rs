@@ -2,6 +2,25 @@
 //!
 //! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
 //! [`SceneError`] that shows every problem at its position. Never here: running agents, drawing, the command line.
+//!
+//! ```
+//! use metachron_scene::{Source, load};
+//!
+//! let text = br#"
+//! format = 1
+//! [[object]]
+//! name = "ball"
+//! model = "rigid"
+//! shape = "ball"
+//! radius_m = 0.1
+//! mass_kg = 2.0
+//! "#;
+//! let source = Source::memory("example", text).unwrap();
+//! let scene = load(&source, &[("object.ball.radius_m".to_owned(), "0.2".to_owned())]).unwrap();
+//! assert_eq!(scene.agents.len(), 1);
+//! let error = load(&source, &[("object.ball.radius_m".to_owned(), "-1".to_owned())]).unwrap_err();
+//! assert!(error.to_string().contains("example"));
+//! ```
 
 mod build;
 pub mod builtin;

@@ -2,6 +2,25 @@
 //!
 //! In: a checked [`metachron_world::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
 //! A [`Session`] is a running scene; [`play_headless`] drives it. Never here: a control law, physics.
+//!
+//! ```
+//! use metachron_render::{Size, Style};
+//! use metachron_scene::{Source, load};
+//! use metachron_session::{Drawing, End, Headless, Session, play_headless};
+//!
+//! let text = b"format = 1\nexecutor = \"lockstep\"\n[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1.0\n";
+//! let scene = load(&Source::memory("falling", text).unwrap(), &[]).unwrap();
+//! let plan = Headless {
+//!     end: End::Frames(30),
+//!     size: Size { width: 320, height: 180 },
+//!     style: Style::default(),
+//!     drawing: Drawing::Nothing,
+//!     png: None,
+//! };
+//! let outcome = play_headless(Session::open(scene).unwrap(), plan, &mut |_, _| true).unwrap();
+//! assert_eq!((outcome.frames.len(), outcome.agents.len()), (30, 1));
+//! assert!(outcome.adapter.is_none() && outcome.agents[0].stats.steps > 0);
+//! ```
 mod assemble;
 #[cfg(feature = "picture")]
 pub mod calibrate;

@@ -3,6 +3,7 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
+use super::builder::SceneBuilder;
 use super::couplings::{Coupling, Faults};
 use super::initial_overlap::Moved;
 use super::kinds::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
@@ -134,7 +135,7 @@ pub struct View {
 }
 
 /// Values that a scene declares for its machine; `None` is the preset's.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Machine {
     /// The preset to start from.
     pub preset: String,
@@ -307,6 +308,12 @@ pub struct Probe {
 }
 
 impl Scene {
+    /// Begins a scene in code: no objects, gravity of 9.81 m/s² along −z.
+    #[must_use]
+    pub const fn builder() -> SceneBuilder {
+        SceneBuilder::new()
+    }
+
     /// The name of an agent; empty where no agent has this id.
     #[must_use]
     pub fn name_of(&self, id: AgentId) -> &str {

@@ -164,7 +164,7 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
 enum Settings {
     /// rapier3d's defaults; only the size of the bodies is set.
     Own,
-    /// Those of an island of rigid agents (`agents/src/rigid/island/pile.rs`).
+    /// Those of an island of rigid agents (`agents/models/src/rigid/island/pile.rs`).
     Island,
 }
 

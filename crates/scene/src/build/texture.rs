@@ -9,17 +9,21 @@ use crate::check::{Checker, allowed};
 use crate::format::MeshFile;
 use crate::source::Source;
 use glam::Vec2;
+#[cfg(feature = "images")]
 use image::{ImageFormat, ImageReader, Limits};
 use metachron_geometry::{Model, Pattern, Texture, Wrap};
 use metachron_world::Look;
 use metachron_world::kinds::ShadingKind;
 use std::collections::BTreeMap;
+#[cfg(feature = "images")]
 use std::io::Cursor;
 use std::sync::Arc;
 
 /// Most pixels of an image along each side.
+#[cfg(feature = "images")]
 const SIDE_MAX: u32 = 4096;
 /// Most bytes that decoding an image may allocate.
+#[cfg(feature = "images")]
 const BYTES_MAX: u64 = 1 << 28;
 
 /// Textures already made, by what they were made from and the bits of their size.
@@ -106,7 +110,14 @@ fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
     glb::image(&bytes)?.map(|image| decode(image, Wrap::Corners)).transpose()
 }
 
+/// Refuses every image: this build has no decoder.
+#[cfg(not(feature = "images"))]
+fn decode(_: &[u8], _: Wrap) -> Result<Texture, String> {
+    Err("this build reads no images (feature `images` of metachron-scene)".to_owned())
+}
+
 /// The pixels of a PNG or JPEG image.
+#[cfg(feature = "images")]
 fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|why| why.to_string())?;
     match reader.format() {
@@ -123,7 +134,7 @@ fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
     Texture::new(pixels.dimensions(), texels, wrap).ok_or_else(|| "its image has no pixels".to_owned())
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "images"))]
 mod tests {
     use super::*;
     use proptest::prelude::*;

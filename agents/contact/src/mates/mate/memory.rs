@@ -18,7 +18,7 @@ impl Mate {
     /// Recalls for a step of `dt` seconds from `now` what the pair's last step left: how far the other is from where friction holds it,
     /// and what it was given.
     pub fn recall(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
-        // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (rod/horizon.rs)
+        // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (agents/models/src/rod/horizon.rs)
         let blows =
             |n: &Neighbour| n.snapshot.inertia.response().is_some_and(|r| r.curve().is_some() && r.forecast_s() == 0.0);
         self.evenly = !self.other.neighbour().is_some_and(blows);

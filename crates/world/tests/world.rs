@@ -1,0 +1,111 @@
+//! Worlds built in code: what they give against closed forms, on every executor.
+
+use metachron_core::{Body, SimSpan, Snapshot};
+use metachron_geometry::Solid;
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError};
+
+const EXECUTORS: [ExecutorKind; 3] = [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool];
+
+fn span(seconds: f64) -> SimSpan {
+    SimSpan::from_secs_f64(seconds).unwrap()
+}
+
+fn height_m(state: &Snapshot) -> f64 {
+    let Body::Rigid(body) = &state.body else { panic!("a rigid body") };
+    body.position.z
+}
+
+fn falling_ball() -> Scene {
+    Scene::builder().add("ball", Rigid::ball(0.02).at([0.0, 0.0, 10.0]).rate_hz(500.0)).build().unwrap()
+}
+
+#[test]
+fn a_falling_ball_is_where_its_own_time_puts_it_on_every_executor() {
+    for executor in EXECUTORS {
+        let world = World::start(&falling_ball(), executor).unwrap();
+        let ball = world.object("ball").unwrap();
+        world.advance(span(0.2));
+        let state = world.latest(ball);
+        let t = state.time.as_secs_f64();
+        assert!(t >= 0.199, "{executor:?}: {t} s");
+        let expected = 10.0 - 0.5 * 9.81 * t * t;
+        // flight is exact in f64: tens of roundings at 10 m
+        assert!((height_m(&state) - expected).abs() < 1e-12, "{executor:?}: {} for {expected}", height_m(&state));
+        let before = world.time();
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        assert_eq!(before, world.time(), "{executor:?}: time stands between two advances");
+        assert_eq!(world.stop().len(), 1);
+    }
+}
+
+#[test]
+fn a_ball_comes_to_rest_on_the_floor_it_was_given() {
+    let scene = Scene::builder()
+        .fixed("floor", Solid::Plane)
+        .add("ball", Rigid::ball(0.05).mass_kg(0.2).restitution(0.0).at([0.0, 0.0, 0.2]))
+        .build();
+    let world = World::start(&scene.unwrap(), ExecutorKind::Lockstep).unwrap();
+    world.advance(span(2.0));
+    let height = height_m(&world.latest(world.object("ball").unwrap()));
+    assert!((height - 0.05).abs() < 1e-4, "{height} m"); // the allowed overlap of a body at rest
+}
+
+#[test]
+fn a_clamped_tube_sags_as_a_beam_does() {
+    let (radius, length, young) = (0.01, 0.2, 1e7);
+    let path = [[0.0; 3], [length, 0.0, 0.0]];
+    let tube = Tube::along(&path).radius_m(radius).young_pa(young).clamp([true, false]).damping_per_s(30.0);
+    let world = World::start(&Scene::builder().add("beam", tube).build().unwrap(), ExecutorKind::Lockstep).unwrap();
+    world.advance(span(3.0));
+    let state = world.latest(world.object("beam").unwrap());
+    let (tip, _) = state.body.probe(1.0).unwrap();
+    let (area, second) = (std::f64::consts::PI * radius * radius, std::f64::consts::FRAC_PI_4 * radius.powi(4));
+    let sag = 1050.0 * area * 9.81 * length.powi(4) / (8.0 * young * second);
+    // Euler and Bernoulli, 1.3 % of the length: shear and large deflection add a few per cent
+    assert!((-tip.z / sag - 1.0).abs() < 0.05, "{} for {sag} m", -tip.z);
+}
+
+#[test]
+fn two_worlds_in_lockstep_live_to_the_same_bits_however_time_is_divided() {
+    let run = |parts: u32| {
+        let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
+        (0..parts).for_each(|_| world.advance(span(0.5 / f64::from(parts))));
+        world.hash()
+    };
+    assert_eq!(run(1), run(2));
+    assert_ne!(run(1), World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap().hash());
+}
+
+#[test]
+fn clones_are_one_world_and_a_stopped_one_stays_as_it_is() {
+    let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
+    let other = world.clone();
+    world.advance(span(0.1));
+    assert_eq!(world.hash(), other.hash());
+    other.stop();
+    let stopped = world.hash();
+    world.advance(span(0.1));
+    assert_eq!(world.hash(), stopped);
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_its_name() {
+    let twice = Scene::builder().fixed("a", Solid::Plane).add("a", Rigid::ball(0.1)).build();
+    assert_eq!(twice.unwrap_err(), SceneBuildError::SameName { name: "a".to_owned() });
+    for rate_hz in [0.0, f64::NAN, -1.0, f64::INFINITY, 1e9] {
+        let scene = Scene::builder().add("b", Rigid::ball(0.1).rate_hz(rate_hz)).build();
+        assert!(matches!(scene, Err(SceneBuildError::BadRate { .. })), "{rate_hz}");
+    }
+    for part in [Rigid::ball(f64::NAN), Rigid::ball(0.1).mass_kg(-1.0), Rigid::new(Solid::Plane)] {
+        let scene = Scene::builder().add("b", part).build().unwrap();
+        let error = World::start(&scene, ExecutorKind::Lockstep).err().unwrap();
+        assert!(matches!(&error, WorldError::Build { name, .. } if name == "b"), "{error}");
+    }
+    for tube in [Tube::along(&[]), Tube::along(&[[0.0; 3]; 2]), Tube::along(&[[0.0; 3], [1.0, 0.0, 0.0]]).wall_m(1.0)] {
+        let scene = Scene::builder().add("t", tube).build().unwrap();
+        assert!(matches!(World::start(&scene, ExecutorKind::Lockstep), Err(WorldError::Build { .. })));
+    }
+    let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
+    assert!(matches!(world.object("bal"), Err(WorldError::NoObject { .. })));
+}
