@@ -12,7 +12,7 @@
 //! world.advance(SimSpan::from_millis(2000));
 //! let state = world.latest(world.object("ball").unwrap());
 //! let (position, _) = state.body.probe(0.0).unwrap();
-//! assert!((position.z - 0.05).abs() < 1e-3); // it lies on the floor
+//! assert!((position.z - 0.05).abs() < 1e-3); // rests on the floor
 //! ```
 
 #[cfg(feature = "cli")]

@@ -49,7 +49,7 @@ Examples:
 
 /// A real-time physics engine in which every object keeps its own time and the frame never waits.
 ///
-/// A scene is a TOML file of objects: soft tubes, rigid bodies, instruments. Each runs as an agent on its own clock, with its
+/// A scene is a TOML file of objects: soft tubes, rigid bodies, tools. Each runs as an agent on its own clock, with its
 /// own step and resolution; the picture takes their newest states inside a frame budget.
 #[derive(Debug, Parser)]
 #[command(name = "metachron", version, after_help = EXAMPLES, max_term_width = 120)]

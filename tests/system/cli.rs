@@ -65,7 +65,7 @@ fn the_schema_is_json_with_every_model() {
     let schema = metachron(&["schema"]);
     let json: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();
     assert_eq!(code(&schema), 0);
-    for model in ["tube", "rigid", "instrument", "synthetic"] {
+    for model in ["tube", "rigid", "tool", "synthetic"] {
         assert!(json["$defs"][model]["properties"]["name"].is_object(), "{model}");
     }
 }

@@ -177,7 +177,7 @@ fn a_tool_that_meets_nobody_takes_the_longest_steps() {
     let (code, said, errors) = fit(folder.scene(), &["--tolerance", "5e-3", "--seconds", "0.4", "--write"]);
     assert_eq!(code, 0, "{errors}");
     let [pays, needs] = ["pays", "needs"].map(|side| &said["objects"][1][side]);
-    assert_eq!(pays["model"].as_str(), Some("instrument"));
+    assert_eq!(pays["model"].as_str(), Some("tool"));
     assert!(number(needs, "/dt_ms") >= 30.0 && number(needs, "/ms_per_s") < 0.2 * number(pays, "/ms_per_s"), "{said}");
     let report = folder.lockstep(&["--seconds", "0.4"]);
     assert_eq!(number(agent(&report, "tool"), "/dt_ms"), number(needs, "/dt_ms"));

@@ -177,7 +177,7 @@ fn an_integrator_that_cannot_carry_the_step_says_how_long_a_one_it_can() {
 
 #[test]
 fn an_unknown_model_names_those_that_exist() {
-    refused("\"tube\"", "\"tubes\"", "\"tubes\"", &["did you mean `tube`?", "`rigid`", "`instrument`"]);
+    refused("\"tube\"", "\"tubes\"", "\"tubes\"", &["did you mean `tube`?", "`rigid`", "`tool`"]);
 }
 
 #[test]
@@ -217,7 +217,7 @@ fn references_name_what_exists() {
     let said = problem(&format!("{TUBE}{tool}")).3;
     assert!(said.contains("`liver`") && said.contains("`intestine`"), "{said}");
     let said = problem(&format!("{TUBE}{}", tool.replace("liver", "tool"))).3;
-    assert!(said.contains("names `tool`, an instrument, which jaws cannot hold"), "{said}");
+    assert!(said.contains("names `tool`, a tool, which jaws cannot hold"), "{said}");
     let fixed = format!(
         "{TUBE}{}\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n",
         tool.replace("liver", "floor")
@@ -362,6 +362,20 @@ fn a_mesh_that_no_scene_can_hold_is_refused_by_name_whether_it_is_touched_or_see
     std::fs::write(at("s.toml"), format!("{seen}{}", seen[10..].replace("seen\"", "far\"\nscale = 2e5"))).unwrap();
     let error = load(&Source::open(at("s.toml").to_str().unwrap()).unwrap(), &[]).unwrap_err();
     assert!(error.problems[0].message.contains("`scale` of `far` makes it too large"), "{:?}", error.problems);
+}
+
+#[test]
+fn a_tool_may_be_called_an_instrument_as_it_was_before() {
+    let text = |model: &str| {
+        format!(
+            "format = 1\n[[object]]\nname = \"t\"\nmodel = \"{model}\"\nkeyframe = [{{ tip_m = [0, 0, 0] }}]\n[machine.step.{model}]\nbase_us = 7\n"
+        )
+    };
+    let read = |model: &str| load(&Source::memory("t", text(model).as_bytes()).unwrap(), &[]).unwrap();
+    for scene in [read("instrument"), read("tool")] {
+        assert_eq!(scene.agents[0].spec.model(), "tool");
+        assert_eq!(scene.machine.steps, [("tool".to_owned(), Some(7.0), None)]);
+    }
 }
 
 #[test]

@@ -108,7 +108,7 @@ fn a_joint_names_two_rigid_objects() {
     );
     joint_refused(r#"kind = "fixed", a = "left", b = "left""#, "\"left\"", &["another object"]);
     joint_refused(r#"kind = "fixed", a = "left", b = "hose""#, "\"hose\"", &["is a tube", "[[coupling]]", "attach"]);
-    joint_refused(r#"kind = "fixed", a = "tool", b = "left""#, "\"tool\"", &["is an instrument", "attach"]);
+    joint_refused(r#"kind = "fixed", a = "tool", b = "left""#, "\"tool\"", &["is a tool", "attach"]);
     joint_refused(r#"kind = "fixed", a = "left", b = "ghost""#, "\"ghost\"", &["no matter"]);
     joint_refused(r#"kind = "fixed", a = "world", b = "left""#, "\"world\"", &["the world is written as `b`"]);
     joint_refused(r#"kind = "fixed", a = "post", b = "world""#, "\"world\"", &["cannot move"]);
@@ -229,7 +229,7 @@ fn a_coupling_that_cannot_be_says_why() {
     let pair = r#"a = "left", b = "right""#;
     coupling_refused(r#"a = "left", b = "rigth""#, "\"rigth\"", &["did you mean `right`?"]);
     coupling_refused(r#"a = "left", b = "left""#, "\"left\"", &["another object"]);
-    coupling_refused(r#"a = "tool", b = "hand", law = "off""#, "\"hand\"", &["is an instrument, as `a` is"]);
+    coupling_refused(r#"a = "tool", b = "hand", law = "off""#, "\"hand\"", &["is a tool, as `a` is"]);
     coupling_refused(r#"a = "left", b = "post""#, "\"post\"", &["which is fixed"]);
     coupling_refused(r#"a = "ghost", b = "left""#, "\"ghost\"", &["no matter"]);
     coupling_refused(&format!(r#"{pair}, law = "spring""#), "\"spring\"", &["`ledger`", "`tlm`"]);
@@ -323,7 +323,7 @@ fn a_grid_that_cannot_be_says_why() {
     let taken = "format = 1\nobject = [\n{ name = \"b-1\", model = \"synthetic\", cost_us = 1 },\n{ name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, grid = [2, 1, 1], spacing_m = [3, 3, 3] },\n]\n";
     assert!(read(taken).unwrap_err().problems[0].message.contains("`b-1` is taken"));
     let ghost = "format = 1\nobject = [{ name = \"g\", model = \"synthetic\", cost_us = 1, grid = [2, 1, 1], spacing_m = [1, 1, 1] }]\n";
-    assert!(read(ghost).unwrap_err().problems[0].expected.contains("an object that has one: no instrument"));
+    assert!(read(ghost).unwrap_err().problems[0].expected.contains("an object that has one: no tool"));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
-use metachron_models::tool::Instrument;
+use metachron_models::tool::Tool;
 use metachron_scene::{builtin, load};
 use std::sync::Arc;
 
@@ -35,9 +35,7 @@ impl Play {
                     Spec::Tube(spec) => Tube::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
                     Spec::Rigid(spec) => RigidBody::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
                     Spec::Soft(spec) => SoftBody::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
-                    Spec::Instrument(spec) => {
-                        Instrument::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string())
-                    }
+                    Spec::Tool(spec) => Tool::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
                     Spec::Synthetic(spec) => Synthetic::new(spec, member.simulation, member.start)
                         .map(|a| Box::new(a) as _)
                         .map_err(|e| e.to_string()),
@@ -95,7 +93,7 @@ fn every_agent_of_every_built_in_scene_can_be_built_and_stays_finite() {
 
 /// How often the grasper of `scene` took hold within `seconds`, the greatest force, and whether it holds at the end.
 fn grasps(name: &str, seconds: f64) -> (u32, f64, bool) {
-    let mut play = Play::of(&scene(name), &["tube", "instrument"]);
+    let mut play = Play::of(&scene(name), &["tube", "tool"]);
     let (mut count, mut force_n, mut holds) = (0, 0.0_f64, false);
     while play.time.as_secs_f64() < seconds {
         play.step(millis(4.0));

@@ -75,7 +75,7 @@ impl Standing {
     }
 
     fn is_led(self) -> bool {
-        self.model == "instrument"
+        self.model == "tool"
     }
 
     fn is_tube(self) -> bool {
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn of_every_pair_exactly_one_owns_unless_both_are_led() {
         let mut all = vec![];
-        for model in ["tube", "rigid", "instrument", "sheet"] {
+        for model in ["tube", "rigid", "tool", "sheet"] {
             for (rate_hz, held_ends, height_j_kg) in
                 [(60.0, 0, 0.0), (100.0, 0, 1.0), (1000.0, 0, 2.0), (1000.0, 1, 1.0)]
             {
@@ -162,7 +162,7 @@ mod tests {
         }
         for a in &all {
             for b in all.iter().filter(|b| b.id != a.id) {
-                let both_led = a.model == "instrument" && b.model == "instrument";
+                let both_led = a.model == "tool" && b.model == "tool";
                 for linked in [false, true] {
                     let owners = u32::from(owns(*a, *b, linked)) + u32::from(owns(*b, *a, linked));
                     assert_eq!(owners, u32::from(!both_led), "{a:?} {b:?}");
@@ -178,7 +178,7 @@ mod tests {
             assert!(owns(standing(1, model, slow), standing(0, "rigid", fast), false));
         }
         assert!(owns(standing(1, "rigid", fast), standing(0, "rigid", slow), false), "the faster");
-        assert!(owns(standing(1, "rigid", slow), standing(0, "instrument", fast), false));
+        assert!(owns(standing(1, "rigid", slow), standing(0, "tool", fast), false));
     }
 
     #[test]

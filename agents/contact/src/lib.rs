@@ -5,28 +5,19 @@
 //!
 //! ```
 //! use glam::DVec3;
-//! use metachron_contact::{Contact, Problem, Response, Settings, Solver};
+//! use metachron_contact::{Contact, Problem, Settings, Solver};
 //! use metachron_core::ContactJacobian;
-//!
-//! /// A point of 2 kg.
-//! struct Point;
-//! impl Response for Point {
-//!     fn respond(&mut self, impulses: &mut [DVec3]) {
-//!         impulses.iter_mut().for_each(|impulse| *impulse *= 0.5);
-//!     }
-//! }
 //!
 //! let mut slots = ContactJacobian::default();
 //! slots.add_linear(0, 1.0);
-//! let contact = Contact {
-//!     key: 0, slots, normal: DVec3::Z, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s: DVec3::ZERO, age_s: 0.0,
-//! };
+//! let (normal, back_m_s) = (DVec3::Z, DVec3::ZERO);
+//! let contact = Contact { key: 0, slots, normal, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s, age_s: 0.0 };
 //! let settings = Settings { iterations: 1000, tolerance_m_s: 1e-9 };
 //! let problem = Problem { contacts: &[contact], kin: &[], h_s: 0.01, mobilities: &[0.5], settings };
-//! let mut velocities = [DVec3::new(0.2, 0.0, -1.0)];
-//! Solver::forming().solve(&problem, &mut velocities, &mut Point);
-//! // the cone allows half of the normal impulse across: more than enough to stop the point
-//! assert!(velocities[0].length() < 1e-6);
+//! let mut velocities = [DVec3::new(2.0, 0.0, -1.0)]; // of a point of 2 kg
+//! Solver::default().solve(&problem, &mut velocities, &mut |j: &mut [DVec3]| j.iter_mut().for_each(|j| *j /= 2.0));
+//! // Coulomb: stopping 1 m/s along the normal takes 0.5 m/s from the sliding
+//! assert!((velocities[0] - DVec3::new(1.5, 0.0, 0.0)).length() < 1e-6);
 //! ```
 
 pub mod agent;

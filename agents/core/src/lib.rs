@@ -1,4 +1,4 @@
-//! What every part of metachron shares: time, numbers of agents, published states, linear algebra.
+//! Time, numbers of agents, published states and linear algebra that every part of metachron shares.
 //!
 //! In: plain values. Out: types that models write and that contact, drawing and reports read.
 //! Never here: a clock, a thread, a file, the GPU, a model of physics, a shape.
@@ -11,8 +11,8 @@
 //! for _ in 0..240 {
 //!     now += step;
 //! }
-//! // a span is whole nanoseconds: 240 of them are less than 240 ns from a second
-//! assert!((now.as_secs_f64() - 1.0).abs() < 240e-9);
+//! // a span is rounded to a nanosecond: 240 of them end within 120 ns of a second
+//! assert!((now.as_secs_f64() - 1.0).abs() < 121e-9);
 //!
 //! let before = Snapshot::default();
 //! let later = Snapshot { time: now, ..Snapshot::default() };

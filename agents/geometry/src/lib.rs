@@ -1,22 +1,23 @@
-//! Shapes without physics: solids, skeleton curves, meshes and their levels.
+//! Shapes without physics: solids, skeleton curves, meshes and their levels, and the contact points between collision shapes.
+//!
+//! In: solids, curves and meshes in their poses. Out: gaps and contact points, signed distances, closest points, triangles,
+//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 12–14.
 //!
 //! ```
 //! use glam::{DQuat, DVec3};
 //! use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
 //! use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 //!
-//! let ball = Solid::Ball { radius_m: 0.5 };
-//! let shape = ball.to_shared_shape().unwrap();
-//! let kind = ShapeKind::Solid(SolidShape { solid: ball, shape, com_local: DVec3::ZERO, radius_m: 0.5 });
-//! let form = CollisionShape { kind, friction: 0.5, restitution: 0.0 };
-//! let at = |x: f64| PlacedShape {
-//!     form: &form,
-//!     view: ShapePose::Solid { position: DVec3::X * x, rotation: DQuat::IDENTITY },
+//! let kind = |solid| ShapeKind::Solid(SolidShape::new(solid, DVec3::ZERO).unwrap());
+//! let [ball, block] = [Solid::Ball { radius_m: 0.5 }, Solid::Box { half_extents_m: DVec3::ONE }]
+//!     .map(|solid| CollisionShape { kind: kind(solid), friction: 0.5, restitution: 0.0 });
+//! let at = |form, x: f64| {
+//!     let view = ShapePose::Solid { position: DVec3::X * x, rotation: DQuat::IDENTITY };
+//!     PlacedShape { form, view }
 //! };
-//!
-//! let (normal, gap_m) = gap(&at(1.25), &at(0.0), 1.0, &mut NarrowPhaseScratch::default()).unwrap();
-//! assert!((gap_m - 0.25).abs() < 1e-6); // never larger than the true gap
-//! assert!((normal - DVec3::X).length() < 1e-6);
+//! let (normal, gap_m) = gap(&at(&ball, 1.75), &at(&block, 0.0), 1.0, &mut NarrowPhaseScratch::default()).unwrap();
+//! assert!((gap_m - 0.25).abs() < 1e-6); // 1.75 m less half the box and the radius
+//! assert!((normal - DVec3::X).length() < 1e-6); // from the box towards the ball
 //! ```
 
 pub mod capsule_chain;

@@ -4,9 +4,10 @@
 //! Never here: promises of a single model; those are tested next to that model.
 //!
 //! ```
-//! use crate::conformance::{Suite, check};
-//! use crate::synthetic::{Synthetic, SyntheticSpec};
-//! use metachron_agents::{Agent, Resolution, ResolutionRange, SimSpan};
+//! use metachron_contact::Agent;
+//! use metachron_core::{Resolution, ResolutionRange, SimSpan};
+//! use metachron_models::conformance::{Suite, check};
+//! use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 //!
 //! let range = ResolutionRange { eps_m: (0.01, 0.04), n: (0, 3) };
 //! let spec = SyntheticSpec { cost_us: 5.0, cost_order: 1.0, error_m: 1e-3, error_order: 2.0 };

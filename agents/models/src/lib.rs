@@ -10,18 +10,13 @@
 //! use metachron_geometry::Solid;
 //! use metachron_models::rigid::{RigidBody, RigidSpec};
 //!
-//! let spec = RigidSpec {
-//!     gravity: DVec3::NEG_Z * 9.81,
-//!     ..RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::Z * 5.0, 1.0)
-//! };
-//! let mut ball = RigidBody::new(spec).unwrap();
-//! let step = SimSpan::from_secs_f64(0.1).unwrap();
-//! ball.step(step, &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
-//!
+//! let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::Z * 5.0, 1.0);
+//! let mut ball = RigidBody::new(RigidSpec { gravity: DVec3::NEG_Z * 9.81, ..ball }).unwrap();
+//! ball.step(SimSpan::from_millis(100), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
 //! let mut state = Snapshot::default();
 //! ball.write_snapshot(&mut state);
 //! let (position, _) = state.body.probe(0.0).unwrap();
-//! assert!((position.z - (5.0 - 0.5 * 9.81 * 0.01)).abs() < 1e-12); // flight is exact
+//! assert!((position.z - (5.0 - 0.5 * 9.81 * 0.1 * 0.1)).abs() < 1e-12); // free flight is exact: z₀ − ½ g t²
 //! ```
 
 pub mod conformance;

@@ -12,7 +12,7 @@ use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
-use metachron_models::tool::Instrument;
+use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
 use std::sync::Arc;
 
@@ -193,7 +193,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
         graspable: vec![held],
         starts_off_m: DVec3::ZERO,
     };
-    let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
+    let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let suite = Suite {
         neighbours: vec![Neighbour::seen(held, Arc::new(seen))],
         pull: Some(hand(Anchor::Local(DVec3::ZERO), DVec3::new(0.4, 0.1, 0.1))),
@@ -223,7 +223,7 @@ fn a_tool_led_at_even_speed_keeps_every_promise() {
         graspable: vec![],
         starts_off_m: DVec3::ZERO,
     };
-    let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
+    let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let straight = |agent: &dyn Agent, t: f64| {
         let mut now = Snapshot::default();
         agent.write_snapshot(&mut now);

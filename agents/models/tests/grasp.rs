@@ -5,7 +5,7 @@ use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, ToolState};
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
-use metachron_models::tool::Instrument;
+use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
 use std::sync::Arc;
 
@@ -25,11 +25,11 @@ fn tube() -> Tube {
 }
 
 /// Shuts over the tube, lifts it by 4 cm, waits, and opens at 6 s.
-fn tool() -> Instrument {
+fn tool() -> Tool {
     let key = |at_s, z, jaw| Keyframe { at_s, tip_m: DVec3::new(0.21, 0.0, z), rotation: DQuat::IDENTITY, jaw };
     let keyframes =
         vec![key(0.0, 0.02, 1.0), key(0.5, 0.0, 0.0), key(2.0, 0.04, 0.0), key(6.0, 0.04, 0.0), key(6.5, 0.04, 1.0)];
-    Instrument::new(ToolSpec {
+    Tool::new(ToolSpec {
         keyframes,
         repeat: false,
         reach_m: 0.02,
@@ -45,7 +45,7 @@ fn tool() -> Instrument {
 /// One agent's view of the other, always one turn old.
 struct Pair {
     tube: Tube,
-    tool: Instrument,
+    tool: Tool,
     time: SimTime,
     rested: bool,
 }

@@ -4,12 +4,16 @@
 //! Never here: anything that a running scene needs.
 //!
 //! ```
-//! use clap::{Args, Command};
-//! use metachron_lab::args::BenchArgs;
+//! use clap::{Args, Command, FromArgMatches};
+//! use metachron_lab::args::{BenchArgs, BenchSubject};
+//! use std::path::Path;
 //!
 //! let command = BenchArgs::augment_args(Command::new("bench"));
-//! let matches = command.try_get_matches_from(["bench", "rod", "--quick"]).unwrap();
-//! assert!(matches.get_flag("quick"));
+//! let matches = command.clone().try_get_matches_from(["bench", "rod", "--quick", "--seconds", "2"]).unwrap();
+//! let args = BenchArgs::from_arg_matches(&matches).unwrap();
+//! assert_eq!((args.subject, args.quick, args.seconds), (BenchSubject::Rod, true, Some(2.0)));
+//! assert_eq!(args.out, Path::new("bench")); // where no folder is named
+//! assert!(command.try_get_matches_from(["bench", "rod", "--seconds", "-1"]).is_err());
 //! ```
 
 pub mod args;

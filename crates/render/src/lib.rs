@@ -1,8 +1,11 @@
-//! Draws the newest states (wgpu) and the panels around them (egui). Reads snapshots, never the runtime.
+//! Draws the newest states with wgpu at levels of detail that the caller chooses.
 //!
-//! A frame: [`SceneView::see`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`] finds which
-//! actors are visible and how large, [`SceneView::compose`] makes the [`Picture`] at the requested levels, [`Renderer::render`] draws it.
-//! [`SceneView`] needs no GPU; [`Offscreen`] needs no window.
+//! In: snapshots, looks, a camera, a level for every actor. Out: the actors in view and their sizes ([`Seen`]), a [`Picture`] as numbers,
+//! and with the feature `gpu` its pixels. Never here: a window, a policy, the runtime.
+//!
+//! A frame: [`SceneView::see`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`]
+//! finds which actors are visible and how large, [`SceneView::compose`] makes the [`Picture`] at the requested levels,
+//! `Renderer::render` draws it. [`SceneView`] needs no GPU; `Offscreen` needs no window.
 //!
 //! ```
 //! use glam::DVec3;
@@ -10,9 +13,9 @@
 //!
 //! let size = Size { width: 640, height: 480 };
 //! let camera = Camera::looking(DVec3::new(0.0, -5.0, 0.0), DVec3::ZERO, 0.7);
-//! let ahead = camera.frustum(size).sees(DVec3::ZERO, 0.1);
-//! let behind = camera.frustum(size).sees(DVec3::new(0.0, -9.0, 0.0), 0.1);
-//! assert!(ahead && !behind);
+//! let frustum = camera.frustum(size);
+//! assert!(frustum.sees(DVec3::ZERO, 0.1));
+//! assert!(!frustum.sees(DVec3::new(0.0, -9.0, 0.0), 0.1)); // behind the eye
 //! // half the height is 240 pixels, and tan(0.35) of the depth
 //! let expected = 240.0 / (5.0 * 0.35_f64.tan());
 //! assert!((camera.pixels_per_metre(5.0, size) - expected).abs() < 1e-6);

@@ -43,7 +43,7 @@ fn make_turns(c: &mut Criterion) {
         run.drive(Drive::Run);
         group.throughput(Throughput::Elements(1));
         group.bench_function(BenchmarkId::from_parameter(agents), |b| b.iter_custom(|turns| time(&run, turns)));
-        run.shutdown();
+        Box::new(run).shutdown();
     }
     group.finish();
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 #[test]
 fn every_agent_steps_on_its_own_and_the_end_joins_them() {
     on_every_executor(|start| {
-        let mut run = start([30.0, 240.0, 1000.0].map(|hz| Dummy::new(1.0).at(hz)).into(), system());
+        let run = start([30.0, 240.0, 1000.0].map(|hz| Dummy::new(1.0).at(hz)).into(), system());
         eventually("50 steps of each", || run.agents().iter().all(|a| a.stats().steps >= 50));
         let kept = run.agents()[0].clone();
         let stats = run.shutdown();
@@ -25,7 +25,7 @@ fn a_broken_agent_is_parked_and_the_others_go_on() {
     on_every_executor(|start| {
         for fault in [Fault::Panic, Fault::NotFinite, Fault::Diverged] {
             let broken = Dummy { fault: Some((3, fault)), ..Dummy::new(1.0) };
-            let mut run = start(vec![broken.at(500.0), Dummy::new(1.0).at(500.0)], system());
+            let run = start(vec![broken.at(500.0), Dummy::new(1.0).at(500.0)], system());
             eventually("the fault", || matches!(run.agents()[0].state(), AgentState::Parked(_)));
             let before = run.agents()[1].stats().steps;
             eventually("20 steps after it", || run.agents()[1].stats().steps >= before + 20);
@@ -40,7 +40,7 @@ fn an_agent_at_rest_wakes_for_a_command_and_for_a_touch() {
     on_every_executor(|start| {
         let sleepy = Dummy { rest_from: Some(5), ..Dummy::new(1.0) };
         let late = Dummy { touches: Some((1, AgentId(0))), rest_from: Some(1), ..Dummy::new(1.0) };
-        let mut run = start(vec![sleepy.at(500.0), late.at(500.0)], system());
+        let run = start(vec![sleepy.at(500.0), late.at(500.0)], system());
         let agent = run.agents()[0].clone();
         eventually("both at rest", || run.agents().iter().all(|a| a.state() == AgentState::Resting));
         let steps = agent.stats().steps;
@@ -88,7 +88,7 @@ fn on_a_clock_that_stands_still_nobody_runs_ahead() {
 fn a_lag_past_the_cap_is_dropped_once_and_the_agent_is_on_time_again() {
     on_every_executor(|start| {
         let clock = Arc::new(ManualClock::new());
-        let mut run = start(vec![Dummy::new(1.0).at(250.0)], Arc::clone(&clock) as Arc<dyn Clock>);
+        let run = start(vec![Dummy::new(1.0).at(250.0)], Arc::clone(&clock) as Arc<dyn Clock>);
         let agent = run.agents()[0].clone();
         eventually("the first step", || agent.stats().steps >= 1);
         clock.advance(Duration::from_secs(3));
@@ -113,7 +113,7 @@ impl Clock for BrokenClock {
 fn a_clock_that_falls_back_holds_agents_until_it_is_where_it_was_and_costs_them_nothing() {
     on_every_executor(|start| {
         let (clock, rates) = (Arc::new(BrokenClock::default()), [250.0, 100.0]);
-        let mut run = start(rates.map(|hz| Dummy::new(1.0).at(hz)).into(), Arc::clone(&clock) as Arc<dyn Clock>);
+        let run = start(rates.map(|hz| Dummy::new(1.0).at(hz)).into(), Arc::clone(&clock) as Arc<dyn Clock>);
         let ms = |n: u64| SimTime::from_nanos(n * 1_000_000);
         for (wall_ms, reached_ms) in [(40, 40), (15, 40), (30, 40), (60, 60)] {
             clock.0.store(wall_ms, SeqCst);
@@ -146,7 +146,7 @@ fn the_end_of_a_run_waits_for_no_step_that_never_returns() {
     on_every_executor(|start| {
         let log = Log::default();
         let hung = Dummy { fault: Some((3, Fault::Hang)), log: Some(Arc::clone(&log)), ..Dummy::new(1.0) };
-        let mut run = start(vec![Dummy::new(1.0).at(500.0), hung.at(500.0)], system());
+        let run = start(vec![Dummy::new(1.0).at(500.0), hung.at(500.0)], system());
         eventually("it hangs", || log.lock().unwrap().len() == 3);
         let stats = run.shutdown();
         assert_eq!((&stats[0].state, stats[1].steps), (&AgentState::Running, 2));

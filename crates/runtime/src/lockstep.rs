@@ -286,7 +286,7 @@ impl Run for Lockstep {
         &self.handles
     }
 
-    fn shutdown(&mut self) -> Vec<AgentStats> {
+    fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
         self.handles.iter().map(AgentHandle::stats).collect()
     }

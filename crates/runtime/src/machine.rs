@@ -95,7 +95,7 @@ impl Machine {
                 price("sheet", 5.0, 0.6),
                 price("solid", 5.0, 0.6),
                 price("rope", 5.0, 0.6),
-                price("instrument", 0.0, 3.0),
+                price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
             draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 4] },

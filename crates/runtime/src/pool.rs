@@ -107,7 +107,7 @@ impl Run for Pool {
         &self.hall.handles
     }
 
-    fn shutdown(&mut self) -> Vec<AgentStats> {
+    fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
         self.hall.handles.iter().map(AgentHandle::stats).collect()
     }

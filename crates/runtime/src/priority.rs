@@ -83,7 +83,7 @@ mod tests {
         let class = u32::from(granted.is_ok());
         for (prefix, pooled) in [("agent:real", false), ("pool:", true)] {
             let spawn = || crate::AgentSpawn { name: "real".to_owned(), ..Dummy::new(1.0).at(100.0) };
-            let mut run: Box<dyn Run> = if pooled {
+            let run: Box<dyn Run> = if pooled {
                 running(Pool::start(vec![spawn()], system(), Priority::Realtime).unwrap())
             } else {
                 running(Threads::start(vec![spawn()], system(), Priority::Realtime).unwrap())

@@ -4,8 +4,8 @@
 
 use super::build::AGENTS_MAX;
 use super::format::{
-    CommonFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SceneFile, SheetFile, SolidFile, SyntheticFile,
-    TreeFile, TubeFile,
+    CommonFile, MODELS, MeshFile, OLD_NAMES, RigidFile, RopeFile, SceneFile, SheetFile, SolidFile, SyntheticFile,
+    ToolFile, TreeFile, TubeFile,
 };
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
@@ -20,7 +20,7 @@ pub fn json_schema() -> Value {
         object::<SheetFile>(&mut generator),
         object::<SolidFile>(&mut generator),
         object::<RopeFile>(&mut generator),
-        object::<InstrumentFile>(&mut generator),
+        object::<ToolFile>(&mut generator),
         object::<SyntheticFile>(&mut generator),
         object::<MeshFile>(&mut generator),
         object::<TreeFile>(&mut generator),
@@ -87,7 +87,10 @@ fn object<T: JsonSchema>(generator: &mut SchemaGenerator) -> Value {
 }
 
 fn with_model(mut object: Value, model: &str) -> Value {
-    object["properties"]["model"] = json!({ "const": model });
+    let old_names = OLD_NAMES.iter().filter(|(_, now)| *now == model).map(|(old, _)| *old);
+    let names: Vec<_> = std::iter::once(model).chain(old_names).collect();
+    object["properties"]["model"] =
+        if let [only] = names[..] { json!({ "const": only }) } else { json!({ "enum": names }) };
     if let Some(required) = object["required"].as_array_mut() {
         required.push(json!("model"));
     }

@@ -135,7 +135,7 @@ fn form(spec: &Spec) -> Form {
         Spec::Tube(_) => Form::Tube,
         Spec::Rigid(body) => Form::Solid(body.solid.clone()),
         Spec::Soft(soft) => soft_form(soft),
-        Spec::Instrument(_) => Form::Tool(ToolShape::default()),
+        Spec::Tool(_) => Form::Tool(ToolShape::default()),
         Spec::Synthetic(_) => Form::Unseen,
     }
 }
@@ -322,7 +322,7 @@ fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
         let n = n as u8;
         match spec {
             Spec::Rigid(body) => solid_triangles(&body.solid, n),
-            Spec::Instrument(_) => of_tool(n),
+            Spec::Tool(_) => of_tool(n),
             Spec::Soft(body) => soft_triangles(&body.shape),
             Spec::Tube(_) | Spec::Synthetic(_) => 0,
         }

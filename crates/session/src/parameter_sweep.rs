@@ -62,7 +62,7 @@ pub fn setting_of(member: &Member) -> Setting {
     let (pieces, method) = match &member.spec {
         Spec::Tube(tube) => (pieces_of(tube, member), method_of(tube.integrator)),
         Spec::Soft(soft) => (cells(&soft.shape).iter().copied().max().unwrap_or(0), 0),
-        Spec::Rigid(_) | Spec::Instrument(_) | Spec::Synthetic(_) => (0, 0),
+        Spec::Rigid(_) | Spec::Tool(_) | Spec::Synthetic(_) => (0, 0),
     };
     Setting { dt_s: member.pace.dt.as_secs_f64(), pieces, method }
 }

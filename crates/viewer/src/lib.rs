@@ -3,12 +3,15 @@
 //! In: a plan of what to play. Out: the outcome of the run. Never here: physics, a law of control, the format of scenes.
 //!
 //! ```
-//! use metachron_viewer::ui::next_speed;
+//! use metachron_viewer::ui::{Command, SHORTCUTS, keys_text};
+//! use std::collections::HashSet;
 //!
-//! // the keys + and - step through a table of speeds, simulated seconds per second
-//! assert_eq!(next_speed(1.0, true), 2.0);
-//! assert_eq!(next_speed(1.0, false), 0.5);
-//! assert_eq!(next_speed(10.0, true), 10.0);
+//! let ctx = egui::Context::default(); // needs no window
+//! ctx.set_os(egui::os::OperatingSystem::Nix);
+//! assert_eq!(keys_text(&ctx, Command::Faster), "= or +");
+//! assert_eq!(keys_text(&ctx, Command::Reload), "Ctrl+L");
+//! let texts: HashSet<_> = SHORTCUTS.iter().map(|row| keys_text(&ctx, row.command)).collect();
+//! assert_eq!(texts.len(), SHORTCUTS.len()); // no two commands share their keys
 //! ```
 
 mod live_tuning;

@@ -184,7 +184,7 @@ pub(super) fn mass_kg(spec: &Spec) -> f64 {
         }
         Spec::Rigid(body) => body.mass_kg,
         Spec::Soft(_) => STRETCH_MASS_KG,
-        Spec::Instrument(_) | Spec::Synthetic(_) => HAND_MASS_KG,
+        Spec::Tool(_) | Spec::Synthetic(_) => HAND_MASS_KG,
     }
 }
 

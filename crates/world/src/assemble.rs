@@ -11,7 +11,7 @@ use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
-use metachron_models::tool::Instrument;
+use metachron_models::tool::Tool;
 use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, Watch};
 use std::borrow::Cow;
 
@@ -76,7 +76,7 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
         Spec::Tube(tube) => Box::new(Tube::new(tube)?),
         Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
         Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
-        Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
+        Spec::Tool(tool) => Box::new(Tool::new(tool)?),
         Spec::Synthetic(synthetic) => {
             let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
             // lockstep charges declared costs, so no CPU time has to be burnt

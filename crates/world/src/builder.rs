@@ -284,13 +284,7 @@ impl SceneBuilder {
 
     /// A solid that never moves, with its axes at `position_m`, metres, turned by `rotation`.
     #[must_use]
-    pub fn fixed_at(
-        mut self,
-        name: impl Into<String>,
-        solid: Solid,
-        position_m: [f64; 3],
-        rotation: DQuat,
-    ) -> Self {
+    pub fn fixed_at(mut self, name: impl Into<String>, solid: Solid, position_m: [f64; 3], rotation: DQuat) -> Self {
         let (friction, restitution) = SURFACE;
         let (name, position) = (name.into(), position_m.into());
         self.fixed.push(Obstacle { name, solid, position, rotation, friction, restitution });
@@ -310,7 +304,8 @@ impl SceneBuilder {
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
         let Self { gravity, fixed, parts } = self;
-        let names: Vec<&String> = fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
+        let names: Vec<&String> =
+            fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
         if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
             return Err(SceneBuildError::SameName { name: (*name).clone() });
         }

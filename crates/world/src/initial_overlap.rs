@@ -66,7 +66,7 @@ impl Scene {
                 Spec::Tube(tube) => tube.path_m.iter_mut().for_each(|point| *point += by_m),
                 Spec::Soft(soft) => soft.position += by_m,
                 Spec::Rigid(body) => body.position += by_m,
-                Spec::Instrument(tool) => tool.starts_off_m += by_m,
+                Spec::Tool(tool) => tool.starts_off_m += by_m,
                 Spec::Synthetic(_) => {}
             }
             self.moved.push(Moved { object: member.name.clone(), by_m });
@@ -106,12 +106,12 @@ impl Scene {
     }
 
     fn is_led(&self, id: AgentId) -> bool {
-        matches!(self.agents[id.0 as usize].spec, Spec::Instrument(_))
+        matches!(self.agents[id.0 as usize].spec, Spec::Tool(_))
     }
 
     /// Whether a tool may be drawn back out of `other`: it does not grasp it, and no attachment holds the tool.
     fn comes_back(&self, tool: AgentId, other: AgentId) -> bool {
-        let Spec::Instrument(spec) = &self.agents[tool.0 as usize].spec else { return false };
+        let Spec::Tool(spec) = &self.agents[tool.0 as usize].spec else { return false };
         let linked = |c: &Coupling| matches!(c.kind, CouplingKind::Attach { .. }) && (c.a == tool || c.b == tool);
         !(spec.graspable.contains(&other) || self.couplings.iter().any(linked))
     }
@@ -125,7 +125,7 @@ impl Scene {
             Spec::Tube(tube) => [tube.clamp, tube.pin].concat().contains(&true) || !tube.attachments.is_empty(),
             Spec::Soft(soft) => !soft.held.is_empty(),
             Spec::Rigid(_) => false,
-            Spec::Instrument(_) | Spec::Synthetic(_) => true,
+            Spec::Tool(_) | Spec::Synthetic(_) => true,
         };
         !(jointed || attached || held)
     }

@@ -121,7 +121,7 @@ pub(super) fn figure(member: &Member) -> Option<StartShape> {
             let kind = body.form()?.kind.clone();
             (kind, Pose::Soft(soft), low, high)
         }
-        Spec::Instrument(spec) => {
+        Spec::Tool(spec) => {
             let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
             let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
             let tip = key.tip_m + spec.starts_off_m;

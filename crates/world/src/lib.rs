@@ -6,24 +6,17 @@
 //! ```
 //! use metachron_core::SimSpan;
 //! use metachron_geometry::Solid;
-//! use metachron_world::kinds::ExecutorKind;
-//! use metachron_world::{Rigid, Scene, Tube, World};
+//! use metachron_world::{Rigid, Scene, Tube, World, kinds::ExecutorKind};
 //!
-//! let scene = Scene::builder()
-//!     .fixed("floor", Solid::Plane)
-//!     .add("ball", Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]).restitution(0.0))
-//!     .add("tube", Tube::along(&[[-0.2, 1.0, 0.3], [0.2, 1.0, 0.3]]).radius_m(0.01).clamp([true, true]))
-//!     .build()
-//!     .unwrap();
-//! let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-//! let ball = world.object("ball").unwrap();
-//! world.advance(SimSpan::from_secs_f64(2.0).unwrap());
-//! let (position, _) = world.latest(ball).body.probe(0.0).unwrap();
-//! assert!((position.z - 0.05).abs() < 1e-3); // it lies on the floor
-//!
-//! let again = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-//! again.advance(SimSpan::from_secs_f64(2.0).unwrap());
-//! assert_eq!(again.hash(), world.hash()); // the same bits
+//! let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]).restitution(0.0);
+//! let tube = Tube::along(&[[-0.2, 1.0, 0.3], [0.2, 1.0, 0.3]]).radius_m(0.01).clamp([true, true]);
+//! let scene = Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap();
+//! let [world, again] = [0, 1].map(|_| World::start(&scene, ExecutorKind::Lockstep).unwrap());
+//! [&world, &again].into_iter().for_each(|world| world.advance(SimSpan::from_millis(2000)));
+//! let state = world.latest(world.object("ball").unwrap());
+//! let (position, _) = state.body.probe(0.0).unwrap();
+//! assert!((position.z - 0.05).abs() < 1e-3); // the ball rests on the floor
+//! assert_eq!(world.hash(), again.hash()); // the same bits
 //! ```
 
 mod assemble;
@@ -37,8 +30,8 @@ mod overlap;
 mod scene;
 mod world;
 
-pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
 pub use assemble::{Govern, machine};
+pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
 pub use initial_overlap::Moved;
 pub use overlap::Overlap;
 pub use scene::{

@@ -68,7 +68,7 @@ impl Scene {
     /// its axis is inside.
     fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
         let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Instrument(_)));
+        let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
         for figure in unled.filter_map(figure) {
             let held = !(self.is_loose(figure.id) || matches!(self.agents[figure.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {

@@ -261,7 +261,7 @@ pub enum Spec {
     /// A sheet, solid or rope.
     Soft(SoftSpec),
     /// A driven tool.
-    Instrument(ToolSpec),
+    Tool(ToolSpec),
     /// Declared cost and error.
     Synthetic(SyntheticSpec),
 }
@@ -274,7 +274,7 @@ impl Spec {
             Self::Tube(_) => "tube",
             Self::Rigid(_) => "rigid",
             Self::Soft(spec) => spec.shape.model(),
-            Self::Instrument(_) => "instrument",
+            Self::Tool(_) => "tool",
             Self::Synthetic(_) => "synthetic",
         }
     }

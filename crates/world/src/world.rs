@@ -12,7 +12,6 @@ use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Command, Drive, Lockstep, Pool, Run, RunError, SendError, SystemClock,
     Threads, Timeline, state_hash, wait_until,
 };
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -62,12 +61,17 @@ pub struct World {
 }
 
 struct Shared {
-    run: Mutex<Box<dyn Run>>,
+    state: Mutex<State>,
     agents: Vec<AgentHandle>,
     executor: ExecutorKind,
     /// The clock of executors in real time.
     clock: Arc<SystemClock>,
-    stopped: AtomicBool,
+}
+
+/// What makes agents step, or where its time stood when it ended.
+enum State {
+    Running(Box<dyn Run>),
+    Stopped { now: Duration, time: SimTime, timeline: Timeline },
 }
 
 /// How often a real-time world looks whether all agents have arrived.
@@ -100,9 +104,7 @@ impl World {
             run.drive(Drive::Pause);
         }
         let agents = run.agents().to_vec();
-        Ok(Self {
-            shared: Arc::new(Shared { run: Mutex::new(run), agents, executor, clock, stopped: AtomicBool::new(false) }),
-        })
+        Ok(Self { shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, clock }) })
     }
 
     /// The object of that name.
@@ -129,7 +131,10 @@ impl World {
     /// Simulated time now.
     #[must_use]
     pub fn time(&self) -> SimTime {
-        self.run().sim_now()
+        match &*self.state() {
+            State::Running(run) => run.sim_now(),
+            State::Stopped { time, .. } => *time,
+        }
     }
 
     /// Hash of the newest states of all objects: equal numbers mean bit-identical states.
@@ -173,34 +178,37 @@ impl World {
     /// Wall time since the start; virtual in lockstep.
     #[must_use]
     pub fn now(&self) -> Duration {
-        self.run().now()
+        match &*self.state() {
+            State::Running(run) => run.now(),
+            State::Stopped { now, .. } => *now,
+        }
     }
 
     /// Waits until the wall time `until`, while the agents run; returns at once if that has passed.
     pub fn wait_until(&self, until: Duration) {
         match self.executor() {
-            ExecutorKind::Lockstep if !self.has_stopped() => self.run().wait_until(until),
-            ExecutorKind::Lockstep => {}
+            ExecutorKind::Lockstep => self.with_run(|run| run.wait_until(until)),
             _ => wait_until(&*self.shared.clock, until),
         }
     }
 
     /// Lets a frame's own `work` pass: it occupies a core of the declared machine in lockstep, and has passed by itself elsewhere.
     pub fn spend(&self, work: Duration) {
-        if !self.has_stopped() {
-            self.run().spend(work);
-        }
+        self.with_run(|run| run.spend(work));
     }
 
     /// The timeline in force.
     #[must_use]
     pub fn timeline(&self) -> Timeline {
-        self.run().timeline()
+        match &*self.state() {
+            State::Running(run) => run.timeline(),
+            State::Stopped { timeline, .. } => *timeline,
+        }
     }
 
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&self, drive: Drive) {
-        self.run().drive(drive);
+        self.with_run(|run| run.drive(drive));
     }
 
     /// Sends a command to an agent.
@@ -214,16 +222,30 @@ impl World {
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
     /// Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
-        self.shared.stopped.store(true, Ordering::Relaxed);
-        self.run().shutdown()
+        let mut state = self.state();
+        let ended = match &*state {
+            State::Running(run) => State::Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline() },
+            State::Stopped { .. } => return self.shared.agents.iter().map(AgentHandle::stats).collect(),
+        };
+        match std::mem::replace(&mut *state, ended) {
+            State::Running(run) => run.shutdown(),
+            State::Stopped { .. } => unreachable!("it ran a moment ago, and the lock is held"),
+        }
     }
 
     fn has_stopped(&self) -> bool {
-        self.shared.stopped.load(Ordering::Relaxed)
+        matches!(*self.state(), State::Stopped { .. })
     }
 
-    fn run(&self) -> MutexGuard<'_, Box<dyn Run>> {
-        self.shared.run.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Does something with a world that runs; nothing with one that was stopped.
+    fn with_run(&self, act: impl FnOnce(&mut dyn Run)) {
+        if let State::Running(run) = &mut *self.state() {
+            act(run.as_mut());
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -28,7 +28,7 @@ impl Fake {
         tube.picture = Some(Resolution { eps_m: 0.0081, n: 3 });
         let mut ball = AgentRow::new(BALL, "stone", "rigid");
         ball.state = AgentState::Resting;
-        let mut tool = AgentRow::new(AgentId(2), "grasper", "instrument");
+        let mut tool = AgentRow::new(AgentId(2), "grasper", "tool");
         tool.state = AgentState::Parked("the path left the world".to_owned());
         let status = Status {
             scene: "tube".to_owned(),

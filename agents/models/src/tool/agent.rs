@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 /// A driven tool with its own clock.
 #[derive(Clone)]
-pub struct Instrument {
+pub struct Tool {
     spec: ToolSpec,
     script: Script,
     tool: ToolState,
@@ -45,7 +45,7 @@ pub struct Instrument {
     steps: u64,
 }
 
-impl fmt::Debug for Instrument {
+impl fmt::Debug for Tool {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Instrument").field("tool", &self.tool).field("jaws", &self.jaws).finish_non_exhaustive()
     }
@@ -71,7 +71,7 @@ const PART_MAX_S: f64 = 1.0 / 240.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
-impl Instrument {
+impl Tool {
     /// Builds the tool of `spec`, in its first keyframe or at the given offset from it.
     ///
     /// # Errors
@@ -235,9 +235,9 @@ fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3
     ((off + push * t) * left, (rate - push * (damping_s * t)) * left)
 }
 
-impl Agent for Instrument {
+impl Agent for Tool {
     fn model(&self) -> &'static str {
-        "instrument"
+        "tool"
     }
 
     /// Moves the tip by `dt`, moves the jaws, reads the forces felt.
@@ -255,7 +255,7 @@ impl Agent for Instrument {
         let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
         if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
             let what = format!("the hand leads its tip to {}", led.tip);
-            return Err(StepError::Diverged { model: "instrument", dt_s, what });
+            return Err(StepError::Diverged { model: "tool", dt_s, what });
         }
         let was = self.tool.jaw;
         let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).0);

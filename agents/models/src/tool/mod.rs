@@ -13,7 +13,7 @@ mod gripper;
 mod spec;
 mod trajectory;
 
-pub use agent::Instrument;
+pub use agent::Tool;
 pub use spec::{Keyframe, ToolError, ToolSpec};
 
 #[cfg(test)]

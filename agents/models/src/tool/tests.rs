@@ -5,7 +5,7 @@ mod holds;
 mod pushes;
 mod rigid;
 
-use super::{Instrument, Keyframe, ToolError, ToolSpec};
+use super::{Keyframe, Tool, ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{
@@ -48,12 +48,12 @@ fn tube() -> Neighbour {
     Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
 }
 
-fn state(tool: &Instrument) -> ToolState {
+fn state(tool: &Tool) -> ToolState {
     let Body::Tool(state) = snapshot(tool).body else { panic!("a tool writes a tool's state") };
     state
 }
 
-fn snapshot(tool: &Instrument) -> Snapshot {
+fn snapshot(tool: &Tool) -> Snapshot {
     let mut snapshot = Snapshot::default();
     tool.write_snapshot(&mut snapshot);
     snapshot
@@ -61,14 +61,14 @@ fn snapshot(tool: &Instrument) -> Snapshot {
 
 /// A tool and its own time.
 struct Stage {
-    tool: Instrument,
+    tool: Tool,
     time: SimTime,
     around: Vec<Neighbour>,
 }
 
 impl Stage {
     fn new(spec: ToolSpec) -> Self {
-        Self { tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
+        Self { tool: Tool::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
     }
 
     fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
@@ -101,7 +101,7 @@ fn hand(target: DVec3) -> AnchorSpring {
 
 #[test]
 fn the_first_snapshot_is_right_before_any_step() {
-    let tool = Instrument::new(spec(vec![key(0.0, DVec3::Y, 0.7), key(1.0, DVec3::X, 0.0)])).unwrap();
+    let tool = Tool::new(spec(vec![key(0.0, DVec3::Y, 0.7), key(1.0, DVec3::X, 0.0)])).unwrap();
     let state = state(&tool);
     assert_eq!((state.tip, state.jaw, state.grasp), (DVec3::Y, 0.7, None));
 }
@@ -271,14 +271,14 @@ fn a_hand_that_is_nowhere_is_refused() {
         let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
         let before = state(&stage.tool);
         let error = stage.step_with(&[hand(target)]).unwrap_err();
-        assert!(matches!(error, StepError::Diverged { model: "instrument", .. }), "{error}");
+        assert!(matches!(error, StepError::Diverged { model: "tool", .. }), "{error}");
         assert_eq!(state(&stage.tool), before);
     }
 }
 
 #[test]
 fn scripts_that_are_none_are_refused() {
-    let refuse = |spec: ToolSpec| Instrument::new(spec).expect_err("it is refused");
+    let refuse = |spec: ToolSpec| Tool::new(spec).expect_err("it is refused");
     assert_eq!(refuse(spec(vec![])), ToolError::NoKeyframe);
     let backwards = refuse(spec(vec![key(1.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0)]));
     assert!(matches!(backwards, ToolError::NotRising { index: 1, .. }), "{backwards}");
@@ -298,7 +298,7 @@ fn scripts_that_are_none_are_refused() {
         assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
         assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber { .. }));
         assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber { .. }));
-        let damped = Instrument::new(ToolSpec { damping_n_s_m: value, ..good });
+        let damped = Tool::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
     }
 }

@@ -16,7 +16,7 @@ fn tireless() -> Machine {
     let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
     Machine {
         cores: 64,
-        steps: ["tube", "rigid", "instrument", "synthetic"].map(free).to_vec(),
+        steps: ["tube", "rigid", "tool", "synthetic"].map(free).to_vec(),
         draw: DrawPrice { setup_ms: 0.0, pixel_ns: 0.0, objects: Default::default() },
         ..Machine::default()
     }

@@ -243,7 +243,7 @@ fn points_of(member: &Member) -> Vec<Point> {
     let at: &[f64] = match member.spec {
         Spec::Tube(_) | Spec::Soft(_) => &[0.0, 0.5, 1.0],
         Spec::Rigid(_) => &[0.0],
-        Spec::Instrument(_) | Spec::Synthetic(_) => &[],
+        Spec::Tool(_) | Spec::Synthetic(_) => &[],
     };
     at.iter().map(|at| Point { agent: member.id, at: *at }).collect()
 }

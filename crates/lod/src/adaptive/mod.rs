@@ -4,7 +4,7 @@
 //! Never here: clocks, threads, the nature of an object; allocation once the buffers have grown. Theory: `docs/theory/budget.md`, §7.
 //!
 //! ```
-//! use crate::adaptive::{Adaptive, Offer, Settings, Time};
+//! use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 //!
 //! let mut adaptive = Adaptive::new(Settings::default());
 //! let offer = |cost, gain| Offer { cost, gain };

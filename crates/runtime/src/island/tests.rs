@@ -220,7 +220,7 @@ fn a_broken_member_is_parked_alone_and_the_others_go_on() {
 fn in_real_time_agents_come_and_go_and_no_step_is_lost() {
     on_every_executor(|start| {
         let log = Log::default();
-        let mut run = start(mates(now_and_then, &log), system());
+        let run = start(mates(now_and_then, &log), system());
         let leaders = || run.agents().iter().map(AgentHandle::led_by).collect::<Vec<_>>();
         let (moves, before) = (Cell::new(0), RefCell::new(leaders()));
         eventually("a hundred moves", || {
@@ -245,7 +245,7 @@ fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
     on_every_executor(|start| {
         for drop_it in [true, false] {
             let log = Log::default();
-            let mut run = start(mates(always, &log), system());
+            let run = start(mates(always, &log), system());
             let kept = run.agents().to_vec();
             eventually("all are led by the first", || kept[1..].iter().all(|a| a.led_by() == Some(AgentId(0))));
             let steps = kept[5].stats().steps;
@@ -285,7 +285,7 @@ fn an_island_rests_and_wakes_as_one_in_real_time() {
     on_every_executor(|start| {
         let log = Log::default();
         let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
-        let mut run = start([500.0, 250.0, 125.0].map(sleepy).into(), system());
+        let run = start([500.0, 250.0, 125.0].map(sleepy).into(), system());
         let all_rest = || run.agents().iter().all(|a| a.state() == AgentState::Resting && a.latest().at_rest);
         for round in 1..=20_u8 {
             eventually("all rest", all_rest);

@@ -24,7 +24,7 @@ fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
         let mut spawns: Vec<_> = (0..20).map(|_| Dummy::new(1.0).at(200.0)).collect();
         // more of them than workers
         (0..4).for_each(|k| spawns[5 * k] = hung(3 + k as u64).at(200.0));
-        let mut run = pool(spawns, workers, SHORT);
+        let run = pool(spawns, workers, SHORT);
         let is_hung = |at: usize| at.is_multiple_of(5);
         let each = |wanted: bool| run.agents().iter().enumerate().filter(move |(at, _)| is_hung(*at) == wanted);
         eventually("all four are parked", || each(true).all(|(_, agent)| parked(agent)));
@@ -45,7 +45,7 @@ fn those_who_are_led_by_one_that_hangs_are_parked_with_it() {
         |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::mate(1.0, |_, _, _| true, &log) };
     let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
-    let mut run = pool(spawns, 2, SHORT);
+    let run = pool(spawns, 2, SHORT);
     eventually("they are one", || run.agents()[1..3].iter().all(|a| a.led_by() == Some(AgentId(0))));
     eventually("all three are parked", || run.agents()[..3].iter().all(parked));
     let before = run.agents()[3].stats().steps;
@@ -55,7 +55,7 @@ fn those_who_are_led_by_one_that_hangs_are_parked_with_it() {
 
 #[test]
 fn one_worker_is_enough_for_a_thousand_and_none_starves() {
-    let mut run = pool((0..1000).map(|k| Dummy::new(1.0).at(5.0 + f64::from(k % 7))).collect(), 1, LONG);
+    let run = pool((0..1000).map(|k| Dummy::new(1.0).at(5.0 + f64::from(k % 7))).collect(), 1, LONG);
     eventually("three turns of each", || run.agents().iter().all(|a| a.stats().steps >= 3));
     let stats = run.shutdown();
     assert!(stats.iter().all(|s| s.state == AgentState::Running));
@@ -78,7 +78,7 @@ fn an_idle_worker_makes_the_turns_that_a_busy_one_cannot() {
 #[test]
 fn thousands_of_sleepers_wake_at_once_and_sleep_again() {
     let sleepy = |_| Dummy { rest_from: Some(2), ..Dummy::new(1.0) }.at(1000.0);
-    let mut run = pool((0..3000).map(sleepy).collect(), 2, LONG);
+    let run = pool((0..3000).map(sleepy).collect(), 2, LONG);
     let all_rest = |steps: u64| {
         let done = |a: &AgentHandle| a.state() == AgentState::Resting && a.latest().steps >= steps;
         eventually("all rest", || run.agents().iter().all(done));
@@ -114,7 +114,7 @@ fn a_pause_holds_thousands_and_a_step_moves_them_by_its_span() {
 
 #[test]
 fn an_empty_run_begins_and_ends() {
-    let mut run = pool(Vec::new(), 4, LONG);
+    let run = pool(Vec::new(), 4, LONG);
     assert!(run.agents().is_empty());
     assert!(run.shutdown().is_empty());
 }

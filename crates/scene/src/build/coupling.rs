@@ -53,8 +53,8 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     if let (Named::Tool(_), Named::Tool(_)) = (a, b) {
-        let expected = "expected a tube or a rigid object: both instruments are led, neither gives way";
-        c.wrong(place, "b", "is an instrument, as `a` is", expected);
+        let expected = "expected a tube or a rigid object: both tools are led, neither gives way";
+        c.wrong(place, "b", "is a tool, as `a` is", expected);
         return None;
     }
     let before = c.count();
@@ -87,8 +87,8 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
             "which is fixed",
             "expected an object that moves: what is fixed is touched by everything, without a coupling",
         ),
-        Some(Named::Scenery) => ("which is only seen", "expected a tube, a rigid object or an instrument"),
-        Some(Named::Synthetic(_)) => ("which has no matter", "expected a tube, a rigid object or an instrument"),
+        Some(Named::Scenery) => ("which is only seen", "expected a tube, a rigid object or a tool"),
+        Some(Named::Synthetic(_)) => ("which has no matter", "expected a tube, a rigid object or a tool"),
         Some(named) => return Some(named),
     };
     c.wrong(place, key, format_args!("names `{name}`, {what}"), expected);
@@ -211,7 +211,7 @@ fn tube_length_m(objects: &Objects, id: AgentId) -> Option<f64> {
     metachron_models::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
 }
 
-/// The centre of mass of a rigid object in its shape's axes; zero for any other object, such as an instrument, whose origin is its tip.
+/// The centre of mass of a rigid object in its shape's axes; zero for any other object, such as a tool, whose origin is its tip.
 fn centre_of_mass(objects: &Objects, id: AgentId) -> DVec3 {
     match spec_of(objects, id) {
         Some(Spec::Rigid(spec)) => RigidBody::new(spec.clone()).map_or(DVec3::ZERO, |body| body.com_local()),

@@ -90,7 +90,7 @@ pub(super) fn copies(
         return Copies::single();
     };
     if !can_move {
-        c.wrong(place, "grid", "repeats an object without a place", "expected an object that has one: no instrument");
+        c.wrong(place, "grid", "repeats an object without a place", "expected an object that has one: no tool");
         return Copies::single();
     }
     let count = grid.iter().map(|n| u64::from(*n)).product::<u64>();

@@ -109,8 +109,8 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
         ),
         Some(Named::Tool(_)) => wrong(
             c,
-            "which is an instrument",
-            "expected a rigid object; an instrument holds by its jaws, or by a `[[coupling]]` of `kind = \"attach\"`",
+            "which is a tool",
+            "expected a rigid object; a tool holds by its jaws, or by a `[[coupling]]` of `kind = \"attach\"`",
         ),
         Some(Named::Synthetic(_)) => wrong(c, "which has no matter", "expected a rigid object"),
         Some(Named::Scenery) => wrong(c, "which is only seen", "expected a rigid object"),

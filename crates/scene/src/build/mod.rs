@@ -9,7 +9,6 @@ mod glb;
 mod grid;
 mod group;
 mod impostors;
-mod instrument;
 mod joint;
 mod joint_keys;
 mod joint_rules;
@@ -22,6 +21,7 @@ mod soft;
 mod stage;
 mod synthetic;
 mod texture;
+mod tool;
 mod tube;
 
 pub(super) use common::world_faults;

@@ -3,12 +3,12 @@
 use super::common::{faults, levels, look, pace, tolerance, untolerated};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
-use super::{instrument, rigid, scenery, soft, synthetic, tube};
+use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
-    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile,
-    SyntheticFile, TreeFile, TubeFile,
+    COMMON_KEYS, CommonFile, FaultsFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile,
+    ToolFile, TreeFile, TubeFile, model_named,
 };
 use crate::source::Source;
 use glam::DVec3;
@@ -20,7 +20,7 @@ use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
-use metachron_models::tool::Instrument;
+use metachron_models::tool::Tool;
 use metachron_world::kinds::Material;
 use metachron_world::{Look, Member, Scenery, Spec};
 use serde::de::DeserializeOwned;
@@ -151,7 +151,7 @@ pub(super) enum ModelFile {
     Sheet(SheetFile),
     Solid(SolidFile),
     Rope(RopeFile),
-    Instrument(InstrumentFile),
+    Tool(ToolFile),
     Synthetic(SyntheticFile),
     Mesh(MeshFile),
     Tree(TreeFile),
@@ -198,7 +198,7 @@ pub(crate) fn read_objects(
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
         entry.fixed |= entry.model.is_scenery();
-        let can_move = !matches!(entry.model, ModelFile::Instrument(_) | ModelFile::Synthetic(_));
+        let can_move = !matches!(entry.model, ModelFile::Tool(_) | ModelFile::Synthetic(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
         entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
     }
@@ -235,7 +235,7 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
         "sheet" => read(c, own, span).map(ModelFile::Sheet),
         "solid" => read(c, own, span).map(ModelFile::Solid),
         "rope" => read(c, own, span).map(ModelFile::Rope),
-        "instrument" => read(c, own, span).map(ModelFile::Instrument),
+        "tool" => read(c, own, span).map(ModelFile::Tool),
         "mesh" => read(c, own, span).map(ModelFile::Mesh),
         "tree" => read(c, own, span).map(ModelFile::Tree),
         _ => read(c, own, span).map(ModelFile::Synthetic),
@@ -253,7 +253,7 @@ fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) 
         return None;
     };
     let found = value.get_ref().as_str();
-    if let Some(model) = MODELS.into_iter().find(|m| Some(*m) == found) {
+    if let Some(model) = found.and_then(model_named) {
         return Some(model);
     }
     let message = match found {
@@ -281,7 +281,7 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             (ModelFile::Tube(_), _) => Named::Tube(id),
             (ModelFile::Rigid(_), _) => Named::Rigid(id),
             (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => Named::Soft(id),
-            (ModelFile::Instrument(_), _) => Named::Tool(id),
+            (ModelFile::Tool(_), _) => Named::Tool(id),
             (ModelFile::Synthetic(_), _) => Named::Synthetic(id),
         };
         let first = next;
@@ -381,7 +381,7 @@ fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
         },
         Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Soft(spec) => SoftBody::new(spec).map(drop).map_err(|e| e.to_string()),
-        Spec::Instrument(spec) => Instrument::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Tool(spec) => Tool::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Synthetic(spec) => {
             Synthetic::new(spec, member.simulation, member.start).map(drop).map_err(|e| e.to_string())
         }
@@ -407,7 +407,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
     let material = match model {
         ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
-        ModelFile::Instrument(_) => Material::Metal,
+        ModelFile::Tool(_) => Material::Metal,
         _ => Material::Plastic,
     };
     let look = look(c, place, common, material);
@@ -425,7 +425,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
         ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &given)), unit, flat, flat),
         ModelFile::Solid(file) => (Spec::Soft(soft::solid(c, file, &given)?), unit, flat, flat),
         ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &given)), unit, flat, flat),
-        ModelFile::Instrument(file) => (Spec::Instrument(instrument::build(c, file, &given, names)), unit, flat, flat),
+        ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &given, names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
             let (spec, range) = synthetic::build(c, file, &given);
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
@@ -433,7 +433,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
     let (name, links) = (common.name.clone(), Vec::new());
-    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Instrument(_))).then_some(simulation)));
+    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Tool(_))).then_some(simulation)));
     Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 
@@ -441,7 +441,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
 fn link(members: &mut [Member]) {
     let mut pairs = Vec::new();
     for member in members.iter() {
-        if let Spec::Instrument(tool) = &member.spec {
+        if let Spec::Tool(tool) = &member.spec {
             pairs.extend(tool.graspable.iter().map(|tube| (member.id, *tube)));
         }
     }

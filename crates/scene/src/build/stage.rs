@@ -3,7 +3,7 @@
 use super::{Names, POSITION_MAX_M};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile};
+use crate::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile, model_named};
 use glam::DVec3;
 use metachron_core::SimSpan;
 use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
@@ -233,7 +233,8 @@ fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [
 fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {
     let mut steps = Vec::with_capacity(file.step.len());
     for (model, price) in &file.step {
-        if !MODELS.contains(&model.as_str()) {
+        let known = model_named(model);
+        if known.is_none() {
             let span = c.document().locate(&format!("machine.step.{model}"));
             let list = MODELS.map(|m| format!("`{m}`")).join(", ");
             let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model"));
@@ -241,7 +242,7 @@ fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Ve
         }
         let place = place.table(model);
         let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, &allowed(0.0..=1e9, "µs")));
-        steps.push((model.clone(), cost("base_us", price.base_us), cost("unit_us", price.unit_us)));
+        steps.push((known.unwrap_or(model).to_owned(), cost("base_us", price.base_us), cost("unit_us", price.unit_us)));
     }
     steps
 }

@@ -5,19 +5,18 @@
 
 mod common;
 mod coupling;
-mod instrument;
 mod joint;
 mod rigid;
 mod scene;
 mod scenery;
 mod soft;
 mod synthetic;
+mod tool;
 mod tube;
 mod value;
 
 pub use common::{COMMON_KEYS, CommonFile, HoldKind};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
-pub use instrument::{InstrumentFile, KeyframeFile};
 pub use joint::{JointFile, JointKind};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
@@ -26,8 +25,19 @@ pub use scene::{
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
 pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
+pub use tool::{KeyframeFile, ToolFile};
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
 pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.
-pub const MODELS: [&str; 9] = ["tube", "rigid", "sheet", "solid", "rope", "instrument", "synthetic", "mesh", "tree"];
+pub const MODELS: [&str; 9] = ["tube", "rigid", "sheet", "solid", "rope", "tool", "synthetic", "mesh", "tree"];
+
+/// Old names of models, which still work, and the names that they have now.
+pub const OLD_NAMES: [(&str, &str); 1] = [("instrument", "tool")];
+
+/// The model that a scene names, by its present or its old name.
+#[must_use]
+pub fn model_named(name: &str) -> Option<&'static str> {
+    let name = OLD_NAMES.iter().find(|(old, _)| *old == name).map_or(name, |(_, now)| now);
+    MODELS.into_iter().find(|model| *model == name)
+}

@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::harness::{Faults, Stage};
-use crate::tool::Instrument;
+use crate::tool::Tool;
 use crate::tool::{Keyframe, ToolSpec};
 use metachron_contact::{Law, Link};
 
@@ -49,7 +49,7 @@ fn floor() -> Obstacle {
 }
 
 /// A hand that closes from `at` to its middle until the springs press, and rises.
-fn hand(at: DVec3) -> Instrument {
+fn hand(at: DVec3) -> Tool {
     let inwards = -at.normalize() * (GAP_M + SQUEEZE_N / (SPRINGS * SPRING_N_M));
     let key = |at_s, way: DVec3| Keyframe { at_s, tip_m: at + way, rotation: DQuat::IDENTITY, jaw: 0.0 };
     let risen = inwards + UP * 0.05;
@@ -70,7 +70,7 @@ fn hand(at: DVec3) -> Instrument {
         graspable: vec![],
         starts_off_m: DVec3::ZERO,
     };
-    Instrument::new(tool).unwrap()
+    Tool::new(tool).unwrap()
 }
 
 impl Grip {

@@ -149,7 +149,7 @@ struct Pusher {
 
 impl Agent for Pusher {
     fn model(&self) -> &'static str {
-        "instrument"
+        "tool"
     }
 
     fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {

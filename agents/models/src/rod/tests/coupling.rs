@@ -110,7 +110,7 @@ impl Prop {
 impl Agent for Prop {
     /// Led as an instrument is: it never owns a pair.
     fn model(&self) -> &'static str {
-        "instrument"
+        "tool"
     }
 
     fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {

@@ -92,7 +92,7 @@ fn stage(
     let graspable = if held == Held::Brick { vec![] } else { vec![id] };
     let spec = ToolSpec { reach_m: 0.2, damping_n_s_m: 4.0, graspable, ..spec(keyframes) };
     let (stiffness_n_m, damping_n_s_m) = (spec.stiffness_n_m, spec.damping_n_s_m);
-    let tool = stage.add(Instrument::new(spec).unwrap(), rates.1);
+    let tool = stage.add(Tool::new(spec).unwrap(), rates.1);
     stage.law(id, tool, Law::Off); // nothing but the hold
     if held == Held::Brick {
         let [here, there] = [DVec3::Z * 0.05, DVec3::Z * -0.01].map(Anchor::Local);

@@ -27,8 +27,8 @@ pub(super) fn cube(position: DVec3, mass_kg: f64) -> RigidSpec {
 }
 
 /// A tool that pushes with at most `limit_n`.
-pub(super) fn tool(keyframes: Vec<Keyframe>, limit_n: f64) -> Instrument {
-    Instrument::new(ToolSpec { max_force_n: limit_n, graspable: vec![], ..spec(keyframes) }).unwrap()
+pub(super) fn tool(keyframes: Vec<Keyframe>, limit_n: f64) -> Tool {
+    Tool::new(ToolSpec { max_force_n: limit_n, graspable: vec![], ..spec(keyframes) }).unwrap()
 }
 
 pub(super) fn body(stage: &Stage, id: AgentId) -> RigidState {

@@ -67,7 +67,7 @@ impl Pair {
         let (reach_m, stiffness_n_m) = (REACH_M, STIFFNESS_N_M);
         let graspable = vec![body];
         let spec = ToolSpec { reach_m, stiffness_n_m, damping_n_s_m, graspable, ..spec(keyframes) };
-        let tool = stage.add(Instrument::new(spec).unwrap(), rates.1);
+        let tool = stage.add(Tool::new(spec).unwrap(), rates.1);
         Self { stage, body, tool }
     }
 
@@ -262,7 +262,7 @@ fn a_rigid_body_out_of_reach_or_not_to_be_grasped_is_left_alone() {
         let body = stage.add(RigidBody::new(RigidSpec { gravity: DVec3::ZERO, ..cube(DVec3::ZERO) }).unwrap(), 240.0);
         let graspable = if graspable { vec![body] } else { vec![] };
         let tool = ToolSpec { graspable, reach_m: REACH_M, ..spec(vec![down(0.0, tip, 0.0)]) };
-        let tool = stage.add(Instrument::new(tool).unwrap(), 240.0);
+        let tool = stage.add(Tool::new(tool).unwrap(), 240.0);
         stage.law(body, tool, metachron_contact::Law::Off);
         stage.run(0.2, |_| {});
         let Body::Tool(state) = stage.newest(tool).body else { panic!("a tool") };

@@ -1,7 +1,7 @@
 //! Islands that a spring from outside bears: what hangs on one member weighs on the spring as closed forms have it.
 
 use super::*;
-use crate::tool::Instrument;
+use crate::tool::Tool;
 use crate::tool::{Keyframe, ToolSpec};
 use metachron_core::PairKind;
 use metachron_core::{Anchor, ToolState};
@@ -79,7 +79,7 @@ fn a_chain_that_swings_from_an_undamped_spring_gains_no_energy() {
 /// A chain and a tool above its first link, shut from the start, each at its own time.
 struct Hanging {
     party: Party,
-    tool: Instrument,
+    tool: Tool,
     time: SimTime,
 }
 
@@ -98,7 +98,7 @@ impl Hanging {
             graspable: vec![AgentId(0)],
             starts_off_m: DVec3::ZERO,
         };
-        Self { party, tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO }
+        Self { party, tool: Tool::new(spec).unwrap(), time: SimTime::ZERO }
     }
 
     fn state(&self) -> ToolState {
@@ -169,7 +169,7 @@ fn a_tool_presses_what_shares_a_world_as_hard_as_a_lone_body() {
             graspable: vec![],
             starts_off_m: DVec3::ZERO,
         };
-        let (tool, party) = (Instrument::new(spec).unwrap(), Party::new([standing(0.15), standing(0.05)]));
+        let (tool, party) = (Tool::new(spec).unwrap(), Party::new([standing(0.15), standing(0.05)]));
         let mut pressing = Hanging { party, tool, time: SimTime::ZERO };
         pressing.run((1.0 / steps.0, 1.0 / steps.1), 3.0);
         let (tip, force_n) = (pressing.state().tip, pressing.state().force_n);

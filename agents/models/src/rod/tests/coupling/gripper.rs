@@ -9,7 +9,7 @@ use crate::rigid::RigidBody;
 use crate::rigid::RigidSpec;
 use crate::rod::Tube;
 use crate::rod::TubeSpec;
-use crate::tool::Instrument;
+use crate::tool::Tool;
 use crate::tool::{Keyframe, ToolSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Law, Link};
@@ -40,7 +40,7 @@ struct Gripper {
 }
 
 /// A tool that closes by `way` metres to its side and rises.
-fn hand(side: f64, way_m: f64) -> Instrument {
+fn hand(side: f64, way_m: f64) -> Tool {
     let rotation = DQuat::from_rotation_y(-side * std::f64::consts::FRAC_PI_2);
     let key = |at_s, in_m: f64, up_m: f64| Keyframe {
         at_s,
@@ -65,7 +65,7 @@ fn hand(side: f64, way_m: f64) -> Instrument {
         graspable: vec![],
         starts_off_m: DVec3::ZERO,
     };
-    Instrument::new(spec).unwrap()
+    Tool::new(spec).unwrap()
 }
 
 fn finger(side: f64) -> RigidBody {

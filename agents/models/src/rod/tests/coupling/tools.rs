@@ -2,7 +2,7 @@
 
 use super::meetings::{RADIUS, nodes, thrown};
 use crate::harness::{Faults, Stage};
-use crate::tool::Instrument;
+use crate::tool::Tool;
 use crate::tool::{Keyframe, ToolSpec};
 use glam::{DQuat, DVec3};
 use metachron_core::PairKind;
@@ -11,14 +11,14 @@ use metachron_core::{AgentId, Body, Snapshot, ToolState};
 const TUBE: AgentId = AgentId(0);
 
 /// A tool along x, its tip from `from` to `to` in half a second, its jaws from open to `jaw` on the way.
-fn tool(from: DVec3, to: DVec3, jaw: f64, graspable: Vec<AgentId>) -> Instrument {
+fn tool(from: DVec3, to: DVec3, jaw: f64, graspable: Vec<AgentId>) -> Tool {
     let key = |at_s, tip_m, jaw| Keyframe { at_s, tip_m, rotation: DQuat::from_rotation_y(1.2), jaw };
     let keyframes = vec![key(0.0, from, if jaw > 0.0 { jaw } else { 0.4 }), key(0.1, from, jaw), key(0.5, to, jaw)];
     let (stiffness_n_m, damping_n_s_m) = (100.0, 0.5);
     let (repeat, reach_m, max_force_n, starts_off_m) = (false, 0.02, 50.0, DVec3::ZERO);
     let spec =
         ToolSpec { keyframes, repeat, reach_m, stiffness_n_m, damping_n_s_m, max_force_n, graspable, starts_off_m };
-    Instrument::new(spec).unwrap()
+    Tool::new(spec).unwrap()
 }
 
 fn state(snapshot: &Snapshot) -> ToolState {

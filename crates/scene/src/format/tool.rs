@@ -1,4 +1,4 @@
-//! `model = "instrument"`: a driven tool with jaws.
+//! `model = "tool"`: a driven tool with jaws.
 
 use super::Point;
 use schemars::JsonSchema;
@@ -7,7 +7,7 @@ use serde::Deserialize;
 /// A driven tool: it follows its keyframes, or the user who drags it, and grasps tubes, soft and rigid bodies.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct InstrumentFile {
+pub struct ToolFile {
     /// Its motion: 1 … 10000 keyframes. With one keyframe the tool stays there until the user drags it.
     #[schemars(length(min = 1, max = 10_000))]
     pub keyframe: Vec<KeyframeFile>,

@@ -1,10 +1,10 @@
-//! Reads an instrument of a scene file as a [`ToolSpec`].
+//! Reads a tool of a scene file as a [`ToolSpec`].
 
 use super::POSITION_MAX_M;
 use super::object::{Given, Named, Names};
 use super::rigid::rotation;
 use crate::check::{Checker, Place, allowed};
-use crate::format::{InstrumentFile, KeyframeFile};
+use crate::format::{KeyframeFile, ToolFile};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -22,8 +22,8 @@ const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
 /// See [`FORCES_N`].
 const FORCES_WHY: &str = "N: a stronger drive would press what is light into what it stands on";
 
-/// Reads an instrument.
-pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Given<'_>, names: &Names) -> ToolSpec {
+/// Reads a tool.
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, given: &Given<'_>, names: &Names) -> ToolSpec {
     let place = given.place;
     ToolSpec {
         keyframes: keyframes(c, place, &file.keyframe),
@@ -42,7 +42,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Give
     }
 }
 
-fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &InstrumentFile, names: &Names) -> Vec<AgentId> {
+fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &ToolFile, names: &Names) -> Vec<AgentId> {
     let Some(wanted) = &file.grasps else { return names.tubes().map(|(_, id)| id).collect() };
     let mut found = Vec::with_capacity(wanted.len().min(names.len()));
     for (i, name) in wanted.iter().enumerate() {
@@ -63,7 +63,7 @@ const fn ungraspable(named: Named) -> Option<&'static str> {
     match named {
         Named::Fixed => Some("a fixed object"),
         Named::Scenery => Some("a mesh or tree without matter"),
-        Named::Tool(_) => Some("an instrument"),
+        Named::Tool(_) => Some("a tool"),
         Named::Synthetic(_) => Some("an agent without matter"),
         Named::Rigid(_) | Named::Tube(_) | Named::Soft(_) => None,
     }
