@@ -1,7 +1,7 @@
 //! The contract of an agent: an object that advances by its own steps.
 //!
 //! In: a step length and what the agent can see of the others ([`StepContext`]). Out: a new state and what the step took.
-//! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`metachron_models::conformance`].
+//! Never here: clocks, threads, files, the GPU. What every agent promises is tested by the suite `metachron_models::conformance`.
 
 use crate::{Law, Link};
 use glam::DVec3;
@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Promises, tested for every model: a step advances exactly `dt`; a refused step leaves the state bit for bit;
 /// the same calls give the same bits; nothing is allocated once the sizes settle; a state that is not finite is never written.
 pub trait Agent: Send {
-    /// The model's name as scenes write it: `tube`, `rigid`, `instrument`, `synthetic`.
+    /// The model's name as scenes write it: `tube`, `rigid`, `sheet`, `solid`, `rope`, `tool`, `synthetic`.
     fn model(&self) -> &'static str;
 
     /// Advances the state by exactly `dt`.

@@ -1,7 +1,7 @@
 //! The places where something fixed, or somebody whom that carries, carries a body that bends: they can push and not pull.
 //!
 //! In: where the body was pressed in its last step. Out: whether what pushes it presses it there. Never here: how the body answers them as it lies
-//! there ([`metachron_models::rod`], [`metachron_models::soft`]). Theory: docs/theory/coupling.md, eq. 7k and 7p.
+//! there (`metachron_models::rod`, `metachron_models::soft`). Theory: docs/theory/coupling.md, eq. 7k and 7p.
 
 use super::jacobian::ContactJacobian;
 use glam::DVec3;

@@ -7,7 +7,7 @@ use crate::SimSpan;
 pub struct StepReport {
     /// Work done, in the model's unit; a declared machine gives the cost of a unit in seconds.
     /// Tube: segments × systems solved: one per substep, more where its rule iterates, plus those of its own error estimate.
-    /// Rigid, instrument: 1. Synthetic: its declared microseconds.
+    /// Rigid, tool: 1. Synthetic: its declared microseconds.
     pub work: f64,
     /// Number of substeps that the step was divided into, ≥ 1.
     pub substeps: u32,

@@ -1,4 +1,4 @@
-//! Reads and checks scene files, as the only crate that reads files written by hand.
+//! Reads and checks scene files and the meshes next to them, as the only crate that does.
 //!
 //! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
 //! [`SceneError`] that shows every problem at its position. Never here: running agents, drawing, the command line.

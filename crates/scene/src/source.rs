@@ -1,6 +1,6 @@
 //! Sources of scenes: built in, or a file; and the files next to it.
 //!
-//! In: a name or a path. Out: text and bytes. Never here: their meaning. This is the only place that reads files.
+//! In: a name or a path. Out: text and bytes. Never here: their meaning. No other module of this crate reads files.
 
 use super::builtin;
 use super::diagnostic::{SceneError, did_you_mean};

@@ -1,6 +1,6 @@
 //! Ties between the objects of a scene: couplings, and injected faults.
 //!
-//! In: built by [`super::load`], checked. Out: plain data that the frame loop passes to agents and to the runtime.
+//! In: built in code ([`crate::Scene::builder`]) or by `metachron-scene`, checked. Out: plain data that the frame loop passes to agents and to the runtime.
 //! Never here: the file's text, forces.
 
 use metachron_contact::Law;

@@ -1,6 +1,6 @@
 //! A scene that can be run: every value checked, every default filled in, every name resolved.
 //!
-//! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
+//! In: built in code ([`Scene::builder`]) or by `metachron-scene`. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
 use super::builder::SceneBuilder;

@@ -5,11 +5,11 @@
 //! those in its island (`island/`).
 //!
 //! Between contacts a body follows its parabola in closed form and rotates by a splitting that conserves the angular momentum
-//! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds its duration.
+//! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `conservative_advancement.rs` bounds its duration.
 //! An impact is solved as instantaneous, so bounce heights do not depend on the step either: with all simultaneous
 //! contacts, in double precision (`meeting.rs`). In lasting contact with static solids a body is moved by
 //! the contact solver (`world.rs`, single precision, 4 small passes in at most 1/240 s), in lasting contact with other agents by the
-//! solve of `meeting.rs`. Springs are implicit (`springs.rs`).
+//! solve of `meeting.rs`. Springs are implicit (`linear_spring.rs`).
 //!
 //! Two rules hold for every pair: friction is the geometric mean of both coefficients, restitution the larger of both.
 

@@ -47,7 +47,7 @@ pub struct Tool {
 
 impl fmt::Debug for Tool {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Instrument").field("tool", &self.tool).field("jaws", &self.jaws).finish_non_exhaustive()
+        f.debug_struct("Tool").field("tool", &self.tool).field("jaws", &self.jaws).finish_non_exhaustive()
     }
 }
 

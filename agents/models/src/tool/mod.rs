@@ -1,10 +1,10 @@
 //! A driven tool: follows keyframes or a user spring, opens, closes, grasps a tube, a soft or a rigid body and drags it.
 //!
 //! In: a [`ToolSpec`], steps, the user spring, the snapshots of graspable agents. Out: a tip, jaws, a grasp.
-//! Never here: the grasp force. The held agent solves it in its own step and books it in a ledger (`felt.rs` reads it).
+//! Never here: the grasp force. The held agent solves it in its own step and books it in a ledger (`force_sensor.rs` reads it).
 //!
-//! `script.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `jaws.rs` the
-//! grasp, `tool.rs` is the agent.
+//! `trajectory.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `gripper.rs` the
+//! grasp, `agent.rs` is the agent.
 
 mod agent;
 mod drive;

@@ -34,13 +34,13 @@ pub(super) struct PoolState {
     pub timeline: SharedTimeline,
     pub board: Arc<SleepRegistry>,
     pub handles: Vec<AgentHandle>,
-    shelves: Vec<CachePadded<ReturnPlace>>,
+    shelves: Vec<CachePadded<WorkerQueue>>,
     beds: Vec<AtomicCell<Option<Box<AgentRunner>>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
 #[derive(Default)]
-struct ReturnPlace {
+struct WorkerQueue {
     queue: Mutex<Queue>,
     due: AtomicU64,
     frontier: AtomicU64,
@@ -121,7 +121,7 @@ impl PoolState {
     /// Takes over agents that another worker serves worse than worker `at` serves its own.
     pub fn balance(&self, at: usize, timeline: &Timeline, now: Duration) {
         let mine = self.shelves[at].frontier.load(Relaxed);
-        let unjust = |shelf: &ReturnPlace| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
+        let unjust = |shelf: &WorkerQueue| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
         if mine == NEVER || !self.shelves.iter().any(|shelf| unjust(shelf)) {
             return;
         }
@@ -144,7 +144,7 @@ impl PoolState {
     fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<AgentRunner>> {
         let count = self.shelves.len();
         let others = (1..count).map(|k| &self.shelves[(at + k) % count]);
-        let late = |shelf: &ReturnPlace| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
+        let late = |shelf: &WorkerQueue| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
         others.filter(|shelf| late(shelf)).find_map(|shelf| {
             shelf.try_with(|queue| {
                 queue.keep_time(timeline, now);
@@ -154,7 +154,7 @@ impl PoolState {
     }
 }
 
-impl ReturnPlace {
+impl WorkerQueue {
     fn with<R>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
         self.show(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
     }
