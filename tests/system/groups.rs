@@ -1,6 +1,6 @@
 //! Groups with levels of their own, from the scene file to the picture.
 
-use crate::picture::gpu;
+use crate::adapter::gpu;
 use metachron_lod::control::{LevelDemand, Policy};
 use metachron_render::{Offscreen, PictureFile, RendererOptions, Size};
 use metachron_scene::Source;

@@ -1,4 +1,6 @@
 //! The whole program as its users meet it; one binary, so that it links once.
+#[path = "../../crates/render/tests/pictures/adapter.rs"]
+mod adapter;
 mod behind;
 mod chart;
 mod chart_policies;
@@ -9,13 +11,10 @@ mod golden;
 mod groups;
 mod guide;
 mod idle;
-mod painting;
-mod picture;
 mod play;
 mod run;
 mod scene;
 mod scene_ties;
-mod scenery;
 mod scenes;
 mod scenes_apart;
 mod scenes_coupled;
@@ -26,4 +25,3 @@ mod sight;
 mod system_calls;
 mod throughput;
 mod tune;
-mod viewer;

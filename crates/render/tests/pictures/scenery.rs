@@ -1,6 +1,6 @@
 //! Meshes, trees and groups: what scenes say of them, and what is seen of them against closed forms.
 
-use crate::picture::gpu;
+use crate::adapter::gpu;
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};

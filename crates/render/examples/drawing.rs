@@ -1,8 +1,8 @@
 //! What does a frame cost to draw, over (ε, n)? Fits set-up, price a triangle and price a pixel on this machine's adapter.
 //!
-//! `cargo run --release --example drawing [-- FILE.png [EPS_M N [WIDTH HEIGHT [SAMPLES]]]]`; with a file name it draws one picture instead.
+//! `cargo run --release -p metachron-render --example drawing [-- FILE.png [EPS_M N [WIDTH HEIGHT [SAMPLES]]]]`; with a file name it draws one picture instead.
 
-#[path = "../tests/system/stage.rs"]
+#[path = "../tests/pictures/stage.rs"]
 mod stage;
 
 use cpu_time::ProcessTime;

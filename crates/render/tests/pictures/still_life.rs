@@ -3,9 +3,8 @@
 //! Without an adapter these tests say so and pass, unless `METACHRON_REQUIRE_ADAPTER=1`.
 //! `METACHRON_WRITE_PICTURES=1` stores the pictures anew.
 
-#[path = "stage.rs"]
-mod stage;
-
+use crate::adapter::gpu;
+use crate::stage;
 use glam::DVec3;
 use image::RgbaImage;
 use metachron_core::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
@@ -18,18 +17,6 @@ use std::sync::Arc;
 
 const SIZE: Size = Size { width: 320, height: 180 };
 const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 1024, shadow_taps: 4, lean: false };
-
-/// A device; `None`, with a line that says why, where there is none and none is required.
-pub fn gpu() -> Option<Gpu> {
-    match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("METACHRON_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("picture test skipped: {error}");
-            None
-        }
-    }
-}
 
 fn draw(gpu: &Gpu, stage: &mut SceneView, camera: &Camera, levels: &[Level], style: Style) -> RgbaImage {
     draw_with(gpu, (stage, camera), levels, style, OPTIONS)

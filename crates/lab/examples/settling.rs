@@ -1,6 +1,6 @@
 //! How fast do the two feedback laws bring a picture back to its target, on a declared machine?
 //!
-//! `cargo run --example settling` prints a table; with `-- --write` it also writes `docs/figures/settling.{csv,svg}`.
+//! `cargo run -p metachron-lab --example settling` prints a table; with `-- --write` it also writes `docs/figures/settling.{csv,svg}`.
 //! Nothing is measured: a frame takes setup + fill + c · triangles, so every run gives the same numbers on any computer.
 
 use metachron_core::{AgentId, ResolutionRange};
@@ -206,9 +206,8 @@ const GREY: RGBColor = RGBColor(0x88, 0x88, 0x88);
 
 /// The widths of words are those of the font that the window's panels are written in.
 fn bring_font() -> Result<(), Box<dyn Error>> {
-    let font = egui::FontDefinitions::default().font_data.remove("Ubuntu-Light").ok_or("no font")?;
-    let bytes = Box::leak(font.bytes().to_vec().into_boxed_slice());
-    register_font("sans-serif", FontStyle::Normal, bytes).map_err(|_| "a font that is none".into())
+    register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .map_err(|_| "the font of the panels cannot be read".into())
 }
 
 /// A panel a target: t/T_set over time, both laws from both sides.

@@ -1,6 +1,6 @@
 //! What is painted on meshes: patterns, images beside a scene and inside a .glb file, and what a wrong one is told.
 
-use crate::picture::gpu;
+use crate::adapter::gpu;
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgba, RgbaImage};
 use metachron_core::{AgentId, Resolution};

@@ -1,0 +1,6 @@
+//! Pictures drawn on the adapter present, compared with what they must show.
+mod adapter;
+mod painting;
+mod scenery;
+mod stage;
+mod still_life;
