@@ -14,7 +14,7 @@ mod acted;
 use super::other::turned;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::foot::is_borne;
-use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Inertia, InverseMass, RigidState, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 
 /// An agent as the audit sees it.
@@ -87,7 +87,7 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     };
     let h = at.secs_after(member.snapshot.time);
     if let Some(sprung) = member.snapshot.sprung.get() {
-        let inertia = (*inverse_mass, *inverse_inertia);
+        let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
         let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
         let [gone, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
         (state.position, state.rotation) = (state.position + gone[0], turned(state.rotation, gone[1]));

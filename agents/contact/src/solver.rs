@@ -205,7 +205,7 @@ impl Solver {
         let most = self.form(problem, body);
         let mut report = SolverReport::default();
         if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
-            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.now.cause(contacts, &self.formed, body, &mut self.answer);
             report.iterations += 1;
         } else {
             self.now.caused.clear();
@@ -220,7 +220,7 @@ impl Solver {
             if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= most) {
                 break;
             }
-            self.next.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.next.cause(contacts, &self.formed, body, &mut self.answer);
             report.iterations += 1;
             taken = self.bound_holds() || report.iterations >= most;
             if taken {
@@ -229,7 +229,7 @@ impl Solver {
         }
         if self.formed.is_known() {
             self.formed.forget();
-            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.now.cause(contacts, &self.formed, body, &mut self.answer);
         }
         self.products = report.iterations;
         report
@@ -302,7 +302,8 @@ impl Solver {
 /// there on, of `slots` in all. One response; nothing is allocated once `room` has its size.
 pub fn inverse_mass(
     contact: &Contact,
-    (own, slots): (usize, usize),
+    own: usize,
+    slots: usize,
     body: &mut impl Response,
     room: &mut Vec<DVec3>,
 ) -> [f64; 2] {
@@ -319,12 +320,7 @@ pub fn inverse_mass(
 
 impl Iterate {
     /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
-    fn cause(
-        &mut self,
-        contacts: &[Contact],
-        (formed, body): (&DelassusMatrix, &mut impl Response),
-        answer: &mut [DVec3],
-    ) {
+    fn cause(&mut self, contacts: &[Contact], formed: &DelassusMatrix, body: &mut impl Response, answer: &mut [DVec3]) {
         if formed.is_known() {
             return formed.times(&self.lambda, &mut self.caused);
         }

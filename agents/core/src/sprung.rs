@@ -6,8 +6,8 @@
 //! A constant acceleration carried on through a stiff spring's period would blow up; a linear model taken implicitly over the
 //! horizon cannot, and in a balance of spring and contact it is exact.
 
-use super::spatial::{Mat6, Twist};
-use glam::{DMat3, DVec3};
+use super::spatial::{InverseMass, Mat6, Twist};
+use glam::DVec3;
 
 /// What a body on springs publishes beside its mass: forces, and how they change, about its centre of mass in world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,13 +31,13 @@ pub struct Sprung {
 impl Sprung {
     /// (M + h C + h² K)⁻¹: the answer to an impulse of a body whose springs are implicit over `h` seconds (eq. 7b).
     #[must_use]
-    pub fn answer(&self, inertia: (f64, DMat3), h: f64) -> Mat6 {
+    pub fn answer(&self, inertia: InverseMass, h: f64) -> Mat6 {
         self.resistance(inertia, h).inverse()
     }
 
     /// M + h C + h² K.
-    fn resistance(&self, (inverse_mass, inverse_inertia): (f64, DMat3), h: f64) -> Mat6 {
-        let mut whole = Mat6::mass(inverse_mass.recip(), inverse_inertia.inverse());
+    fn resistance(&self, inertia: InverseMass, h: f64) -> Mat6 {
+        let mut whole = Mat6::mass(inertia.linear_per_kg.recip(), inertia.angular_per_kg_m2.inverse());
         whole.add(&self.damping, h);
         whole.add(&self.stiffness, h * h);
         whole
@@ -46,7 +46,7 @@ impl Sprung {
     /// How far a body comes in `h` seconds, and its velocities then, with what is on its way to it: how much that changes
     /// its velocities, and how far it has carried it by now.
     #[must_use]
-    pub fn settled(&self, inertia: (f64, DMat3), velocity: Twist, way: [Twist; 2], h: f64) -> [Twist; 2] {
+    pub fn settled(&self, inertia: InverseMass, velocity: Twist, way: [Twist; 2], h: f64) -> [Twist; 2] {
         let mut lean = Lean::new(*self, inertia, velocity);
         let [change, carried] = way.map(|impulse| lean.respond(impulse));
         lean.deliver(change, carried);
@@ -69,7 +69,7 @@ const STEP_SLACK: f64 = 1e-4;
 #[derive(Debug, Clone, Copy)]
 pub struct Lean {
     sprung: Sprung,
-    inertia: (f64, DMat3),
+    inertia: InverseMass,
     /// The horizon of `answer`, seconds.
     horizon_s: f64,
     answer: Mat6,
@@ -89,7 +89,7 @@ pub struct Lean {
 
 impl Lean {
     /// A body that is where it said to be.
-    pub fn new(sprung: Sprung, inertia: (f64, DMat3), velocity: Twist) -> Self {
+    pub fn new(sprung: Sprung, inertia: InverseMass, velocity: Twist) -> Self {
         let none = [DVec3::ZERO; 2];
         let (horizon_s, answer) = (sprung.span_s, sprung.answer(inertia, sprung.span_s));
         Self {
@@ -139,7 +139,7 @@ impl Lean {
     /// The velocities that an impulse causes.
     pub fn respond(&self, impulse: Twist) -> Twist {
         if self.struck {
-            [impulse[0] * self.inertia.0, self.inertia.1 * impulse[1]]
+            [impulse[0] * self.inertia.linear_per_kg, self.inertia.angular_per_kg_m2 * impulse[1]]
         } else {
             self.answer.times(impulse)
         }
@@ -148,8 +148,8 @@ impl Lean {
     /// The inverse mass (1/kg) and the mean inverse inertia (1/(kg·m²)) with which it answers.
     pub fn mobility(&self) -> [f64; 2] {
         if self.struck {
-            let turning = self.inertia.1;
-            return [self.inertia.0, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
+            let turning = self.inertia.angular_per_kg_m2;
+            return [self.inertia.linear_per_kg, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
         }
         let a = &self.answer.0;
         [(a[0][0] + a[1][1] + a[2][2]) / 3.0, (a[3][3] + a[4][4] + a[5][5]) / 3.0]

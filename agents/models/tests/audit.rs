@@ -94,7 +94,7 @@ fn a_tube_s_sums_are_its_own() {
     let mut snapshot = Snapshot::default();
     tube.write_snapshot(&mut snapshot);
     let spec = tube.spec();
-    let (mass_per_length_kg_m, rotary_kg_m) = (spec.mass_per_length_kg_m, spec.section.rotary_kg_m);
+    let (mass_per_length_kg_m, rotary_kg_m) = (spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m);
     let member = Member { id: AgentId(0), snapshot: &snapshot, mass_per_length_kg_m, rotary_kg_m };
     let sum = audit(&[member], SimTime::ZERO, &mut |_, _| 0.0);
     let (momentum, angular) = tube.momentum();

@@ -73,7 +73,7 @@ impl Line {
 
     /// Stores the wave that the other end published at its time `at`. The end that `decides` chooses the delay from its own step of
     /// `dt_s` and the other's step; the other end adopts it.
-    pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
+    pub fn receive(&mut self, at: SimTime, wave: Option<Wave>, decides: bool, dt_s: f64) {
         let wave = wave.unwrap_or_default();
         let sane = wave.sent.is_finite() && wave.start.is_finite();
         let back_s = self.heard.back().map_or(-1.0, |&(last, _)| last.secs_after(at));
@@ -199,7 +199,7 @@ mod tests {
         while t[0].as_secs_f64() < seconds {
             let i = usize::from(t[1] < t[0]);
             let (h, other) = (steps[i], 1 - i);
-            lines[i].hear(shown[other].0, shown[other].1, (i == 0, h));
+            lines[i].receive(shown[other].0, shown[other].1, i == 0, h);
             let c = lines[i].arriving(t[i], h);
             let z = lines[i].impedance();
             let force = (c.x + z * v[i]) / (1.0 + z * h); // of 1 kg

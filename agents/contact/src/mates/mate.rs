@@ -423,7 +423,7 @@ impl Mate {
             respond(&mut impulses[..own]);
             self.other.respond(self.slots_mut(impulses));
         };
-        self.weighed = Some(inverse_mass(&contact, (own, self.end()), &mut answer, &mut room));
+        self.weighed = Some(inverse_mass(&contact, own, self.end(), &mut answer, &mut room));
         self.room = room;
     }
 

@@ -6,7 +6,7 @@ use super::{Other, Pose};
 use glam::{DQuat, DVec3};
 use metachron_core::Inertia;
 use metachron_core::sprung::Lean;
-use metachron_core::{Sprung, Twist};
+use metachron_core::{InverseMass, Sprung, Twist};
 
 impl Other {
     /// Its smooth acceleration and the mean of what others give it, m/s²: none where impulses do not move it.
@@ -85,7 +85,8 @@ impl Other {
     pub(super) fn lean_of(&self, sprung: Option<Sprung>, velocity: Twist) -> Option<Lean> {
         match (sprung.filter(|_| !self.held), &self.neighbour.as_ref()?.snapshot.inertia) {
             (Some(sprung), Inertia::Rigid { inverse_mass, inverse_inertia }) => {
-                Some(Lean::new(sprung, (*inverse_mass, *inverse_inertia), velocity))
+                let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
+                Some(Lean::new(sprung, inertia, velocity))
             }
             _ => None,
         }

@@ -360,7 +360,7 @@ impl Meeting {
             impulses[1] = inverse.1 * impulses[1];
             other.respond(&mut impulses[its.clone()]);
         };
-        let weighed = inverse_mass(&contact, (2, its.end), &mut answer, room);
+        let weighed = inverse_mass(&contact, 2, its.end, &mut answer, room);
         exchange.pair_mut(id).inverse_mass_per_kg = Some(weighed);
     }
 

@@ -8,7 +8,7 @@ use super::banded_ldl::Factor;
 use super::contact::TubeContacts;
 use super::discretization::Discretization;
 use super::rotation::{exp, unit};
-use super::state::{RodMaterial, RodState};
+use super::state::{DividedRod, RodState};
 use glam::DVec3;
 use metachron_contact::Neighbour;
 use metachron_core::SimTime;
@@ -20,6 +20,25 @@ use metachron_core::{ContactJacobian, Foot, Impulse, Site};
 const TIMELY_STEPS: f64 = 2.0;
 /// How often that displacement is halved before it is dropped.
 const WAY_HALVINGS: u32 = 6;
+
+/// A factored system, with the springs and supports that it includes.
+pub struct FactoredSystem<'a> {
+    /// The factor of its matrix.
+    pub factor: &'a Factor,
+    /// Springs: each records the impulse that it takes.
+    pub ties: &'a mut [Tie],
+    /// Contact points on moving supports: the impulses that they take act on the tube through the coming substep.
+    pub feet: &'a [Foot],
+}
+
+/// What limits the displacement of a tube by received impulses.
+#[derive(Clone, Copy)]
+pub struct DisplacementLimit<'a> {
+    /// Contacts with fixed solids, which no node may enter.
+    pub walls: &'a TubeContacts,
+    /// The longest displacement of a node, metres; may be infinite.
+    pub way_m: f64,
+}
 
 /// Received impulses, gathered in slots.
 #[derive(Debug, Clone, Default)]
@@ -123,16 +142,17 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; recomputes the strains. Needs a factor of this division.
     ///
-    /// `feet` are the contact points on moving supports that the factor includes: the impulses they take act on the tube through the coming
-    /// substep. No node is displaced by more than `way_m`, and untimely displacements are shortened until they do not strain the tube.
-    /// `ties` are those in the factor: each records the impulse it takes.
+    /// Displacements stay within `limit`, and untimely ones are shortened until they do not strain the tube.
     pub fn apply(
         &mut self,
         state: &mut RodState,
-        (factor, ties): (&Factor, &mut [Tie]),
-        (matter, division): (&RodMaterial, &Discretization),
-        (walls, feet, way_m): (&TubeContacts, &[Foot], f64),
+        system: FactoredSystem<'_>,
+        rod: DividedRod<'_>,
+        limit: DisplacementLimit<'_>,
     ) {
+        let FactoredSystem { factor, ties, feet } = system;
+        let DividedRod { matter, division } = rod;
+        let DisplacementLimit { walls, way_m } = limit;
         let Self { sum, carried, fresh, slots, .. } = self;
         for list in [&mut *sum, &mut *carried] {
             hold(list, matter.held);
@@ -150,7 +170,7 @@ impl Received {
         }
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };
-        let share = if self.untimely { self.unstrained(state, (matter, division), share) } else { share };
+        let share = if self.untimely { self.unstrained(state, rod, share) } else { share };
         let Self { sum, carried, .. } = self;
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
         ties.iter_mut().for_each(|tie| tie.take(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
@@ -161,18 +181,13 @@ impl Received {
 
     /// The share of the displacement of `state`, at most `share`, halved until it does not increase the tube's strain energy; zero where a
     /// few halvings do not suffice (eq. 37b).
-    fn unstrained(
-        &mut self,
-        state: &RodState,
-        (matter, division): (&RodMaterial, &Discretization),
-        mut share: f64,
-    ) -> f64 {
+    fn unstrained(&mut self, state: &RodState, rod: DividedRod<'_>, mut share: f64) -> f64 {
         let Self { carried, trial, .. } = self;
         for _ in 0..WAY_HALVINGS {
             trial.resize(state.q.len());
             trial.copy_from(state);
             carry(trial, carried, share);
-            trial.strain(matter, division);
+            trial.strain(rod.matter, rod.division);
             if trial.elastic_j <= state.elastic_j {
                 return share;
             }

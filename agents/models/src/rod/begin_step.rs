@@ -41,7 +41,7 @@ impl Tube {
         if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {
             self.act_on_itself(around, dt_s).map_err(|lost| self.diverged(lost, dt_s))?;
         }
-        let taken = self.step_by(dt_s, |stepper, now, setting, ties| stepper.receive(now, setting, (ties, way_m)));
+        let taken = self.step_by(dt_s, |stepper, now, setting, ties| stepper.receive(now, setting, ties, way_m));
         taken.map_err(|lost| self.diverged(lost, dt_s))?;
         if around.neighbours.iter().any(|n| n.form.is_some() || n.owned) {
             let bounds = bounds(&self.now, self.widest_m());

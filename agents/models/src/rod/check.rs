@@ -105,7 +105,7 @@ fn check_section(spec: &TubeSpec) -> Result<(), TubeError> {
     positive("ei_n_m2", s.ei_n_m2)?;
     positive("gj_n_m2", s.gj_n_m2)?;
     positive("rotary_kg_m", s.rotary_kg_m)?;
-    positive("mass_per_length_kg_m", spec.mass_per_length_kg_m)
+    positive("mass_per_length_kg_m", s.mass_per_length_kg_m)
 }
 
 fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {

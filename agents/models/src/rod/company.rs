@@ -9,6 +9,7 @@ use super::apply_impulses::Received;
 use super::contact::Skin;
 use super::discretization::Discretization;
 use super::sided::Sided;
+use super::substep::Substep;
 use glam::DVec3;
 use metachron_contact::beside::{may_touch, parts};
 use metachron_contact::{Contact, Exchange, Law, Mates, Search, WAKE_M_S};
@@ -190,13 +191,13 @@ impl Company {
         contacts[first..].sort_unstable_by_key(|contact| contact.key);
     }
 
-    /// Tells links where their far ends are for the substep from `start` to `start + h` seconds of the step.
-    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], (start, h): (f64, f64)) {
+    /// Tells links where their far ends are for a substep.
+    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], substep: Substep) {
         for tie in ties {
             let End::Linked(link) = tie.end else { continue };
-            let Some(far) = self.mates.far(&link, h) else { continue };
+            let Some(far) = self.mates.far(&link, substep.span_s) else { continue };
             let point = tie.mix(positions[tie.segment], positions[tie.segment + 1]);
-            tie.aim(&far, point, (start, h));
+            tie.aim(&far, point, substep);
         }
     }
 

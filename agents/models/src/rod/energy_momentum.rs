@@ -16,14 +16,14 @@ use glam::{DMat3, DQuat, DVec3};
 const TURN_MIN_RAD: f64 = 1e-6;
 
 /// Fills `rhs` with M (v_n − v) + 2 h f̄, and adds springs to both; `scene.h` is half the substep.
-pub fn fill_mean(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
-    fill_segments(scene, (now, next), rhs);
-    fill_joints(scene, (now, next), rhs);
-    add_springs(scene, (now, next), rows, rhs);
+pub fn fill_mean(scene: &Scene<'_>, now: &RodState, next: &RodState, rows: &mut [Row], rhs: &mut [DVec3]) {
+    fill_segments(scene, now, next, rhs);
+    fill_joints(scene, now, next, rhs);
+    add_springs(scene, now, next, rows, rhs);
 }
 
 /// Change of momentum, weight, stretch and shear (eq. 45, 47).
-fn fill_segments(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
+fn fill_segments(scene: &Scene<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
     let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *scene.matter;
     let h = scene.h;
     let want = |slot: usize| now.u[slot] - next.u[slot];
@@ -49,7 +49,7 @@ fn fill_segments(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &m
 }
 
 /// Bend and twist (eq. 48).
-fn fill_joints(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
+fn fill_joints(scene: &Scene<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
     let Scene { matter, division, .. } = *scene;
     let (count, wall) = (now.q.len(), division.wall);
     let ends = |k: usize| (now.q[k], next.q[k]);
@@ -86,7 +86,7 @@ fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DV
 }
 
 /// Attachments: the mean of the forces at both ends of the substep, corrected along the displacement so that work equals energy change.
-fn add_springs(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
+fn add_springs(scene: &Scene<'_>, now: &RodState, next: &RodState, rows: &mut [Row], rhs: &mut [DVec3]) {
     let h = scene.h;
     for spring in scene.springs {
         let (k, slot) = (spring.node, 2 * spring.node);
@@ -116,7 +116,7 @@ mod tests {
         let scene =
             Scene { matter, division, springs: &[], ties: &[], h: 1.0, until: 0.0, integrator: Default::default() };
         let (mut rows, mut rhs) = (vec![Row::ZERO; now.u.len()], vec![DVec3::ZERO; now.u.len()]);
-        fill_mean(&scene, (&now, &next), &mut rows, &mut rhs);
+        fill_mean(&scene, &now, &next, &mut rows, &mut rhs);
         let mut work = 0.0;
         let (mut push, mut turn) = (DVec3::ZERO, DVec3::ZERO);
         for k in 0..now.x.len() {

@@ -5,7 +5,7 @@
 //! Never here: whether the step is short enough ([`super::method`]). Theory: docs/theory/rod.md, eq. 40–42.
 
 use super::banded_ldl::Row;
-use super::state::{RodMaterial, RodState};
+use super::state::{DividedRod, RodMaterial, RodState};
 use super::step::{Lost, Stepper};
 use super::sym3::Sym3;
 use super::system::{Iterate, Scene, add_springs, add_ties, gyrate, hold_ends};
@@ -26,7 +26,8 @@ impl Stepper {
         self.assemble_light(now, scene, true);
         self.answer()?;
         let Self { rhs, projector, .. } = self;
-        projector.project(now, rhs, (scene.matter, scene.division), scene.h);
+        let rod = DividedRod { matter: scene.matter, division: scene.division };
+        projector.project(now, rhs, rod, scene.h);
         self.touch(now, scene, true);
         self.advance(now, scene, true);
         self.must_be_finite()
@@ -76,7 +77,7 @@ fn fill_forces(scene: &Scene<'_>, now: &RodState, rhs: &mut [DVec3]) {
     for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {
         let (a, b, m) = (now.u[2 * k], now.u[2 * k + 2], mu * l / 6.0);
         rhs[2 * k] += (a * 2.0 + b) * m;
-        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, (rotary * l, h)) + now.force[2 * k + 1] * h;
+        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, rotary * l, h) + now.force[2 * k + 1] * h;
         rhs[2 * k + 2] = now.force[2 * k + 2] * h + (b * 2.0 + a) * m;
     }
 }
@@ -89,13 +90,13 @@ fn fill_weights(scene: &Scene<'_>, now: &RodState, rhs: &mut [DVec3]) {
     for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {
         let half = 0.5 * mu * l;
         rhs[2 * k] += (now.u[2 * k] + gravity * h) * half;
-        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, (rotary * l, h));
+        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, rotary * l, h);
         rhs[2 * k + 2] = (now.u[2 * k + 2] + gravity * h) * half;
     }
 }
 
 /// The angular momentum of a segment about its own centre, turned by its gyroscopic torque (eq. 19).
-fn spin(w: DVec3, t: DVec3, (rotary, h): (f64, f64)) -> DVec3 {
+fn spin(w: DVec3, t: DVec3, rotary: f64, h: f64) -> DVec3 {
     let w = gyrate(w, t, h);
     (w + t * t.dot(w)) * rotary
 }

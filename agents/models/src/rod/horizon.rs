@@ -131,13 +131,13 @@ impl Tube {
     pub(super) fn foretell(&mut self, dt: f64) {
         let Self { now, matter, division, accelerations: list, stepper, .. } = self;
         list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
-        momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
+        momenta(matter.mu, matter.rotary, division.length.iter().copied().zip(now.t.iter().copied()), list);
         list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
         list.iter_mut().zip(stepper.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * dt);
         let standing = stepper.footing.factor();
         self.standing_accelerations.extend(list.iter().filter(|_| standing.is_some()));
         let accelerate = |factor: &Factor, list: &mut Vec<DVec3>| {
-            respond((factor, matter.held), list);
+            respond(factor, matter.held, list);
             list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
         };
         accelerate(stepper.factor(), list);

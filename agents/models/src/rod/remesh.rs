@@ -8,6 +8,15 @@ use super::rotation::between;
 use super::state::{RodMaterial, RodState};
 use glam::{DQuat, DVec3};
 
+/// A state of a tube on the division that it belongs to.
+#[derive(Debug, Clone, Copy)]
+pub struct MeshedRod<'a> {
+    /// The state.
+    pub state: &'a RodState,
+    /// The division.
+    pub division: &'a Discretization,
+}
+
 /// Working storage.
 #[derive(Debug, Clone, Default)]
 pub struct Remesher {
@@ -35,21 +44,17 @@ impl Remesher {
         &self.arcs
     }
 
-    /// Writes the state `from` on division `old` into `to` on division `new`.
-    pub fn carry(
-        &mut self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    /// Writes the state of `old` into `to` on division `new`.
+    pub fn carry(&mut self, matter: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         to.resize(new.segments());
-        self.learn(matter, from, old);
-        self.shape(matter, (from, old), (to, new));
-        self.motion(matter, (from, old), (to, new));
+        self.learn(matter, old);
+        self.shape(matter, old, to, new);
+        self.motion(matter, old, to, new);
     }
 
     /// Samples rotations and strains of the old segments relative to rest.
-    fn learn(&mut self, matter: &RodMaterial, from: &RodState, old: &Discretization) {
+    fn learn(&mut self, matter: &RodMaterial, old: MeshedRod<'_>) {
+        let MeshedRod { state: from, division: old } = old;
         self.turns.clear();
         self.at.clear();
         self.strains.clear();
@@ -69,12 +74,8 @@ impl Remesher {
     }
 
     /// Frames by interpolated rotations (eq. 30), positions by summing the strained segments (eq. 31).
-    fn shape(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn shape(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         to.x[0] = from.x[0];
         for k in 0..new.segments() {
             let s = new.middle_m(k);
@@ -82,16 +83,12 @@ impl Remesher {
             let strain = self.strain_at(old, s) + DVec3::Z * new.chord[k];
             to.x[k + 1] = to.x[k] + to.q[k] * strain * new.length[k];
         }
-        self.place(matter, (from, old), (to, new));
+        self.place(matter, rod, to, new);
     }
 
     /// Restores held ends, or the centre of mass where none is held.
-    fn place(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn place(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         let gap = from.x[old.segments()] - to.x[new.segments()];
         match matter.held {
             [true, false] => {}
@@ -109,12 +106,8 @@ impl Remesher {
     }
 
     /// Velocities by interpolation, then the missing momentum spread evenly over the free nodes (eq. 32).
-    fn motion(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn motion(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         let count = new.segments();
         for (k, &s) in new.arc_m.iter().enumerate() {
             let (left, w) = old.locate(s);

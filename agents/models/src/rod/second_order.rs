@@ -9,7 +9,7 @@ use super::energy_momentum::fill_mean;
 use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
 use super::state::{RodMaterial, RodState};
-use super::step::{Lost, Stepper, TURN_MAX_RAD, Verdict};
+use super::step::{Lost, Stepper, TURN_MAX_RAD, Trial, Verdict};
 use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
 
 /// Newton iterations of BDF2 (least, most): with a single one it damps like implicit Euler, and an unconverged one never comes to rest.
@@ -23,12 +23,12 @@ const MEAN_ITERATIONS: u32 = 12;
 const MEAN_SLACK: f64 = 1e-14;
 
 impl Stepper {
-    /// One trial substep of second order (eq. 43–48); `bound` limits turns, `divide` allows a smaller substep.
-    pub(super) fn glide(
+    /// One trial substep of second order (eq. 43–48).
+    pub(super) fn attempt_second_order(
         &mut self,
         now: &RodState,
         scene: &Scene<'_>,
-        (bound, divide): (bool, bool),
+        trial: Trial,
     ) -> Result<Verdict, Lost> {
         let free = scene.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
         if free {
@@ -38,7 +38,7 @@ impl Stepper {
             };
             let rise = self.energy_rise(now, scene);
             let ended = ended && rise <= self.past.spare_j() && self.next.is_finite();
-            if bound && !(ended && self.farthest_turn(now) <= TURN_MAX_RAD) {
+            if trial.bounds_turns && !(ended && self.farthest_turn(now) <= TURN_MAX_RAD) {
                 return Ok(Verdict::TooFar);
             }
             if ended && !self.would_touch(now, scene) {
@@ -46,7 +46,7 @@ impl Stepper {
                 return Ok(Verdict::Good);
             }
         }
-        self.attempt_euler(now, scene, (bound, divide))
+        self.attempt_euler(now, scene, trial)
     }
 
     /// Backward differences (eq. 43): implicit Euler of another length from another state; returns whether the iteration converged.
@@ -54,7 +54,7 @@ impl Stepper {
         let mut start = std::mem::take(&mut self.ahead);
         let h = self.past.start(now, &mut start, scene.h);
         let scene = Scene { h, ..*scene };
-        self.guess(now, &start, (h, scene.h));
+        self.guess(now, &start, h, scene.h);
         let mut ended = false;
         for done in 1..=BACK_ITERATIONS.1 {
             self.next.strain(scene.matter, scene.division);
@@ -78,7 +78,7 @@ impl Stepper {
     }
 
     /// The first iterate: velocities extrapolated from the past, and the positions they reach from `start`.
-    fn guess(&mut self, now: &RodState, start: &RodState, (h, whole): (f64, f64)) {
+    fn guess(&mut self, now: &RodState, start: &RodState, h: f64, whole: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -129,7 +129,7 @@ impl Stepper {
         for _ in 0..MEAN_ITERATIONS {
             self.next.strain(scene.matter, scene.division);
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
-            fill_mean(&tangent, (now, &self.next), &mut self.rows, &mut self.rhs);
+            fill_mean(&tangent, now, &self.next, &mut self.rows, &mut self.rhs);
             hold_ends(scene.matter, &mut self.rows, &mut self.rhs);
             self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
@@ -215,7 +215,7 @@ impl Stepper {
         for k in 0..now.q.len() {
             rhs[2 * k + 1] = next.u[2 * k + 1];
         }
-        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h, first: true };
         contacts.would_touch(&now.x, rhs, &solved)
     }
 }

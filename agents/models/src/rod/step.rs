@@ -4,6 +4,7 @@
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
 use super::anchor_springs::{NodeSpring, Tie};
+use super::apply_impulses::{DisplacementLimit, FactoredSystem};
 use super::banded_ldl::InverseBlocks;
 use super::banded_ldl::{Factor, Row};
 use super::company::Company;
@@ -15,7 +16,8 @@ use super::history::History;
 use super::horizon::Horizon;
 use super::method::Integrator;
 use super::rotation::{exp, unit};
-use super::state::{RodMaterial, RodState};
+use super::state::{DividedRod, RodMaterial, RodState};
+use super::substep::Substep;
 use super::system::{Iterate, Scene, assemble};
 use super::xpbd::Projector;
 use glam::{DMat3, DVec3};
@@ -89,6 +91,25 @@ pub struct Stepper {
     pub(super) solves: u32,
 }
 
+/// What may end a trial substep without a next state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Whether no segment may turn further than [`TURN_MAX_RAD`].
+    pub bounds_turns: bool,
+    /// Whether a smaller substep may take its place.
+    pub may_divide: bool,
+}
+
+/// A tube's response to impulses, as it is published.
+pub struct PublishedResponse<'a> {
+    /// The factor of the predicted step, or else of the last one.
+    pub factor: &'a Factor,
+    /// The length of the last substep, seconds.
+    pub span_s: f64,
+    /// Its supports, and the factor that includes them.
+    pub supported: Lies<'a, Factor>,
+}
+
 /// The result of a trial substep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -108,25 +129,26 @@ impl Stepper {
         let tick = setting.dt / ticks as f64;
         let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
         while gone < ticks {
-            let span = (tick * gone as f64, tick * size as f64);
-            self.company.aim(ties, &now.x, span);
+            let substep = Substep { start_s: tick * gone as f64, span_s: tick * size as f64 };
+            self.company.aim(ties, &now.x, substep);
             let scene = Scene {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
                 ties,
-                h: span.1,
+                h: substep.span_s,
                 until: tick * (gone + size) as f64,
                 integrator: setting.integrator,
             };
-            let stretched = span.1 * now.stretch > setting.longest_s && size > 1;
+            let stretched = substep.span_s * now.stretch > setting.longest_s && size > 1;
             let solves = self.solves;
-            if stretched || self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
+            let trial = Trial { bounds_turns: size > TURN_TICKS, may_divide: size > 1 };
+            if stretched || self.attempt(now, &scene, trial)? == Verdict::TooFar {
                 (self.solves, size) = (solves, size / 2);
                 continue;
             }
-            self.accept(now, ties, span);
-            self.remember(now, (setting.integrator, ties.is_empty()), span.1);
+            self.accept(now, ties, substep);
+            self.remember(now, setting.integrator, ties.is_empty(), substep.span_s);
             (gone, taken) = (gone + size, taken + 1);
             // double again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
@@ -145,7 +167,8 @@ impl Stepper {
         &mut self,
         now: &mut RodState,
         setting: &Setting<'_>,
-        (ties, way_m): (&mut [Tie], f64),
+        ties: &mut [Tie],
+        way_m: f64,
     ) -> Result<(), Lost> {
         if self.company.received().is_empty() {
             return Ok(());
@@ -154,9 +177,11 @@ impl Stepper {
         let Self { company, factor, footing, contacts, .. } = self;
         let push = company.received().push();
         let lies = Some(&*footing).filter(|footing| footing.stance.bears(push));
-        let answer = lies.and_then(Footing::factor).unwrap_or(factor);
+        let factor = lies.and_then(Footing::factor).unwrap_or(factor);
         let feet = lies.map_or(&[][..], |footing| footing.stance.on_others());
-        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
+        let system = FactoredSystem { factor, ties, feet };
+        let rod = DividedRod { matter: setting.matter, division: setting.division };
+        company.received().apply(now, system, rod, DisplacementLimit { walls: contacts, way_m });
         Ok(())
     }
 
@@ -203,12 +228,15 @@ impl Stepper {
         self.span_s
     }
 
-    /// Published data on the tube's response to impulses: the factor of the predicted step or else the last one, the length of the
-    /// last one, and the supports with the factor that includes them.
-    pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
+    /// The tube's response to impulses, as others are to expect it.
+    pub fn published_response(&self) -> PublishedResponse<'_> {
         let Self { footing, horizon, factor, span_s, .. } = self;
-        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
-        ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
+        let supported = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
+        PublishedResponse {
+            factor: horizon.factor().unwrap_or(factor),
+            span_s: *span_s,
+            supported: supported.filter(|(feet, _)| !feet.is_empty()),
+        }
     }
 
     /// Finds the supports of the tube after its last substep, where others need them (`watched`).
@@ -220,12 +248,12 @@ impl Stepper {
     /// Computes the effective inverse mass of the strongest contact with each touched peer, by the factor of the last substep.
     pub fn weigh(&mut self, held: [bool; 2]) {
         let Self { factor, company, .. } = self;
-        company.mates_mut().weigh(factor.slots(), |impulses| respond((factor, held), impulses));
+        company.mates_mut().weigh(factor.slots(), |impulses| respond(factor, held, impulses));
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, in the last
     /// substep (eq. 18); `None` where the segments have changed since, or no step was taken.
-    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &RodMaterial, slots: usize) -> Option<DMat3> {
+    pub fn inverse_mass(&self, segment: usize, w: f64, matter: &RodMaterial, slots: usize) -> Option<DMat3> {
         if self.factor.slots() != slots {
             return None;
         }
@@ -240,27 +268,22 @@ impl Stepper {
         Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
-    /// One trial substep, from `now` into `next`; of `smaller`, the first limits turns, the second allows a smaller substep.
-    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
+    /// One trial substep, from `now` into `next`.
+    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Lost> {
         match scene.integrator {
             Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
             Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
-            Integrator::ImplicitEuler => self.attempt_euler(now, scene, smaller),
-            Integrator::Bdf2 | Integrator::EnergyMomentum => self.glide(now, scene, smaller),
+            Integrator::ImplicitEuler => self.attempt_euler(now, scene, trial),
+            Integrator::Bdf2 | Integrator::EnergyMomentum => self.attempt_second_order(now, scene, trial),
         }
     }
 
     /// The same by implicit Euler (eq. 11–20).
-    pub(super) fn attempt_euler(
-        &mut self,
-        now: &RodState,
-        scene: &Scene<'_>,
-        (bound, divide): (bool, bool),
-    ) -> Result<Verdict, Lost> {
+    pub(super) fn attempt_euler(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Lost> {
         if let Err(lost) = self.solve(now, scene, true) {
-            return if divide { Ok(Verdict::TooFar) } else { Err(lost) };
+            return if trial.may_divide { Ok(Verdict::TooFar) } else { Err(lost) };
         }
-        if bound && self.widest_turn() * scene.h > TURN_MAX_RAD {
+        if trial.bounds_turns && self.widest_turn() * scene.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
         self.advance(now, scene, true);
@@ -274,7 +297,7 @@ impl Stepper {
             rise = self.energy_rise(now, scene);
         }
         let finite = self.next.is_finite();
-        if divide && (rise > 0.0 || !finite) {
+        if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
         }
         if rise > 0.0 {
@@ -304,11 +327,11 @@ impl Stepper {
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
     pub(super) fn touch(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
-        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h, first };
         // contact is a law of whole velocities, not of their change in an iteration
         let known = if first { &[][..] } else { &next.u[..] };
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
-        *pushed_j = contacts.act(&now.x, rhs, &solved, (company, first));
+        *pushed_j = contacts.act(&now.x, rhs, &solved, company);
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
     }
 
@@ -361,7 +384,7 @@ impl Stepper {
     }
 
     /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
-    fn remember(&mut self, now: &RodState, (integrator, untied): (Integrator, bool), h: f64) {
+    fn remember(&mut self, now: &RodState, integrator: Integrator, untied: bool, h: f64) {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;
         }
@@ -373,7 +396,8 @@ impl Stepper {
     }
 
     /// Makes `next` the state and books the impulses of pulls and contacts.
-    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], (start, h): (f64, f64)) {
+    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], substep: Substep) {
+        let Substep { start_s: start, span_s: h } = substep;
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
         self.company.received().spend();
@@ -381,8 +405,8 @@ impl Stepper {
             let (a, b) = (tie.segment, tie.segment + 1);
             // constraints act after the tie: its impulse belongs to the velocity before them
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
-            let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
-            tie.book(point, (h, start + h));
+            let (x, v) = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
+            tie.book(x, v, substep);
         }
         if self.company.is_watched() {
             self.presses.note(self.contacts.impulses(), now.u.len(), h);

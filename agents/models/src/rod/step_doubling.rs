@@ -47,10 +47,14 @@ impl Doubling {
         self.watch.rest();
     }
 
-    /// Prepares for step number `steps` of the tube `me` from `now`. A step with peers or received impulses is not repeated: impulses are
+    /// Whether step number `steps` of the tube `me` is the first of those to be repeated.
+    pub fn begins(&mut self, steps: u64, me: AgentId) -> bool {
+        self.watch.begins(steps, me)
+    }
+
+    /// Prepares for a step from `now`, after [`Self::begins`]. A step with peers or received impulses is not repeated: impulses are
     /// given once only.
-    pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&RodState, &[Tie]), stepper: &Stepper) {
-        let begins = self.watch.begins(steps, me);
+    pub fn begin(&mut self, begins: bool, now: &RodState, ties: &[Tie], stepper: &Stepper) {
         if !stepper.company.is_empty()
             || !stepper.company.fresh().is_empty()
             || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now))

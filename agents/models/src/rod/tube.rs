@@ -12,7 +12,7 @@ use super::discretization;
 use super::discretization::Discretization;
 use super::horizon::owns_it;
 use super::publish::bounds;
-use super::remesh::Remesher;
+use super::remesh::{MeshedRod, Remesher};
 use super::rest::RestWatch;
 use super::rest_curve::RestCurve;
 use super::state::{RodMaterial, RodState};
@@ -200,7 +200,8 @@ impl Tube {
     #[must_use]
     pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
         let stepped = (self.steps > 0).then_some(&self.stepper)?;
-        stepped.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
+        let (segment, share) = self.division.locate(arc_m);
+        stepped.inverse_mass(segment, share, &self.matter, self.now.u.len())
     }
 
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
@@ -232,7 +233,7 @@ impl Tube {
     }
 
     /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
-    fn double(&mut self, (dt, substeps): (f64, u32)) {
+    fn double(&mut self, dt: f64, substeps: u32) {
         if !self.doubling.is_on() {
             return;
         }
@@ -345,12 +346,13 @@ impl Agent for Tube {
         let watched = self.stepper.company.is_watched();
         let before = self.begin_watch(watched);
         self.stepper.solves = 0;
-        self.doubling.begin((self.steps, around.me), (&self.now, &self.ties), &self.stepper);
+        let begins = self.doubling.begins(self.steps, around.me);
+        self.doubling.begin(begins, &self.now, &self.ties, &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
         self.stepper.weigh(self.matter.held);
         self.stepper.stand(self.matter.held, watched);
-        self.double((dt_s, substeps));
+        self.double(dt_s, substeps);
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
         self.end_watch(before, around, dt_s);
@@ -398,7 +400,8 @@ impl Agent for Tube {
         let arcs = self.remesher.arcs(&self.now, &old, count);
         self.division.rebuild(&self.skeleton, arcs);
         let mut next = RodState::default();
-        self.remesher.carry(&self.matter, (&self.now, &old), (&mut next, &self.division));
+        let old = MeshedRod { state: &self.now, division: &old };
+        self.remesher.carry(&self.matter, old, &mut next, &self.division);
         next.strain(&self.matter, &self.division);
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
@@ -435,7 +438,7 @@ fn matter_of(spec: &TubeSpec) -> RodMaterial {
         ga: s.ga_n,
         ei: s.ei_n_m2,
         gj: s.gj_n_m2,
-        mu: spec.mass_per_length_kg_m,
+        mu: s.mass_per_length_kg_m,
         rotary: s.rotary_kg_m,
         damping: spec.damping_per_s,
         gravity: spec.gravity,

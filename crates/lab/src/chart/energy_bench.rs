@@ -49,7 +49,7 @@ impl Play {
 
     /// Adds a tube; `None` where it cannot be built.
     pub(super) fn add_tube(&mut self, spec: TubeSpec, rate_hz: f64) -> Option<AgentId> {
-        let weight = [spec.mass_per_length_kg_m, spec.section.rotary_kg_m];
+        let weight = [spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m];
         let gravity = spec.gravity;
         let id = self.stage.add(Box::new(Tube::new(spec).ok()?), rate_hz, weight);
         self.solids.push(Solid { mass_kg: 0.0, gravity, springs: Vec::new() });

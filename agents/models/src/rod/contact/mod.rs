@@ -132,7 +132,7 @@ impl TubeContacts {
 
     /// Undoes the part of the nodes' latest displacements `ways` that leads into fixed solids; `arc_m` are their rest arc lengths.
     pub fn hold_back(&self, positions: &mut [DVec3], ways: impl Iterator<Item = DVec3>, arc_m: &[f64]) {
-        self.walls.hold_back(positions, ways, (arc_m, &self.radii_m));
+        self.walls.hold_back(positions, ways, arc_m, &self.radii_m);
     }
 
     /// The contacts found last, and their impulses.

@@ -28,18 +28,18 @@ pub(crate) struct Solved<'a> {
     pub factor: &'a Factor,
     /// The substep, seconds.
     pub h: f64,
+    /// Whether contacts are searched: a further Newton iteration of the same substep reuses those of the first.
+    pub first: bool,
 }
 
 impl TubeContacts {
     /// Corrects the free `velocities` of a substep that starts at `positions`; returns the work that contact then does, J.
-    ///
-    /// With `first` the contacts are searched; a further Newton iteration of the same substep reuses them.
     pub fn act(
         &mut self,
         positions: &[DVec3],
         velocities: &mut Vec<DVec3>,
         solved: &Solved<'_>,
-        (company, first): (&mut Company, bool),
+        company: &mut Company,
     ) -> f64 {
         if self.is_idle() && company.is_empty() {
             self.contacts.clear(); // contacts with peers that have gone
@@ -51,7 +51,7 @@ impl TubeContacts {
         }
         let own = velocities.len();
         company.mates_mut().extend(velocities, solved.h);
-        if first {
+        if solved.first {
             let arc_m = &solved.division.arc_m;
             let radii_m = std::mem::take(&mut self.radii_m);
             let skin = Skin {
@@ -77,7 +77,7 @@ impl TubeContacts {
         let Self { contacts, mobilities, solver, .. } = self;
         let kin = &KIN[..if met { KIN.len() } else { KIN_OWN }];
         let problem = Problem { contacts: &[], kin, h_s: solved.h, mobilities, settings: SETTINGS };
-        let respond = |impulses: &mut [DVec3]| respond((solved.factor, solved.matter.held), impulses);
+        let respond = |impulses: &mut [DVec3]| respond(solved.factor, solved.matter.held, impulses);
         company.mates_mut().solve(solver, (contacts, problem), velocities, Owner { slots: own, respond, tips: false });
         if met {
             company.mates_mut().watch(self.impulses(), velocities);
@@ -135,7 +135,7 @@ impl TubeContacts {
 }
 
 /// Turns impulses, one per slot, into velocity changes by the factor of the substep; held ends do not move.
-pub(crate) fn respond((factor, held): (&Factor, [bool; 2]), impulses: &mut [DVec3]) {
+pub(crate) fn respond(factor: &Factor, held: [bool; 2], impulses: &mut [DVec3]) {
     let last = impulses.len().saturating_sub(1);
     for (_, slot) in [(held[0], 0), (held[1], last)].into_iter().filter(|(held, _)| *held) {
         impulses[slot] = DVec3::ZERO;
