@@ -47,7 +47,7 @@ impl Contact {
     }
 
     /// Stops pushing out an overlap: neither depth nor rebound count any more.
-    pub fn leave_inside(&mut self) {
+    pub fn stop_push_out(&mut self) {
         (self.gap_m, self.rebound_m_s) = (self.gap_m.max(0.0), 0.0);
     }
 

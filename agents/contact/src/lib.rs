@@ -38,12 +38,12 @@ pub mod solver;
 pub mod taken;
 pub mod tank;
 
-pub use agent::{Agent, AnchorSpring, Companion, Neighbour, StepContext};
+pub use agent::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
 pub use contact::{Contact, PUSH_OUT_SHARE};
 pub use exchange::{Exchange, acknowledged};
 pub use knock::Knock;
 pub use lasting::smooth;
-pub use law::{Law, Link, Standing, keep_step, owns};
+pub use law::{Law, Link, OwnershipTraits, keep_step, owns};
 pub use mates::Feet;
 pub use mates::{Far, Mate, Mates, Owner, Pulled, Search};
 pub use other::{Astray, Other, WAKE_M_S};

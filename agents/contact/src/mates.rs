@@ -196,9 +196,9 @@ impl Mates {
             if !gives_way && !self.overspends(found(), velocities) {
                 break;
             }
-            self.leave_inside(contacts);
+            self.stop_push_out(contacts);
             velocities.copy_from_slice(&free);
-            solver.take_back();
+            solver.undo();
         }
         self.all_mut().iter_mut().for_each(|mate| mate.other.release());
         self.free = free;
@@ -225,9 +225,9 @@ impl Mates {
     }
 
     /// Takes push-out from the contacts with those whose tank could not bear it.
-    fn leave_inside(&self, contacts: &mut [Contact]) {
+    fn stop_push_out(&self, contacts: &mut [Contact]) {
         for mate in self.all().iter().filter(|mate| mate.is_spent()) {
-            contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::leave_inside);
+            contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::stop_push_out);
         }
     }
 

@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vectors_are_solved_as_numbers_are() {
+    fn solving_vectors_gives_what_solving_numbers_gives() {
         let first_body = [0, 0, 1, 0, 3];
         let mut matrix = SkylineCholesky::<3>::default();
         matrix.shape(&first_body);

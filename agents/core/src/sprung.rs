@@ -47,11 +47,11 @@ impl Sprung {
     /// its velocities, and how far it has carried it by now.
     #[must_use]
     pub fn settled(&self, inertia: InverseMass, velocity: Twist, way: [Twist; 2], h: f64) -> [Twist; 2] {
-        let mut lean = Lean::new(*self, inertia, velocity);
-        let [change, carried] = way.map(|impulse| lean.respond(impulse));
-        lean.deliver(change, carried);
-        let gone = lean.go_on(h);
-        [[0, 1].map(|i| carried[i] + gone[i]), lean.velocity()]
+        let mut prediction = SprungPrediction::new(*self, inertia, velocity);
+        let [change, carried] = way.map(|impulse| prediction.respond(impulse));
+        prediction.deliver(change, carried);
+        let way = prediction.go_on(h);
+        [[0, 1].map(|i| carried[i] + way[i]), prediction.velocity()]
     }
 
     /// Whether every number is finite.
@@ -67,27 +67,27 @@ const STEP_SLACK: f64 = 1e-4;
 
 /// A body on springs at a neighbour's own time: how far it is from what it published.
 #[derive(Debug, Clone, Copy)]
-pub struct Lean {
+pub struct SprungPrediction {
     sprung: Sprung,
     inertia: InverseMass,
     /// The horizon of `answer`, seconds.
     horizon_s: f64,
     answer: Mat6,
     /// How long until the published state, seconds; below zero it is past.
-    left_s: f64,
+    until_published_s: f64,
     velocity: Twist,
     /// By how much place and velocity differ from the published ones, or, before those are reached, from the way to them.
-    off: Twist,
-    faster: Twist,
+    displacement: Twist,
+    velocity_change: Twist,
     /// What impulses that last have just added to the velocity: as long as the next stretch does, so they carry half as far.
     fresh: Twist,
     /// The acceleration with which the body makes its next step, and how long after the published state that ends, seconds.
     steady: Option<(Twist, f64)>,
     /// Whether a blow meets it: in no time a drive of limited force gives nothing, and its mass alone answers.
-    struck: bool,
+    in_impact: bool,
 }
 
-impl Lean {
+impl SprungPrediction {
     /// A body that is where it said to be.
     pub fn new(sprung: Sprung, inertia: InverseMass, velocity: Twist) -> Self {
         let none = [DVec3::ZERO; 2];
@@ -97,25 +97,25 @@ impl Lean {
             inertia,
             horizon_s,
             answer,
-            left_s: 0.0,
+            until_published_s: 0.0,
             velocity,
-            off: none,
-            faster: none,
+            displacement: none,
+            velocity_change: none,
             fresh: none,
             steady: None,
-            struck: false,
+            in_impact: false,
         }
     }
 
     /// A blow begins or ends (eq. 9h).
-    pub fn strike(&mut self, struck: bool) {
-        self.struck = struck && self.sprung.limit_n.is_finite();
+    pub fn strike(&mut self, in_impact: bool) {
+        self.in_impact = in_impact && self.sprung.limit_n.is_finite();
     }
 
     /// Takes impulses that last for `h` seconds, or for the body's own step where that is longer, from now on.
     pub fn foresee(&mut self, h: f64) {
         let h = h.max(self.sprung.span_s);
-        self.give_way(h);
+        self.limit_force(h);
         if h != self.horizon_s {
             (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
         }
@@ -123,7 +123,7 @@ impl Lean {
 
     /// Springs that would have to give more than they can in the next `h` seconds give that and no more, however far the body goes
     /// (eq. 9f).
-    fn give_way(&mut self, h: f64) {
+    fn limit_force(&mut self, h: f64) {
         let limit_n = self.sprung.limit_n;
         let pull = if limit_n.is_finite() { self.pull(h)[0] } else { DVec3::ZERO };
         if pull.length() <= limit_n {
@@ -132,13 +132,13 @@ impl Lean {
         let none = [DVec3::ZERO; 2];
         self.sprung.force = [pull.clamp_length_max(limit_n), DVec3::ZERO];
         (self.sprung.rising, self.sprung.stiffness) = (none, Mat6::ZERO);
-        (self.off, self.faster, self.fresh, self.steady) = (none, none, none, None);
+        (self.displacement, self.velocity_change, self.fresh, self.steady) = (none, none, none, None);
         (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
     }
 
     /// The velocities that an impulse causes.
     pub fn respond(&self, impulse: Twist) -> Twist {
-        if self.struck {
+        if self.in_impact {
             [impulse[0] * self.inertia.linear_per_kg, self.inertia.angular_per_kg_m2 * impulse[1]]
         } else {
             self.answer.times(impulse)
@@ -147,7 +147,7 @@ impl Lean {
 
     /// The inverse mass (1/kg) and the mean inverse inertia (1/(kg·m²)) with which it answers.
     pub fn mobility(&self) -> [f64; 2] {
-        if self.struck {
+        if self.in_impact {
             let turning = self.inertia.angular_per_kg_m2;
             return [self.inertia.linear_per_kg, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
         }
@@ -161,23 +161,23 @@ impl Lean {
             return self.sprung.past;
         }
         let ahead = self.ahead(h);
-        if self.left_s <= 0.0 {
+        if self.until_published_s <= 0.0 {
             return ahead;
         }
         // the force of the step that is under way, answered like any other over this horizon
         let force = self.sprung.resistance(self.inertia, self.sprung.span_s).times(self.sprung.past);
-        let (behind, share) = (self.answer.times(force), self.left_s / h);
+        let (behind, share) = (self.answer.times(force), self.until_published_s / h);
         [0, 1].map(|i| behind[i] * share + ahead[i] * (1.0 - share))
     }
 
     /// Whether the published state is still to come after `h` seconds.
     fn is_behind(&self, h: f64) -> bool {
-        self.left_s > 0.0 && self.left_s >= h
+        self.until_published_s > 0.0 && self.until_published_s >= h
     }
 
     /// The mean acceleration past the published state.
     fn ahead(&self, h: f64) -> Twist {
-        let since = (-self.left_s).max(0.0);
+        let since = (-self.until_published_s).max(0.0);
         if let Some((a, _)) = self.steady.filter(|(_, until)| since < *until && self.horizon_s <= self.sprung.span_s) {
             return a;
         }
@@ -186,13 +186,13 @@ impl Lean {
 
     /// The force of the springs at the end of the next `h` seconds, had nothing else changed the velocities by then.
     fn pull(&self, h: f64) -> Twist {
-        let Self { sprung, off, .. } = self;
-        let since = (-self.left_s).max(0.0);
+        let Self { sprung, displacement, .. } = self;
+        let since = (-self.until_published_s).max(0.0);
         // what the body took ahead will have been given by the time of its state
-        let there = if self.left_s > 0.0 { 0.0 } else { 1.0 };
+        let there = if self.until_published_s > 0.0 { 0.0 } else { 1.0 };
         let without = |all: &Twist| [0, 1].map(|i| all[i] - self.fresh[i]);
-        let pulled = sprung.stiffness.times(off.map(|x| x * there));
-        let damped = sprung.damping.times(without(&self.faster).map(|v| v * there));
+        let pulled = sprung.stiffness.times(displacement.map(|x| x * there));
+        let damped = sprung.damping.times(without(&self.velocity_change).map(|v| v * there));
         let falling = sprung.stiffness.times(without(&self.velocity));
         let late = h.max(self.horizon_s);
         let force =
@@ -203,15 +203,15 @@ impl Lean {
     /// Adds to its velocities what an impulse has caused, which `lasts` through the next stretch or was a blow.
     pub fn push(&mut self, change: Twist, lasts: bool) {
         add(&mut self.velocity, change, 1.0);
-        add(&mut self.faster, change, 1.0);
+        add(&mut self.velocity_change, change, 1.0);
         add(&mut self.fresh, change, if lasts { 1.0 } else { 0.0 });
     }
 
     /// Adds what impulses on their way have done meanwhile.
     pub fn deliver(&mut self, change: Twist, way: Twist) {
         add(&mut self.velocity, change, 1.0);
-        add(&mut self.faster, change, 1.0);
-        add(&mut self.off, way, 1.0);
+        add(&mut self.velocity_change, change, 1.0);
+        add(&mut self.displacement, way, 1.0);
     }
 
     /// Lets `h` seconds pass, back where `h` is below zero: how far it comes (eq. 7d).
@@ -221,27 +221,27 @@ impl Lean {
         }
         let past = h < 0.0 || self.is_behind(h);
         let a = if h < 0.0 { self.sprung.past } else { self.acceleration(h) };
-        self.hold_on(a, h);
+        self.keep_acceleration(a, h);
         let mut way = [DVec3::ZERO; 2];
         add(&mut way, self.velocity, h);
         add(&mut way, self.fresh, -0.5 * h);
         add(&mut way, a, 0.5 * h * h);
         if past {
-            add(&mut self.off, self.faster, h);
-            add(&mut self.off, self.fresh, -0.5 * h);
+            add(&mut self.displacement, self.velocity_change, h);
+            add(&mut self.displacement, self.fresh, -0.5 * h);
         } else {
-            add(&mut self.off, way, 1.0);
-            add(&mut self.faster, a, h);
+            add(&mut self.displacement, way, 1.0);
+            add(&mut self.velocity_change, a, h);
         }
         add(&mut self.velocity, a, h);
-        self.left_s -= h;
+        self.until_published_s -= h;
         self.fresh = [DVec3::ZERO; 2];
         way
     }
 
     /// Past the published state the body itself keeps one acceleration for a whole step.
-    fn hold_on(&mut self, a: Twist, h: f64) {
-        let since = -self.left_s;
+    fn keep_acceleration(&mut self, a: Twist, h: f64) {
+        let since = -self.until_published_s;
         let over = self.steady.is_none_or(|(_, until)| since >= until);
         if h > 0.0 && since >= 0.0 && over {
             self.steady = Some((a, since + (1.0 - STEP_SLACK) * self.sprung.span_s));

@@ -113,7 +113,7 @@ impl<'a> Suite<'a> {
 
     /// Builds the agent and its clock.
     fn start(&self) -> Run<'_> {
-        Run { agent: (self.make)(), time: SimTime::ZERO, around: &self.neighbours }
+        Run { agent: (self.make)(), time: SimTime::ZERO, neighbours: &self.neighbours }
     }
 }
 
@@ -140,13 +140,13 @@ const ME: AgentId = AgentId(0);
 struct Run<'a> {
     agent: Box<dyn Agent>,
     time: SimTime,
-    around: &'a [Neighbour],
+    neighbours: &'a [Neighbour],
 }
 
 impl Run<'_> {
     fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
-        let around = StepContext { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
-        self.agent.step(dt, &around)?;
+        let context = StepContext { me: ME, time: self.time, neighbours: self.neighbours, hands, links: &[] };
+        self.agent.step(dt, &context)?;
         self.time += dt;
         Ok(())
     }

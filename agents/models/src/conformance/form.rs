@@ -38,7 +38,7 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
 }
 
 /// Quantities that a change of resolution must conserve.
-struct Kept {
+struct Invariants {
     mass_kg: f64,
     length_m: f64,
     linear: glam::DVec3,
@@ -49,7 +49,7 @@ struct Kept {
     swing: f64,
 }
 
-impl Kept {
+impl Invariants {
     fn of(run: &Run<'_>) -> Self {
         let body = run.snapshot().body;
         let (linear, angular) = run.agent.momentum();
@@ -79,9 +79,9 @@ pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
     }
     // coarse to fine and back: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
-        let (before, held_before) = (Kept::of(&run), run.agent.resolution());
+        let (before, held_before) = (Invariants::of(&run), run.agent.resolution());
         run.agent.set_resolution(*wanted);
-        let after = Kept::of(&run);
+        let after = Invariants::of(&run);
         let eps_m = run.agent.resolution().map_or(0.0, |r| r.eps_m).max(held_before.map_or(0.0, |r| r.eps_m));
         compare(&before, &after, eps_m).map_err(|what| format!("retuned to ε {} m, {what}", wanted.eps_m))?;
         run.must_step(suite.dt, suite.pull.as_slice())?;
@@ -89,7 +89,7 @@ pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-fn compare(before: &Kept, after: &Kept, eps_m: f64) -> Result<(), String> {
+fn compare(before: &Invariants, after: &Invariants, eps_m: f64) -> Result<(), String> {
     if (after.mass_kg - before.mass_kg).abs() > ROUNDING * before.mass_kg {
         return Err(format!("mass went from {} to {} kg", before.mass_kg, after.mass_kg));
     }

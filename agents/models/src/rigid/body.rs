@@ -23,7 +23,7 @@ use metachron_contact::beside;
 use metachron_contact::beside::{bends, is_driven};
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
-use metachron_contact::{Agent, Companion, Neighbour, StepContext};
+use metachron_contact::{Agent, IslandMember, Neighbour, StepContext};
 use metachron_core::DRIFT_S;
 use metachron_core::{
     AgentId, Body, Grip, LiesOn, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport, Tips,
@@ -331,7 +331,7 @@ impl Agent for RigidBody {
     }
 
     /// Publishes how springs hold it before it has moved.
-    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
+    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
             self.company.gather(around, (&self.world.mover, &self.motion), &[]);
             self.ties.gather(around, &self.company);
@@ -388,11 +388,11 @@ impl Agent for RigidBody {
         Some(self)
     }
 
-    fn lead(
+    fn step_island(
         &mut self,
         dt: SimSpan,
         around: &StepContext<'_>,
-        others: &mut [Companion<'_>],
+        others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         island::lead(self, dt, around, others, apart)

@@ -118,7 +118,7 @@ impl Meeting {
     /// Solves a blow, and gives everybody what it is.
     fn exchange_blow(&mut self, me: &mut Me<'_>, company: &mut Company) {
         self.wake(company);
-        self.blow.start_afresh();
+        self.blow.reset();
         self.solve(company, 1.0, true);
         self.strike_in_turn(company);
         self.give(me, company, 0.0);
@@ -140,7 +140,7 @@ impl Meeting {
                 self.found.iter_mut().for_each(|found| found.contact.rebound_m_s = 0.0);
             }
             self.velocities.clone_from(&self.before);
-            self.blow.start_afresh();
+            self.blow.reset();
             self.solve(company, 1.0, true);
         }
     }
@@ -246,7 +246,7 @@ impl Meeting {
                 break;
             }
             self.velocities.clone_from(&self.free);
-            if is_blow { self.blow.take_back() } else { self.press.take_back() }
+            if is_blow { self.blow.undo() } else { self.press.undo() }
         }
         company.release();
     }
@@ -263,7 +263,7 @@ impl Meeting {
             }
         };
         let (solver, settings) = if is_blow { (blow, BLOW) } else { (press, PRESS) };
-        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings };
+        let problem = Problem { contacts, related_keys: &[], h_s: h, mobilities, settings };
         solver.solve(&problem, velocities, &mut answer);
         let solver = if is_blow { &self.blow } else { &self.press };
         self.given.clear();

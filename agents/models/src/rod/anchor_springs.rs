@@ -117,7 +117,7 @@ pub struct Tie {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum End {
     /// A user spring or a tool: driven, never yields.
-    Led,
+    Driven,
     /// A point of another agent, which yields.
     Linked(Link),
 }
@@ -131,7 +131,7 @@ impl Tie {
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
-    /// The tie of a link, whose far end is set later ([`Tie::aim`]); `None` where it has no point on this tube.
+    /// The tie of a link, whose far end is set later ([`Tie::set_far_end`]); `None` where it has no point on this tube.
     pub fn of_link(link: &Link, division: &Discretization) -> Option<Self> {
         let tie = Self::at(link.here, link.stiffness_n_m, link.damping_n_s_m, division)?;
         Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
@@ -148,7 +148,7 @@ impl Tie {
             by: None,
             segment,
             share,
-            end: End::Led,
+            end: End::Driven,
             target: DVec3::ZERO,
             target_velocity: DVec3::ZERO,
             stiffness: Sym3::identity(stiffness_n_m),
@@ -162,7 +162,7 @@ impl Tie {
     }
 
     /// Sets the far end of a link for a substep; `point` is the near end at its start (eq. 35, 36).
-    pub fn aim(&mut self, far: &Far, point: DVec3, substep: Substep) {
+    pub fn set_far_end(&mut self, far: &Far, point: DVec3, substep: Substep) {
         let Substep { start_s: start, span_s: h } = substep;
         let End::Linked(link) = self.end else { return };
         let spring = far.spring(&link, point);
@@ -180,7 +180,7 @@ impl Tie {
 
     /// Records the impulse of a substep that has ended with the point at `x` and velocity `v`, including what the tie has taken up since
     /// the last one.
-    pub fn book(&mut self, x: DVec3, v: DVec3, substep: Substep) {
+    pub fn record(&mut self, x: DVec3, v: DVec3, substep: Substep) {
         let h = substep.span_s;
         self.given = self.force(x, v, substep.end_s()) * h + self.taken;
         self.impulse += self.given;
@@ -195,12 +195,12 @@ impl Tie {
 
     /// Records the impulse that the tie takes up where an impulse from another agent changes the velocities at the ends of its segment
     /// by `a` and `b`: the factor of that response includes the tie (eq. 37a).
-    pub fn take(&mut self, a: DVec3, b: DVec3) {
+    pub fn absorb(&mut self, a: DVec3, b: DVec3) {
         self.taken -= self.resistance * self.mix(a, b);
     }
 
     /// Continues the same tie of the step before: inherits the impulse still owed to the far end.
-    pub fn follow(&mut self, before: &[Self]) {
+    pub fn continue_from(&mut self, before: &[Self]) {
         let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
         self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
     }
@@ -221,7 +221,7 @@ impl Tie {
     pub fn implicit(&self, h: f64) -> Sym3 {
         let resistance = self.stiffness * (h * h) + self.damping * h;
         match self.end {
-            End::Led => resistance,
+            End::Driven => resistance,
             End::Linked(_) => Sym3::of(&(self.ease * resistance.full())),
         }
     }

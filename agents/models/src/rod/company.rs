@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md.
 
 use super::anchor_springs::{End, Tie};
-use super::apply_impulses::Received;
+use super::apply_impulses::ReceivedImpulses;
 use super::contact::Skin;
 use super::discretization::Discretization;
 use super::sided::Sided;
@@ -26,7 +26,7 @@ use std::sync::Arc;
 pub struct Company {
     form: Option<Arc<CollisionShape>>,
     mates: Mates,
-    received: Received,
+    received: ReceivedImpulses,
     room: Room,
     touches: Vec<Touch>,
     sided: Sided,
@@ -79,7 +79,7 @@ impl Company {
             exchange.take(around, until, |id, site, sum, carried| {
                 received.add(division, site, sum, carried);
                 let giver = around.neighbours.iter().find(|n| n.id == id);
-                giver.into_iter().for_each(|giver| received.note(giver, around.time, dt));
+                giver.into_iter().for_each(|giver| received.check_clock(giver, around.time, dt));
             });
         }
     }
@@ -126,7 +126,7 @@ impl Company {
     }
 
     /// What others gave since the last step.
-    pub fn received(&mut self) -> &mut Received {
+    pub fn received(&mut self) -> &mut ReceivedImpulses {
         &mut self.received
     }
 
@@ -197,7 +197,7 @@ impl Company {
             let End::Linked(link) = tie.end else { continue };
             let Some(far) = self.mates.far(&link, substep.span_s) else { continue };
             let point = tie.mix(positions[tie.segment], positions[tie.segment + 1]);
-            tie.aim(&far, point, substep);
+            tie.set_far_end(&far, point, substep);
         }
     }
 

@@ -106,7 +106,7 @@ mod tests {
     use crate::rod::tests::{free_tube, shake};
 
     #[test]
-    fn mean_forces_do_what_energies_change_by_and_drive_no_momentum() {
+    fn mean_forces_do_work_equal_to_the_energy_change_and_keep_momentum() {
         let tube = free_tube(9);
         let (matter, division) = (tube.matter(), tube.division());
         let (mut now, mut next) = (shake(&tube, 3), shake(&tube, 8));

@@ -6,31 +6,31 @@
 
 use super::banded_ldl::Row;
 use super::state::{DividedRod, RodMaterial, RodState};
-use super::step::{Lost, Stepper};
+use super::step::{Divergence, Stepper};
 use super::sym3::Sym3;
 use super::system::{Iterate, Scene, add_springs, add_ties, gyrate, hold_ends};
 use glam::DVec3;
 
 impl Stepper {
     /// A substep of symplectic Euler: velocities from the forces at the start, positions from those velocities.
-    pub(super) fn push(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Lost> {
+    pub(super) fn step_symplectic_euler(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Divergence> {
         self.assemble_light(now, scene, false);
-        self.answer()?;
-        self.touch(now, scene, true);
+        self.factor_and_solve()?;
+        self.solve_contacts(now, scene, true);
         self.advance(now, scene, true);
-        self.must_be_finite()
+        self.check_finite()
     }
 
     /// A substep of XPBD: gravity and external springs, then the constraints, then contact.
-    pub(super) fn project(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Lost> {
+    pub(super) fn step_xpbd(&mut self, now: &RodState, scene: &Scene<'_>) -> Result<(), Divergence> {
         self.assemble_light(now, scene, true);
-        self.answer()?;
+        self.factor_and_solve()?;
         let Self { rhs, projector, .. } = self;
         let rod = DividedRod { matter: scene.matter, division: scene.division };
         projector.project(now, rhs, rod, scene.h);
-        self.touch(now, scene, true);
+        self.solve_contacts(now, scene, true);
         self.advance(now, scene, true);
-        self.must_be_finite()
+        self.check_finite()
     }
 
     /// The system of masses and springs alone; `lumped` with lumped node masses and no elastic forces (eq. 40).
@@ -50,8 +50,8 @@ impl Stepper {
         hold_ends(scene.matter, rows, rhs);
     }
 
-    fn must_be_finite(&self) -> Result<(), Lost> {
-        if self.next.is_finite() { Ok(()) } else { Err(Lost { slot: None }) }
+    fn check_finite(&self) -> Result<(), Divergence> {
+        if self.next.is_finite() { Ok(()) } else { Err(Divergence { slot: None }) }
     }
 }
 

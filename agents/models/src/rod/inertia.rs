@@ -44,12 +44,12 @@ impl CurveInertia {
     }
 
     /// Copies the supports and the accelerations there.
-    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
+    pub(super) fn copy_supports(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
     /// Copies mass, rotary inertia and damping, and lengths and directions of segments.
-    pub(super) fn weigh(&mut self, matter: &RodMaterial, length_m: &[f64], directions: &[DVec3]) {
+    pub(super) fn copy_masses(&mut self, matter: &RodMaterial, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();
         self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));

@@ -54,10 +54,10 @@ impl Tube {
             let inertia = into.inertia.response_mut::<CurveInertia>();
             let response = self.stepper.published_response();
             inertia.copy_from(response.factor, response.span_s, self.matter.held, &self.now.u);
-            inertia.stand(response.supported, &self.standing_accelerations);
+            inertia.copy_supports(response.supported, &self.standing_accelerations);
             inertia.accelerations.clone_from(&self.accelerations);
             inertia.ahead_s = self.ahead_s;
-            inertia.weigh(&self.matter, &self.division.length, &self.now.t);
+            inertia.copy_masses(&self.matter, &self.division.length, &self.now.t);
         } else {
             into.inertia = Inertia::Immovable;
         }

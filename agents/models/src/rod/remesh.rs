@@ -21,7 +21,7 @@ pub struct MeshedRod<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct Remesher {
     /// Rotations from rest to now, sampled at the arc lengths `at`.
-    turns: Vec<DQuat>,
+    rotations: Vec<DQuat>,
     at: Vec<f64>,
     /// Strains beyond rest in the segments' own axes.
     strains: Vec<DVec3>,
@@ -45,30 +45,30 @@ impl Remesher {
     }
 
     /// Writes the state of `old` into `to` on division `new`.
-    pub fn carry(&mut self, matter: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+    pub fn transfer(&mut self, matter: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         to.resize(new.segments());
-        self.learn(matter, old);
+        self.sample(matter, old);
         self.shape(matter, old, to, new);
         self.motion(matter, old, to, new);
     }
 
     /// Samples rotations and strains of the old segments relative to rest.
-    fn learn(&mut self, matter: &RodMaterial, old: MeshedRod<'_>) {
+    fn sample(&mut self, matter: &RodMaterial, old: MeshedRod<'_>) {
         let MeshedRod { state: from, division: old } = old;
-        self.turns.clear();
+        self.rotations.clear();
         self.at.clear();
         self.strains.clear();
         if matter.clamp[0] {
-            self.turns.push(DQuat::IDENTITY); // a wall does not turn
+            self.rotations.push(DQuat::IDENTITY); // a wall does not turn
             self.at.push(0.0);
         }
         for k in 0..old.segments() {
-            self.turns.push(from.q[k] * old.frame[k].conjugate());
+            self.rotations.push(from.q[k] * old.frame[k].conjugate());
             self.at.push(old.middle_m(k));
             self.strains.push(from.q[k].conjugate() * from.e[k] - DVec3::Z * old.chord[k]);
         }
         if matter.clamp[1] {
-            self.turns.push(DQuat::IDENTITY);
+            self.rotations.push(DQuat::IDENTITY);
             self.at.push(old.total_m());
         }
     }
@@ -79,7 +79,7 @@ impl Remesher {
         to.x[0] = from.x[0];
         for k in 0..new.segments() {
             let s = new.middle_m(k);
-            to.q[k] = (self.turn_at(s) * new.frame[k]).normalize();
+            to.q[k] = (self.rotation_at(s) * new.frame[k]).normalize();
             let strain = self.strain_at(old, s) + DVec3::Z * new.chord[k];
             to.x[k + 1] = to.x[k] + to.q[k] * strain * new.length[k];
         }
@@ -126,15 +126,15 @@ impl Remesher {
         let mass: f64 = (0..=count).filter(|&k| free(k)).map(share).sum();
         // twice: the second pass removes the rounding error of the first
         for _ in 0..2 {
-            let lack = (flow(from, old) - flow(to, new)) / mass;
-            (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += lack);
+            let missing = (flow(from, old) - flow(to, new)) / mass;
+            (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += missing);
         }
     }
 
-    fn turn_at(&self, s: f64) -> DQuat {
+    fn rotation_at(&self, s: f64) -> DQuat {
         let (left, w) = bracket(self.at.len(), |i| self.at[i], s);
         let right = (left + 1).min(self.at.len() - 1);
-        between(self.turns[left], self.turns[right], w)
+        between(self.rotations[left], self.rotations[right], w)
     }
 
     fn strain_at(&self, old: &Discretization, s: f64) -> DVec3 {

@@ -3,23 +3,17 @@
 //! In: its motion, step by step. Out: true after enough quiet time. Never here: the use of it (sleep is up to the runtime).
 
 use super::state::RodState;
+use crate::rest_limits::{ACCELERATION_MAX_M_S2, QUIET_S, SPEED_MAX_M_S};
 use glam::DVec3;
-
-/// A node is quiet below this speed, m/s: a tenth of a millimetre per second is invisible on any screen.
-const SPEED_MAX_M_S: f64 = 1e-4;
-/// A node is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
-const ACCELERATION_MAX_M_S2: f64 = 1e-2;
-/// All nodes must have been quiet for this long, seconds of the tube's own time.
-const QUIET_S: f64 = 0.5;
 
 /// Counts quiet time.
 #[derive(Debug, Clone, Default)]
-pub struct RestWatch {
+pub struct RestDetector {
     quiet_s: f64,
     before: Vec<DVec3>,
 }
 
-impl RestWatch {
+impl RestDetector {
     /// Restarts the count.
     pub fn wake(&mut self) {
         self.quiet_s = 0.0;

@@ -9,13 +9,13 @@ use super::energy_momentum::fill_mean;
 use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
 use super::state::{RodMaterial, RodState};
-use super::step::{Lost, Stepper, TURN_MAX_RAD, Trial, Verdict};
+use super::step::{Divergence, Stepper, TURN_MAX_RAD, Trial, Verdict};
 use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
 
 /// Newton iterations of BDF2 (least, most): with a single one it damps like implicit Euler, and an unconverged one never comes to rest.
-const BACK_ITERATIONS: (u32, u32) = (2, 6);
+const BDF2_ITERATIONS: (u32, u32) = (2, 6);
 /// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-4.
-const BACK_SLACK: f64 = 1e-8;
+const BDF2_SLACK: f64 = 1e-8;
 /// The most Newton iterations of the energy-momentum rule: one that needs more has stalled, and halving the substep is cheaper.
 const MEAN_ITERATIONS: u32 = 12;
 /// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-7.
@@ -29,19 +29,19 @@ impl Stepper {
         now: &RodState,
         scene: &Scene<'_>,
         trial: Trial,
-    ) -> Result<Verdict, Lost> {
+    ) -> Result<Verdict, Divergence> {
         let free = scene.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
         if free {
-            let ended = match scene.integrator {
-                Integrator::EnergyMomentum => self.keep(now, scene),
-                _ => self.look_back(now, scene),
+            let converged = match scene.integrator {
+                Integrator::EnergyMomentum => self.solve_energy_momentum(now, scene),
+                _ => self.solve_bdf2(now, scene),
             };
             let rise = self.energy_rise(now, scene);
-            let ended = ended && rise <= self.past.spare_j() && self.next.is_finite();
-            if trial.bounds_turns && !(ended && self.farthest_turn(now) <= TURN_MAX_RAD) {
+            let converged = converged && rise <= self.past.spare_j() && self.next.is_finite();
+            if trial.bounds_turns && !(converged && self.farthest_turn(now) <= TURN_MAX_RAD) {
                 return Ok(Verdict::TooFar);
             }
-            if ended && !self.would_touch(now, scene) {
+            if converged && !self.would_touch(now, scene) {
                 self.past.spend(rise);
                 return Ok(Verdict::Good);
             }
@@ -50,13 +50,13 @@ impl Stepper {
     }
 
     /// Backward differences (eq. 43): implicit Euler of another length from another state; returns whether the iteration converged.
-    fn look_back(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
+    fn solve_bdf2(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let mut start = std::mem::take(&mut self.ahead);
         let h = self.past.start(now, &mut start, scene.h);
         let scene = Scene { h, ..*scene };
-        self.guess(now, &start, h, scene.h);
-        let mut ended = false;
-        for done in 1..=BACK_ITERATIONS.1 {
+        self.predict(now, &start, h, scene.h);
+        let mut converged = false;
+        for done in 1..=BDF2_ITERATIONS.1 {
             self.next.strain(scene.matter, scene.division);
             let iterate = Iterate { start: &start, at: &self.next, first: false };
             assemble(&scene, &iterate, &mut self.rows, &mut self.rhs);
@@ -66,19 +66,19 @@ impl Stepper {
             }
             self.factor.solve(&mut self.rhs);
             let at_work = now.kinetic_j + now.elastic_j + self.next.elastic_j;
-            ended = done >= BACK_ITERATIONS.0 && self.change_j(&scene) <= BACK_SLACK * at_work;
-            self.follow(&start, h);
-            if ended {
+            converged = done >= BDF2_ITERATIONS.0 && self.change_j(&scene) <= BDF2_SLACK * at_work;
+            self.update_iterate(&start, h);
+            if converged {
                 break;
             }
         }
         self.next.strain(scene.matter, scene.division);
         self.ahead = start;
-        ended
+        converged
     }
 
     /// The first iterate: velocities extrapolated from the past, and the positions they reach from `start`.
-    fn guess(&mut self, now: &RodState, start: &RodState, h: f64, whole: f64) {
+    fn predict(&mut self, now: &RodState, start: &RodState, h: f64, whole: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -94,7 +94,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves accordingly (eq. 20).
-    fn follow(&mut self, start: &RodState, h: f64) {
+    fn update_iterate(&mut self, start: &RodState, h: f64) {
         let Self { next, rhs, .. } = self;
         next.u.iter_mut().zip(&*rhs).for_each(|(u, change)| *u += *change);
         for (k, x) in next.x.iter_mut().enumerate() {
@@ -109,23 +109,23 @@ impl Stepper {
     /// converged.
     ///
     /// Damping of the mean velocity would not act on motion that changes sign in every substep.
-    fn keep(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
-        let slower = libm::exp(-0.5 * scene.h * scene.matter.damping);
+    fn solve_energy_momentum(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
+        let decay = libm::exp(-0.5 * scene.h * scene.matter.damping);
         let undamped = RodMaterial { damping: 0.0, ..*scene.matter };
         let mut start = std::mem::take(&mut self.ahead);
         start.copy_from(now);
-        start.u.iter_mut().for_each(|u| *u *= slower);
-        let ended = self.keep_undamped(&start, &Scene { matter: &undamped, ..*scene });
+        start.u.iter_mut().for_each(|u| *u *= decay);
+        let converged = self.solve_undamped(&start, &Scene { matter: &undamped, ..*scene });
         self.ahead = start;
-        self.next.u.iter_mut().for_each(|u| *u *= slower);
+        self.next.u.iter_mut().for_each(|u| *u *= decay);
         self.next.strain(scene.matter, scene.division);
-        ended
+        converged
     }
 
-    fn keep_undamped(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
+    fn solve_undamped(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
         let half = 0.5 * scene.h;
         let tangent = Scene { h: half, ..*scene };
-        self.guess_mean(now, scene.h);
+        self.predict_mean(now, scene.h);
         for _ in 0..MEAN_ITERATIONS {
             self.next.strain(scene.matter, scene.division);
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
@@ -137,7 +137,7 @@ impl Stepper {
             }
             self.factor.solve(&mut self.rhs);
             let change_j = self.change_j(scene);
-            self.follow_mean(now, half);
+            self.update_mean_iterate(now, half);
             if change_j <= MEAN_SLACK * (now.kinetic_j + now.elastic_j + self.next.elastic_j) {
                 return true;
             }
@@ -149,7 +149,7 @@ impl Stepper {
     }
 
     /// The first iterate of the energy-momentum rule.
-    fn guess_mean(&mut self, now: &RodState, h: f64) {
+    fn predict_mean(&mut self, now: &RodState, h: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -165,7 +165,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves by the mean of old and new.
-    fn follow_mean(&mut self, now: &RodState, half: f64) {
+    fn update_mean_iterate(&mut self, now: &RodState, half: f64) {
         let Self { next, rhs, .. } = self;
         for k in 0..next.x.len() {
             next.u[2 * k] += rhs[2 * k];

@@ -57,7 +57,7 @@ pub struct Setting<'a> {
 
 /// The state stopped being finite: where it failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lost {
+pub struct Divergence {
     /// The slot whose pivot failed; `None` where the state itself did.
     pub slot: Option<usize>,
 }
@@ -123,8 +123,8 @@ impl Stepper {
     /// Advances `now`, whose strains are up to date, by the span; returns the number of substeps.
     ///
     /// # Errors
-    /// [`Lost`] where the next state is not finite; `now` is then the last state that was.
-    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
+    /// [`Divergence`] where the next state is not finite; `now` is then the last state that was.
+    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Divergence> {
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
         let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
@@ -162,14 +162,14 @@ impl Stepper {
     /// those of the step before.
     ///
     /// # Errors
-    /// [`Lost`] where the system cannot be factored; `now` is then untouched.
+    /// [`Divergence`] where the system cannot be factored; `now` is then untouched.
     pub fn receive(
         &mut self,
         now: &mut RodState,
         setting: &Setting<'_>,
         ties: &mut [Tie],
         way_m: f64,
-    ) -> Result<(), Lost> {
+    ) -> Result<(), Divergence> {
         if self.company.received().is_empty() {
             return Ok(());
         }
@@ -188,8 +188,8 @@ impl Stepper {
     /// Factors the system of a substep about `now` where there is no factor of this division yet.
     ///
     /// # Errors
-    /// [`Lost`] where it cannot be factored.
-    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Lost> {
+    /// [`Divergence`] where it cannot be factored.
+    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Divergence> {
         if self.factor.slots() == now.u.len() {
             return Ok(());
         }
@@ -204,7 +204,7 @@ impl Stepper {
         }
         self.factor.factor(&self.rows).map_err(|slot| {
             self.factor.forget();
-            Lost { slot: Some(slot) }
+            Divergence { slot: Some(slot) }
         })
     }
 
@@ -240,13 +240,13 @@ impl Stepper {
     }
 
     /// Finds the supports of the tube after its last substep, where others need them (`watched`).
-    pub fn stand(&mut self, held: [bool; 2], watched: bool) {
+    pub fn find_supports(&mut self, held: [bool; 2], watched: bool) {
         let Self { footing, rows, contacts, company, .. } = self;
         if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
     }
 
     /// Computes the effective inverse mass of the strongest contact with each touched peer, by the factor of the last substep.
-    pub fn weigh(&mut self, held: [bool; 2]) {
+    pub fn update_inverse_masses(&mut self, held: [bool; 2]) {
         let Self { factor, company, .. } = self;
         company.mates_mut().weigh(factor.slots(), |impulses| respond(factor, held, impulses));
     }
@@ -269,21 +269,26 @@ impl Stepper {
     }
 
     /// One trial substep, from `now` into `next`.
-    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Lost> {
+    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Divergence> {
         match scene.integrator {
-            Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
-            Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
+            Integrator::SymplecticEuler => self.step_symplectic_euler(now, scene).map(|()| Verdict::Good),
+            Integrator::Xpbd => self.step_xpbd(now, scene).map(|()| Verdict::Good),
             Integrator::ImplicitEuler => self.attempt_euler(now, scene, trial),
             Integrator::Bdf2 | Integrator::EnergyMomentum => self.attempt_second_order(now, scene, trial),
         }
     }
 
     /// The same by implicit Euler (eq. 11–20).
-    pub(super) fn attempt_euler(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Lost> {
-        if let Err(lost) = self.solve(now, scene, true) {
-            return if trial.may_divide { Ok(Verdict::TooFar) } else { Err(lost) };
+    pub(super) fn attempt_euler(
+        &mut self,
+        now: &RodState,
+        scene: &Scene<'_>,
+        trial: Trial,
+    ) -> Result<Verdict, Divergence> {
+        if let Err(divergence) = self.solve(now, scene, true) {
+            return if trial.may_divide { Ok(Verdict::TooFar) } else { Err(divergence) };
         }
-        if trial.bounds_turns && self.widest_turn() * scene.h > TURN_MAX_RAD {
+        if trial.bounds_turns && self.fastest_spin() * scene.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
         self.advance(now, scene, true);
@@ -301,31 +306,31 @@ impl Stepper {
             return Ok(Verdict::TooFar);
         }
         if rise > 0.0 {
-            energy_limiter::take(rise, &mut self.next, scene.matter, scene.division);
+            energy_limiter::remove(rise, &mut self.next, scene.matter, scene.division);
         }
-        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Lost { slot: None }) }
+        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
     /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
-    fn solve(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
+    fn solve(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
-        self.answer()?;
-        self.touch(now, scene, first);
+        self.factor_and_solve()?;
+        self.solve_contacts(now, scene, first);
         Ok(())
     }
 
     /// Factors and solves the assembled system, with the received impulses that act through the substep.
-    pub(super) fn answer(&mut self) -> Result<(), Lost> {
+    pub(super) fn factor_and_solve(&mut self) -> Result<(), Divergence> {
         self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
-        self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
+        self.factor.factor(&self.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
         Ok(())
     }
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    pub(super) fn touch(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
+    pub(super) fn solve_contacts(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
         let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h, first };
         // contact is a law of whole velocities, not of their change in an iteration
@@ -336,7 +341,7 @@ impl Stepper {
     }
 
     /// The fastest spin in `rhs`, rad/s.
-    fn widest_turn(&self) -> f64 {
+    fn fastest_spin(&self) -> f64 {
         self.rhs.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt()
     }
 
@@ -406,7 +411,7 @@ impl Stepper {
             // constraints act after the tie: its impulse belongs to the velocity before them
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
             let (x, v) = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
-            tie.book(x, v, substep);
+            tie.record(x, v, substep);
         }
         if self.company.is_watched() {
             self.presses.note(self.contacts.impulses(), now.u.len(), h);

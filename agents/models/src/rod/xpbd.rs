@@ -82,7 +82,7 @@ impl Projector {
         let RodMaterial { ea, ga, rotary, .. } = *constants.matter;
         let (l, q) = (constants.division.length[k], self.q[k]);
         let u = q.conjugate() * ((self.x[k + 1] - self.x[k]) / l);
-        let (wa, wb) = (constants.lightness(k), constants.lightness(k + 1));
+        let (wa, wb) = (constants.inverse_mass(k), constants.inverse_mass(k + 1));
         let compliance = DVec3::new(1.0 / ga, 1.0 / ga, 1.0 / ea) * (constants.rate2 / l);
         let own = 1.0 / (rotary * l);
         let turned = Sym3::outer(DVec3::new(0.0, u.z, -u.y), own)
@@ -134,7 +134,7 @@ impl Projector {
 
 impl Constants<'_> {
     /// Inverse mass of a node; zero where it is held.
-    fn lightness(&self, node: usize) -> f64 {
+    fn inverse_mass(&self, node: usize) -> f64 {
         let (length, held) = (&self.division.length, self.matter.held);
         if (node == 0 && held[0]) || (node == length.len() && held[1]) {
             return 0.0;

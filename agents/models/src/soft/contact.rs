@@ -99,7 +99,7 @@ impl Contacts {
         self.list.sort_unstable_by_key(|contact| contact.key);
         company.mates().scale(&mut self.mobilities);
         let Self { list, mobilities, solver, .. } = self;
-        let problem = Problem { contacts: &[], kin: &[], h_s: h, mobilities, settings };
+        let problem = Problem { contacts: &[], related_keys: &[], h_s: h, mobilities, settings };
         let respond = |impulses: &mut [DVec3]| system.respond(impulses);
         company.mates_mut().solve(solver, (list, problem), velocities, Owner { slots: own, respond, tips: true });
         company.mates_mut().watch(self.list.iter().zip(self.solver.impulses()), velocities);

@@ -295,7 +295,7 @@ impl Agent for Tool {
     }
 
     /// Publishes the length of a step before the first one: peers predict the drive over that span.
-    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
+    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         self.drive.look(self.longest_step(dt, around).as_secs_f64());
     }
 

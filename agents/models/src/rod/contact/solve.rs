@@ -3,7 +3,7 @@
 //! In: the state at the start of a substep, its free velocities and its factor. Out: velocities that keep the skin apart.
 //! Never here: contact detection ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
 
-use super::{KIN, KIN_OWN, Skin, TubeContacts, node_slot, segment_slot};
+use super::{RELATED_KEYS, RELATED_KEYS_WITHOUT_PEERS, Skin, TubeContacts, node_slot, segment_slot};
 use crate::rod::banded_ldl::{Factor, Row};
 use crate::rod::company::Company;
 use crate::rod::discretization::Discretization;
@@ -63,7 +63,7 @@ impl TubeContacts {
                 h_s: solved.h,
             };
             self.find(&skin);
-            self.find_others(&skin, company);
+            self.find_peer_contacts(&skin, company);
             self.radii_m = radii_m;
         }
         if self.contacts.is_empty() {
@@ -75,8 +75,8 @@ impl TubeContacts {
         company.mates().scale(&mut self.mobilities);
         let met = !company.is_empty();
         let Self { contacts, mobilities, solver, .. } = self;
-        let kin = &KIN[..if met { KIN.len() } else { KIN_OWN }];
-        let problem = Problem { contacts: &[], kin, h_s: solved.h, mobilities, settings: SETTINGS };
+        let related_keys = &RELATED_KEYS[..if met { RELATED_KEYS.len() } else { RELATED_KEYS_WITHOUT_PEERS }];
+        let problem = Problem { contacts: &[], related_keys, h_s: solved.h, mobilities, settings: SETTINGS };
         let respond = |impulses: &mut [DVec3]| respond(solved.factor, solved.matter.held, impulses);
         company.mates_mut().solve(solver, (contacts, problem), velocities, Owner { slots: own, respond, tips: false });
         if met {

@@ -135,7 +135,7 @@ impl Walls {
             for wall in &self.walls {
                 let (gap_m, at_m) = wall.nodes[node];
                 let is_near = gap_m - (self.travel_m - at_m) <= moved_m;
-                if is_near && !wall.bores.meet(arc_m[node], arc_m[node]) {
+                if is_near && !wall.bores.overlap(arc_m[node], arc_m[node]) {
                     wall.field.hold_back(&mut positions[node], way, radii_m[node]);
                 }
             }
@@ -206,7 +206,7 @@ impl Wall {
         let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
         self.nodes[node].0 = touches.clear_m - ball.radius_m;
-        if skin.is_held(node) || self.bores.meet(skin.arc_m[node], skin.arc_m[node]) {
+        if skin.is_held(node) || self.bores.overlap(skin.arc_m[node], skin.arc_m[node]) {
             return;
         }
         for (place, touch) in (0_u32..).zip(touches.iter()) {
@@ -222,15 +222,15 @@ impl Wall {
     fn measure_span(&self, skin: &Skin<'_>, segment: usize, range: SearchRange, visit: &mut impl FnMut(WallTouch)) {
         let SearchRange { slack_m, reach_m } = range;
         let ends = [skin.ball(segment), skin.ball(segment + 1)];
-        if self.bores.meet(skin.arc_m[segment], skin.arc_m[segment + 1]) {
+        if self.bores.overlap(skin.arc_m[segment], skin.arc_m[segment + 1]) {
             return;
         }
         let Some((share, touch)) = self.field.touches_span(ends, reach_m) else { return };
         let ball = ends[0].toward(ends[1], share);
         let way = skin.velocity(segment).lerp(skin.velocity(segment + 1), share) * skin.h_s;
         let gap_m = touch.distance_m - ball.radius_m;
-        let told = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
-        if gap_m + way.dot(touch.normal) <= slack_m && !told {
+        let hidden = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
+        if gap_m + way.dot(touch.normal) <= slack_m && !hidden {
             visit(self.touch(segment, Some(share), touch, ball.radius_m));
         }
     }

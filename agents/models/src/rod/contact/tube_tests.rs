@@ -359,7 +359,7 @@ fn contact_gives_the_same_bits_every_time() {
 
 /// Pushed out to both sides of the block and up it would hold a hundred times the energy that it starts with.
 #[test]
-fn a_hose_that_is_held_through_a_block_hangs_as_if_it_were_bored() {
+fn a_hose_held_through_a_block_hangs_as_if_the_block_had_a_bore() {
     let block = solid(Solid::Box { half_extents_m: DVec3::splat(0.1) }, DVec3::ZERO, 0.5);
     let held = |obstacles| TubeSpec {
         clamp: [true; 2],

@@ -90,7 +90,7 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
         is_left: false,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
-    Some(vec![Neighbour { owned: true, ..Neighbour::seen(AgentId(1), tool) }])
+    Some(vec![Neighbour { owned: true, ..Neighbour::observed(AgentId(1), tool) }])
 }
 
 /// One step among `neighbours`; `None` where it fails.

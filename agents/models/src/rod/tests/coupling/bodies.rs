@@ -172,7 +172,7 @@ fn a_tube_knocks_at_a_sleeper_that_owns_the_pair() {
     sleeper.write_snapshot(&mut seen);
     for (at_rest, knocks) in [(true, true), (false, false)] {
         let snapshot = Arc::new(Snapshot { at_rest, ..seen.clone() });
-        let near = Neighbour { form: sleeper.form(), ..Neighbour::seen(AgentId(3), snapshot) };
+        let near = Neighbour { form: sleeper.form(), ..Neighbour::observed(AgentId(3), snapshot) };
         let neighbours = std::slice::from_ref(&near);
         let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
         tube.step(millis(10.0), &around).unwrap();
