@@ -153,7 +153,7 @@ impl Run<'_> {
 
     /// A step that must succeed.
     fn must_step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), String> {
-        self.step(dt, hands).map_err(|error| format!("a good step at {} s failed: {error}", self.time.as_secs_f64()))
+        self.step(dt, hands).map_err(|error| format!("a valid step at {} s failed: {error}", self.time.as_secs_f64()))
     }
 
     fn snapshot(&self) -> Snapshot {

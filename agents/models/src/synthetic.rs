@@ -26,7 +26,7 @@ pub struct SyntheticSpec {
 #[non_exhaustive]
 pub enum SyntheticError {
     /// A number of the curves is negative or not finite.
-    #[error("{what} is {value}; it must be finite and not negative")]
+    #[error("the synthetic agent's {what} is {value}; expected finite and not negative")]
     BadNumber {
         /// Name of the number.
         what: &'static str,
@@ -34,7 +34,7 @@ pub enum SyntheticError {
         value: f64,
     },
     /// The range of spacings is empty, or its finest end is not above zero.
-    #[error("the spacings are {finest_m} … {coarsest_m} m; they must be finite, above zero and rising")]
+    #[error("the synthetic agent's spacings are {finest_m} … {coarsest_m} m; expected finite, above 0 and rising")]
     BadRange {
         /// Finest spacing given.
         finest_m: f64,
@@ -69,10 +69,10 @@ impl Synthetic {
     /// [`SyntheticError`] for a curve with a negative or non-finite number and for an empty range.
     pub fn new(spec: SyntheticSpec, range: ResolutionRange, start: Resolution) -> Result<Self, SyntheticError> {
         let numbers = [
-            ("the cost", spec.cost_us),
-            ("the order of the cost", spec.cost_order),
-            ("the error", spec.error_m),
-            ("the order of the error", spec.error_order),
+            ("cost", spec.cost_us),
+            ("order of the cost", spec.cost_order),
+            ("error", spec.error_m),
+            ("order of the error", spec.error_order),
         ];
         for (what, value) in numbers {
             if !(value.is_finite() && value >= 0.0) {
@@ -189,7 +189,7 @@ mod tests {
     fn invalid_curves_and_ranges_are_refused() {
         for bad in [-1.0, f64::NAN, f64::INFINITY] {
             let error = Synthetic::new(SyntheticSpec { cost_us: bad, ..SPEC }, RANGE, at(0.01)).unwrap_err();
-            assert!(matches!(error, SyntheticError::BadNumber { what: "the cost", .. }), "{error}");
+            assert!(matches!(error, SyntheticError::BadNumber { what: "cost", .. }), "{error}");
         }
         for eps_m in [(0.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0)] {
             let error = Synthetic::new(SPEC, ResolutionRange { eps_m, ..RANGE }, at(0.01)).unwrap_err();

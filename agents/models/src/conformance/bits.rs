@@ -13,7 +13,7 @@ pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
         for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
             match tried.step(bad, &[]) {
                 Err(StepError::BadSpan { .. }) => {}
-                other => return Err(format!("a step of {} s gave {other:?}", bad.as_secs_f64())),
+                other => return Err(format!("a step of {} s gave {other:?}; expected StepError::BadSpan", bad.as_secs_f64())),
             }
             if tried.hash() != before {
                 return Err(format!("a refused step of {} s changed the state", bad.as_secs_f64()));
@@ -67,7 +67,7 @@ pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
         return Err(error.to_string());
     }
     let each = counted as f64 / f64::from(suite.steps);
-    if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; {allowed} are allowed")) }
+    if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; expected at most {allowed}")) }
 }
 
 /// Under any pull no state is written that is not finite: the agent reports that it has diverged, or ignores the pull.
@@ -82,7 +82,7 @@ pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
         run.must_step(suite.dt, &[])?;
         match run.step(suite.dt, &[*pull]) {
             Ok(()) | Err(StepError::Diverged { .. }) => {}
-            Err(other) => return Err(format!("a pull to {} gave {other:?}", pull.target)),
+            Err(other) => return Err(format!("a pull to {} gave {other:?}; expected a step or StepError::Diverged", pull.target)),
         }
         shows_finite(&run).map_err(|what| format!("after a pull to {}: {what}", pull.target))?;
     }
@@ -93,16 +93,16 @@ fn shows_finite(run: &Run<'_>) -> Result<(), String> {
     let snapshot = run.snapshot();
     let numbers = [("energy", snapshot.energy_j), ("residual", snapshot.residual_m), ("mass", run.agent.mass_kg())];
     if let Some((what, value)) = numbers.iter().find(|(_, value)| !value.is_finite()) {
-        return Err(format!("its {what} is {value}"));
+        return Err(format!("the {what} is {value}"));
     }
     if snapshot.residual_m < 0.0 {
-        return Err(format!("its residual is {}", snapshot.residual_m));
+        return Err(format!("the residual is {}", snapshot.residual_m));
     }
     if !snapshot.body.is_finite() {
-        return Err("its body is not finite".to_owned());
+        return Err("the body is not finite".to_owned());
     }
     if let Some(grip) = snapshot.grips.iter().find(|grip| !grip.force_n.is_finite()) {
-        return Err(format!("its grip is {}", grip.force_n));
+        return Err(format!("the grip force is {}", grip.force_n));
     }
     Ok(())
 }

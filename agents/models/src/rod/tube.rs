@@ -186,7 +186,7 @@ impl Tube {
             let RodMaterial { ea, ga, .. } = self.matter;
             let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
             list.push(format!(
-                "the tube is stretched {:.2} times (warned of above {STRETCH_WARN}): past {limit:.2} its sections tilt and the answer is no longer that of a tube; use a stiffer or lighter one",
+                "the tube is stretched to {:.2} times its length; the rod model is valid up to {limit:.2} (warning from {STRETCH_WARN}): use a stiffer or lighter tube",
                 self.now.stretch
             ));
         }
@@ -249,9 +249,9 @@ impl Tube {
 
     pub(super) fn diverged(&self, divergence: Divergence, dt_s: f64) -> StepError {
         let what = match divergence.slot {
-            Some(slot) if slot % 2 == 0 => format!("the system's pivot at node {}", slot / 2),
-            Some(slot) => format!("the system's pivot at segment {}", slot / 2),
-            None => "positions or velocities".to_owned(),
+            Some(slot) if slot % 2 == 0 => format!("the system matrix is not positive definite at node {}", slot / 2),
+            Some(slot) => format!("the system matrix is not positive definite at segment {}", slot / 2),
+            None => "positions or velocities are not finite".to_owned(),
         };
         StepError::Diverged { model: self.model(), dt_s, what }
     }
