@@ -16,7 +16,7 @@ pub struct Contact {
     /// Its name from step to step, for the warm start; unique, and contacts are listed by rising keys.
     pub key: u64,
     /// The velocities it joins.
-    pub slots: ContactJacobian,
+    pub jacobian: ContactJacobian,
     /// Unit normal: away from the other body, so that a rising gap has a positive normal velocity.
     pub normal: DVec3,
     /// Distance of the surfaces, metres; below zero they overlap.
@@ -71,10 +71,10 @@ mod tests {
     use super::*;
 
     fn at_rest(gap_m: f64, friction: f64) -> Contact {
-        let slots = ContactJacobian::default();
+        let jacobian = ContactJacobian::default();
         Contact {
             key: 0,
-            slots,
+            jacobian,
             normal: DVec3::Z,
             gap_m,
             friction,

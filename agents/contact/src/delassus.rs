@@ -22,10 +22,10 @@ impl DelassusMatrix {
             self.blocks.resize(from + contacts.len(), DMat3::ZERO);
             for (axis, unit) in DVec3::AXES.into_iter().enumerate() {
                 scratch.fill(DVec3::ZERO);
-                pushed.slots.scatter(unit, scratch);
+                pushed.jacobian.scatter(unit, scratch);
                 body.respond(scratch);
                 for (block, moved) in self.blocks[from..].iter_mut().zip(contacts) {
-                    *block.col_mut(axis) = moved.slots.velocity(scratch);
+                    *block.col_mut(axis) = moved.jacobian.velocity(scratch);
                 }
             }
         }

@@ -150,9 +150,10 @@ impl Solver {
     fn prepare(&mut self, problem: &Problem<'_>, velocities: &[DVec3]) {
         let Problem { contacts, h_s: h, mobilities, .. } = *problem;
         self.free.clear();
-        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
+        self.free
+            .extend(contacts.iter().map(|c| c.jacobian.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
         self.scale.clear();
-        self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
+        self.scale.extend(contacts.iter().map(|c| c.jacobian.mobility(mobilities).max(MOBILITY_MIN)));
         (self.before.1, self.before.2) = (self.known_h, self.stiffness);
         self.start(problem);
         self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
@@ -307,7 +308,7 @@ pub fn inverse_mass(
     body: &mut impl Response,
     scratch: &mut Vec<DVec3>,
 ) -> [f64; 2] {
-    let Contact { slots: at, normal, .. } = contact;
+    let Contact { jacobian: at, normal, .. } = contact;
     scratch.clear();
     scratch.resize(slots, DVec3::ZERO);
     at.scatter(*normal, scratch);
@@ -331,9 +332,9 @@ impl Iterate {
             return formed.times(&self.lambda, &mut self.caused);
         }
         answer.fill(DVec3::ZERO);
-        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.slots.scatter(*lambda, answer));
+        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.jacobian.scatter(*lambda, answer));
         body.respond(answer);
         self.caused.clear();
-        self.caused.extend(contacts.iter().map(|c| c.slots.velocity(answer)));
+        self.caused.extend(contacts.iter().map(|c| c.jacobian.velocity(answer)));
     }
 }

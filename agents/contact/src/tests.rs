@@ -59,7 +59,7 @@ fn random_contacts(count: u32, slots: u32, friction: f64, random: &mut Random) -
         let gap_m = random.next() * 0.01;
         Contact {
             key: u64::from(key),
-            slots: at,
+            jacobian: at,
             normal: random.vector().normalize(),
             gap_m,
             friction,
@@ -85,10 +85,10 @@ fn sweeps(contacts: &[Contact], free: &[DVec3], body: &mut Dense) -> Vec<DVec3> 
     let (mut velocities, mobilities) = (free.to_vec(), body.mobilities());
     for _ in 0..20_000 {
         for (contact, lambda) in contacts.iter().zip(&mut lambdas) {
-            let slope = contact.slots.velocity(&velocities) + contact.normal * contact.bias_m_s(0.01);
-            let next = contact.project(*lambda - slope / (3.0 * contact.slots.mobility(&mobilities)));
+            let slope = contact.jacobian.velocity(&velocities) + contact.normal * contact.bias_m_s(0.01);
+            let next = contact.project(*lambda - slope / (3.0 * contact.jacobian.mobility(&mobilities)));
             let mut change = vec![DVec3::ZERO; velocities.len()];
-            contact.slots.scatter(next - *lambda, &mut change);
+            contact.jacobian.scatter(next - *lambda, &mut change);
             body.respond(&mut change);
             velocities.iter_mut().zip(&change).for_each(|(v, dv)| *v += *dv);
             *lambda = next;
@@ -177,7 +177,7 @@ fn every_law_holds_after_the_solve() {
         let free: Vec<DVec3> = (0..8).map(|_| random.vector()).collect();
         let (velocities, solver) = after(&contacts, &free, &mut body, STRICT);
         for (contact, impulse) in contacts.iter().zip(solver.impulses()) {
-            let u = contact.slots.velocity(&velocities);
+            let u = contact.jacobian.velocity(&velocities);
             let opening = u.dot(contact.normal) + contact.bias_m_s(0.01);
             let push = impulse.dot(contact.normal);
             // the solve stops at 1e-11 m/s; sticking contacts share it among neighbours
@@ -220,7 +220,7 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
     }
     let contact = Contact {
         key: 1,
-        slots,
+        jacobian: slots,
         normal: DVec3::X,
         gap_m: 0.0,
         friction: 0.4,
@@ -248,7 +248,7 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
             slots.add_linear(i, 1.0);
             Contact {
                 key: u64::from(i),
-                slots,
+                jacobian: slots,
                 normal: DVec3::Z,
                 gap_m: 0.0,
                 friction,
@@ -303,7 +303,7 @@ fn contacts_that_stay_open_cost_no_response() {
     slots.add_linear(0, 1.0);
     let contacts = [Contact {
         key: 0,
-        slots,
+        jacobian: slots,
         normal: DVec3::Z,
         gap_m: 0.1,
         friction: 0.5,
@@ -327,7 +327,7 @@ fn an_impulse_passes_to_a_related_key() {
     let mut press = |key: u64| {
         let contacts = [Contact {
             key,
-            slots,
+            jacobian: slots,
             normal: DVec3::Z,
             gap_m: 0.0,
             friction: 0.5,

@@ -13,7 +13,12 @@ pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
         for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
             match tried.step(bad, &[]) {
                 Err(StepError::BadSpan { .. }) => {}
-                other => return Err(format!("a step of {} s gave {other:?}; expected StepError::BadSpan", bad.as_secs_f64())),
+                other => {
+                    return Err(format!(
+                        "a step of {} s gave {other:?}; expected StepError::BadSpan",
+                        bad.as_secs_f64()
+                    ));
+                }
             }
             if tried.hash() != before {
                 return Err(format!("a refused step of {} s changed the state", bad.as_secs_f64()));
@@ -82,7 +87,9 @@ pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
         run.must_step(suite.dt, &[])?;
         match run.step(suite.dt, &[*pull]) {
             Ok(()) | Err(StepError::Diverged { .. }) => {}
-            Err(other) => return Err(format!("a pull to {} gave {other:?}; expected a step or StepError::Diverged", pull.target)),
+            Err(other) => {
+                return Err(format!("a pull to {} gave {other:?}; expected a step or StepError::Diverged", pull.target));
+            }
         }
         shows_finite(&run).map_err(|what| format!("after a pull to {}: {what}", pull.target))?;
     }

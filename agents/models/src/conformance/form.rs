@@ -30,7 +30,9 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
             // NaN is a failure too
             if wrong.is_nan() || wrong > allowed {
                 let t = run.time.as_secs_f64();
-                return Err(format!("after {t} s the deviation from the closed form is {wrong:e}; expected at most {allowed:e}"));
+                return Err(format!(
+                    "after {t} s the deviation from the closed form is {wrong:e}; expected at most {allowed:e}"
+                ));
             }
         }
     }
@@ -75,7 +77,11 @@ pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
         let before = run.hash();
         let wanted = run.agent.resolution().unwrap_or(Resolution { eps_m: 0.01, n: 2 });
         run.agent.set_resolution(wanted);
-        return if run.hash() == before { Ok(()) } else { Err("set_resolution with the present resolution changed the state".to_owned()) };
+        return if run.hash() == before {
+            Ok(())
+        } else {
+            Err("set_resolution with the present resolution changed the state".to_owned())
+        };
     }
     // coarse to fine and back: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
@@ -118,7 +124,10 @@ pub(super) fn residual(suite: &Suite<'_>) -> Result<(), String> {
         }
         let now = run.snapshot().residual_m;
         if let Some((eps_m, coarser)) = last.filter(|(_, coarser)| now > RESIDUAL_SLACK * coarser) {
-            return Err(format!("the residual is {coarser:e} m at ε {eps_m} m and {now:e} m at the finer ε {} m", wanted.eps_m));
+            return Err(format!(
+                "the residual is {coarser:e} m at ε {eps_m} m and {now:e} m at the finer ε {} m",
+                wanted.eps_m
+            ));
         }
         last = Some((wanted.eps_m, now));
     }

@@ -15,7 +15,9 @@ pub enum TubeError {
         count: usize,
     },
     /// A point of the path is not finite, or the same as the one before it.
-    #[error("point {index} of the tube's path is {point}; expected finite coordinates that differ from the point before")]
+    #[error(
+        "point {index} of the tube's path is {point}; expected finite coordinates that differ from the point before"
+    )]
     BadPoint {
         /// Index of the point, from 0.
         index: usize,

@@ -104,7 +104,7 @@ impl TubeContacts {
         if let Some(pairs) = pairs {
             pairs.visit(skin, slack_m, |facing| {
                 let contact = contact_between_segments(&facing, *friction);
-                let closing = contact.slots.velocity_of_nodes(skin.slots).dot(contact.normal);
+                let closing = contact.jacobian.velocity_of_nodes(skin.slots).dot(contact.normal);
                 if contact.gap_m + closing * skin.h_s <= slack_m {
                     contacts.push(contact);
                 }
@@ -143,7 +143,7 @@ impl TubeContacts {
     /// Contacts in which fixed solids pressed in the last solve: slots and normal of each.
     pub fn supporting_contacts(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
-        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.jacobian, c.normal))
     }
 
     /// Whether any fixed solid pressed in the last solve.
@@ -222,20 +222,20 @@ fn is_fixed(contact: &Contact) -> bool {
 
 /// Self-contact: facing points of two segments, and arms to the middle of the gap (eq. 20).
 fn contact_between_segments(facing: &FacingPoints, friction: f64) -> Contact {
-    let mut slots = ContactJacobian::default();
+    let mut jacobian = ContactJacobian::default();
     for (side, sign) in [(0, 1.0), (1, -1.0)] {
         let (segment, share) = (facing.segments[side] as usize, facing.shares[side]);
-        slots.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
-        slots.add_linear(node_slot(segment + 1) as u32, sign * share);
+        jacobian.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
+        jacobian.add_linear(node_slot(segment + 1) as u32, sign * share);
         // the arm points to the other side: against the normal for the first, along it for the second
         let arm = facing.normal * -sign * (facing.radii_m[side] + 0.5 * facing.gap_m);
-        slots.add_angular(segment_slot(segment) as u32, arm * sign);
+        jacobian.add_angular(segment_slot(segment) as u32, arm * sign);
     }
     let [first, second] = facing.segments.map(u64::from);
     let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(facing.place);
     Contact {
         key,
-        slots,
+        jacobian,
         normal: facing.normal,
         gap_m: facing.gap_m,
         friction,
@@ -247,20 +247,20 @@ fn contact_between_segments(facing: &FacingPoints, friction: f64) -> Contact {
 
 /// Contact with a wall, at a node or inside a segment (eq. 21).
 fn contact_with_wall(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
-    let mut slots = ContactJacobian::default();
+    let mut jacobian = ContactJacobian::default();
     let index = touch.index as usize;
     let arm = touch.normal * -touch.radius_m;
     if let Some(share) = touch.share {
-        slots.add_linear(node_slot(index) as u32, 1.0 - share);
-        slots.add_linear(node_slot(index + 1) as u32, share);
-        slots.add_angular(segment_slot(index) as u32, arm);
+        jacobian.add_linear(node_slot(index) as u32, 1.0 - share);
+        jacobian.add_linear(node_slot(index + 1) as u32, share);
+        jacobian.add_angular(segment_slot(index) as u32, arm);
     } else {
-        slots.add_linear(node_slot(index) as u32, 1.0);
+        jacobian.add_linear(node_slot(index) as u32, 1.0);
         // a node's skin turns with the mean of the adjacent segments
         let beside = [index.checked_sub(1), Some(index).filter(|&k| k < segments)];
         let count = beside.iter().flatten().count() as f64;
         for segment in beside.into_iter().flatten() {
-            slots.add_angular(segment_slot(segment) as u32, arm / count);
+            jacobian.add_angular(segment_slot(segment) as u32, arm / count);
         }
     }
     let inside = u64::from(touch.share.is_some());
@@ -268,7 +268,7 @@ fn contact_with_wall(touch: &WallTouch, friction: f64, segments: usize) -> Conta
         (u64::from(touch.wall) + 1) << WALL_SHIFT | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
     Contact {
         key,
-        slots,
+        jacobian,
         normal: touch.normal,
         gap_m: touch.gap_m,
         friction: (friction * touch.friction).sqrt(),

@@ -83,7 +83,7 @@ impl TubeContacts {
             company.mates_mut().watch(self.impulses(), velocities);
         }
         velocities[own..].fill(DVec3::ZERO); // the peers' motion is not this tube's work
-        let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
+        let work = self.impulses().map(|(contact, impulse)| contact.jacobian.velocity(velocities).dot(*impulse)).sum();
         velocities.truncate(own);
         work
     }

@@ -171,7 +171,7 @@ fn self_contact_gives_no_net_force_and_no_net_torque() {
     for contact in &contacts.contacts {
         let impulse = random.vector();
         let mut slots = vec![DVec3::ZERO; 2 * chain.positions.len()];
-        contact.slots.scatter(impulse, &mut slots);
+        contact.jacobian.scatter(impulse, &mut slots);
         let force: DVec3 = (0..chain.positions.len()).map(|i| slots[node_slot(i)]).sum();
         let torque: DVec3 = (0..chain.positions.len())
             .map(|i| chain.positions[i].cross(slots[node_slot(i)]) + slots[segment_slot(i)])
