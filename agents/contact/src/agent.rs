@@ -157,9 +157,9 @@ pub struct AnchorSpring {
 /// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag what it grasps along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
-/// By how many seconds the motion of a tool, published at `seen`, is extrapolated to reach `time`.
-pub fn tool_extrapolation_s(time: SimTime, seen: SimTime) -> f64 {
-    time.secs_after(seen).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
+/// By how many seconds the motion of a tool, published at `published`, is extrapolated to reach `time`.
+pub fn tool_extrapolation_s(time: SimTime, published: SimTime) -> f64 {
+    time.secs_after(published).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
 }
 
 impl<'a> StepContext<'a> {

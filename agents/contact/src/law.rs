@@ -1,4 +1,4 @@
-//! Who owns a pair of agents, and by which law the two act on each other.
+//! Which agent owns a pair, and by which law the two act on each other.
 
 use super::beside::PART_MAX_S;
 use super::crowd::PART_S;
@@ -28,7 +28,7 @@ pub enum Law {
         /// Damping beside it, N·s/m, ≥ 0.
         damping_n_s_m: f64,
     },
-    /// They pass through each other.
+    /// No contact: the two pass through each other.
     Off,
 }
 
@@ -45,16 +45,16 @@ pub struct Link {
     pub stiffness_n_m: f64,
     /// Damping, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
-    /// The distance at which it pulls nothing, metres, ≥ 0.
+    /// The distance at which it exerts no force, metres, ≥ 0.
     pub rest_m: f64,
     /// [`Law::Ledger`] or [`Law::Tlm`].
     pub law: Law,
 }
 
-/// What decides who owns a pair.
+/// The properties of an agent that decide whether it owns a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnershipTraits {
-    /// Its number.
+    /// The agent.
     pub id: AgentId,
     /// Its model's name.
     pub model: &'static str,
@@ -62,7 +62,7 @@ pub struct OwnershipTraits {
     pub rate_hz: f64,
     /// How many ends of a tube are held in place.
     pub held_ends: u8,
-    /// How high it starts, J/kg: see [`CollisionShape::height_j_kg`].
+    /// Height of its start position, J/kg: see [`CollisionShape::height_j_kg`].
     pub height_j_kg: f32,
 }
 
@@ -86,7 +86,7 @@ impl OwnershipTraits {
         self.is_tube() || matches!(self.model, "sheet" | "solid" | "rope")
     }
 
-    /// Below which rate the two keep the same one beside each other, Hz.
+    /// The rate below which the two keep the same one beside each other, Hz.
     fn common_hz(self, other: Self, linked: bool) -> f64 {
         match (keep_step(self, other, linked), self.is_tube() && other.is_tube()) {
             (true, _) => PART_S.recip(),
@@ -96,23 +96,23 @@ impl OwnershipTraits {
     }
 }
 
-/// Whether two, whom a link by the ledger may have `linked`, keep step beside each other: who owns makes no longer steps than the other, down
-/// to those of a crowd (docs/theory/coupling.md, eq. 7o). They do where both bend, but for two tubes of whom one lies on its hold; links have
-/// clocks of their own.
+/// Whether two agents keep step beside each other: the owner's steps are no longer than the peer's, down to those of a contact cluster
+/// (docs/theory/coupling.md, eq. 7o). Two deformables do, except two tubes of which one is held, and except where a ledger link joins the two
+/// (`linked`): links have clocks of their own.
 #[must_use]
 pub fn keep_step(a: OwnershipTraits, b: OwnershipTraits, linked: bool) -> bool {
     let held = a.held_ends > 0 || b.held_ends > 0;
     a.is_deformable() && b.is_deformable() && !linked && !(a.is_tube() && b.is_tube() && held)
 }
 
-/// Whether `me` owns the pair with `other`, to whom a link by the ledger may have it `linked`.
+/// Whether `me` owns the pair with `other`; `linked` where a ledger link joins the two.
 ///
-/// A tool is led and owns nothing. What bends owns before a rigid body: how that answers impulses is known exactly, however long the step
-/// (docs/decisions/0012, 0013).
-/// Of two that bend the faster owns, and of two that can keep step the higher: it solves what it bears in one problem with their contact
-/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not lie on it; and of two tubes of whom
-/// one is held, and lies on its hold, the one with fewer held ends does before the faster. Who are alike in all this leave it to the
-/// rates that their scene wants, then to the lower number.
+/// A tool is driven and owns nothing. A deformable owns before a rigid body, whose response to impulses is known exactly, however long the
+/// step (docs/decisions/0012, 0013).
+/// Of two deformables the faster owns, and of two that can keep step the higher: it solves its load in one problem with their contact
+/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not rest on it; and of two tubes of which
+/// one is held, the one with fewer held ends owns before the faster. Ties are broken by the rates that the scene wants, then by the
+/// lower number.
 #[must_use]
 pub fn owns(me: OwnershipTraits, other: OwnershipTraits, linked: bool) -> bool {
     if me.is_driven() || other.is_driven() {
@@ -143,7 +143,7 @@ pub fn owns(me: OwnershipTraits, other: OwnershipTraits, linked: bool) -> bool {
 mod tests {
     use super::*;
 
-    fn standing(id: u32, model: &'static str, rate_hz: f64) -> OwnershipTraits {
+    fn traits(id: u32, model: &'static str, rate_hz: f64) -> OwnershipTraits {
         OwnershipTraits::new(AgentId(id), model, rate_hz, None)
     }
 
@@ -158,7 +158,7 @@ mod tests {
             for (rate_hz, held_ends, height_j_kg) in
                 [(60.0, 0, 0.0), (100.0, 0, 1.0), (1000.0, 0, 2.0), (1000.0, 1, 1.0)]
             {
-                all.push(OwnershipTraits { held_ends, height_j_kg, ..standing(all.len() as u32, model, rate_hz) });
+                all.push(OwnershipTraits { held_ends, height_j_kg, ..traits(all.len() as u32, model, rate_hz) });
             }
         }
         for a in &all {
@@ -176,46 +176,40 @@ mod tests {
     fn a_deformable_owns_before_a_rigid_body_and_a_tool_owns_nothing() {
         let [slow, fast] = [60.0, 1000.0];
         for model in ["tube", "sheet"] {
-            assert!(owns(standing(1, model, slow), standing(0, "rigid", fast), false));
+            assert!(owns(traits(1, model, slow), traits(0, "rigid", fast), false));
         }
-        assert!(owns(standing(1, "rigid", fast), standing(0, "rigid", slow), false), "the faster");
-        assert!(owns(standing(1, "rigid", slow), standing(0, "tool", fast), false));
+        assert!(owns(traits(1, "rigid", fast), traits(0, "rigid", slow), false), "the faster");
+        assert!(owns(traits(1, "rigid", slow), traits(0, "tool", fast), false));
     }
 
     #[test]
     fn the_upper_of_two_deformables_owns_where_they_keep_step() {
         for (upper, lower) in [("sheet", "sheet"), ("tube", "tube"), ("tube", "sheet"), ("sheet", "tube")] {
             for (upper_hz, lower_hz) in [(60.0, 60.0), (60.0, 240.0), (240.0, 60.0), (1000.0, 240.0)] {
-                let [upper, lower] = [above(standing(0, upper, upper_hz)), standing(1, lower, lower_hz)];
+                let [upper, lower] = [above(traits(0, upper, upper_hz)), traits(1, lower, lower_hz)];
                 assert!(owns(upper, lower, false), "{upper:?} on {lower:?}");
             }
         }
-        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "sheet", 60.0)), false), "the faster");
-        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "tube", 60.0)), false), "the soft one");
-        assert!(
-            owns(above(standing(0, "sheet", 60.0)), standing(1, "tube", 1000.0), false),
-            "the soft one, however slow"
-        );
-        assert!(owns(standing(2, "sheet", 240.0), standing(1, "sheet", 60.0), false), "as high, the faster");
-        assert!(owns(standing(0, "sheet", 60.0), standing(1, "sheet", 60.0), false), "of equals the lower number");
+        assert!(owns(traits(1, "sheet", 1000.0), above(traits(0, "sheet", 60.0)), false), "the faster");
+        assert!(owns(traits(1, "sheet", 1000.0), above(traits(0, "tube", 60.0)), false), "the soft one");
+        assert!(owns(above(traits(0, "sheet", 60.0)), traits(1, "tube", 1000.0), false), "the soft one, however slow");
+        assert!(owns(traits(2, "sheet", 240.0), traits(1, "sheet", 60.0), false), "as high, the faster");
+        assert!(owns(traits(0, "sheet", 60.0), traits(1, "sheet", 60.0), false), "of equals the lower number");
     }
 
     #[test]
     fn linked_and_held_pairs_are_owned_regardless_of_height() {
-        let (sheet, tube) = (standing(1, "sheet", 60.0), standing(2, "tube", 60.0));
+        let (sheet, tube) = (traits(1, "sheet", 60.0), traits(2, "tube", 60.0));
         assert!(owns(sheet, above(tube), true), "the soft one");
-        assert!(
-            owns(OwnershipTraits { rate_hz: 61.0, ..sheet }, above(standing(0, "sheet", 60.0)), true),
-            "the faster"
-        );
+        assert!(owns(OwnershipTraits { rate_hz: 61.0, ..sheet }, above(traits(0, "sheet", 60.0)), true), "the faster");
         let held = |held_ends, s| OwnershipTraits { held_ends, ..s };
         assert!(owns(tube, held(1, above(tube)), false), "the one that falls");
-        assert!(owns(standing(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
-        assert!(owns(held(2, standing(2, "tube", 1000.0)), above(tube), false), "the faster");
+        assert!(owns(traits(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
+        assert!(owns(held(2, traits(2, "tube", 1000.0)), above(tube), false), "the faster");
         assert!(owns(held(2, tube), held(2, above(tube)), false), "the lower number of those that are held alike");
         assert!(!keep_step(tube, held(1, above(tube)), false), "a held tube lies on its hold");
         assert!(keep_step(sheet, held(1, above(tube)), false) && keep_step(tube, above(tube), false));
         assert!(!keep_step(sheet, above(tube), true), "links have clocks of their own");
-        assert!(!keep_step(sheet, above(standing(0, "rigid", 60.0)), false), "what does not bend too");
+        assert!(!keep_step(sheet, above(traits(0, "rigid", 60.0)), false), "what does not bend too");
     }
 }

@@ -13,7 +13,7 @@
 //! let (normal, back_m_s) = (DVec3::Z, DVec3::ZERO);
 //! let contact = Contact { key: 0, jacobian, normal, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s, age_s: 0.0 };
 //! let settings = Settings { iterations: 1000, tolerance_m_s: 1e-9 };
-//! let problem = Problem { contacts: &[contact], kin: &[], h_s: 0.01, mobilities: &[0.5], settings };
+//! let problem = Problem { contacts: &[contact], related_keys: &[], h_s: 0.01, mobilities: &[0.5], settings };
 //! let mut velocities = [DVec3::new(2.0, 0.0, -1.0)]; // of a point of 2 kg
 //! Solver::default().solve(&problem, &mut velocities, &mut |j: &mut [DVec3]| j.iter_mut().for_each(|j| *j /= 2.0));
 //! // Coulomb: stopping 1 m/s along the normal takes 0.5 m/s from the sliding

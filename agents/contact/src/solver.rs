@@ -66,7 +66,7 @@ pub struct Solver {
     now: Iterate,
     ahead: Iterate,
     next: Iterate,
-    answer: Vec<DVec3>,
+    response: Vec<DVec3>,
     /// Whether W may be formed: for bodies whose response is expensive compared with a product with the W of as many contacts.
     forms: bool,
     formed: DelassusMatrix,
@@ -141,7 +141,7 @@ impl Solver {
         }
         self.prepare(problem, velocities);
         let report = self.iterate(problem, body, velocities.len());
-        velocities.iter_mut().zip(&self.answer).for_each(|(v, dv)| *v += *dv);
+        velocities.iter_mut().zip(&self.response).for_each(|(v, dv)| *v += *dv);
         self.remember(problem);
         report
     }
@@ -198,15 +198,15 @@ impl Solver {
         self.known_h = problem.h_s;
     }
 
-    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `answer`.
+    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `response`.
     fn iterate(&mut self, problem: &Problem<'_>, body: &mut impl Response, slots: usize) -> SolverReport {
         let Problem { contacts, settings, .. } = *problem;
-        self.answer.clear();
-        self.answer.resize(slots, DVec3::ZERO);
+        self.response.clear();
+        self.response.resize(slots, DVec3::ZERO);
         let limit = self.form(problem, body);
         let mut report = SolverReport::default();
         if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
-            self.now.apply_delassus(contacts, &self.formed, body, &mut self.answer);
+            self.now.apply_delassus(contacts, &self.formed, body, &mut self.response);
             report.iterations += 1;
         } else {
             self.now.caused.clear();
@@ -217,11 +217,11 @@ impl Solver {
         loop {
             self.descend(contacts);
             report.residual_m_s = self.residual();
-            // `answer` must belong to `now`: no stop between a rejected move and the next one
+            // `response` must belong to `now`: no stop between a rejected move and the next one
             if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= limit) {
                 break;
             }
-            self.next.apply_delassus(contacts, &self.formed, body, &mut self.answer);
+            self.next.apply_delassus(contacts, &self.formed, body, &mut self.response);
             report.iterations += 1;
             taken = self.bound_holds() || report.iterations >= limit;
             if taken {
@@ -230,7 +230,7 @@ impl Solver {
         }
         if self.formed.is_known() {
             self.formed.forget();
-            self.now.apply_delassus(contacts, &self.formed, body, &mut self.answer);
+            self.now.apply_delassus(contacts, &self.formed, body, &mut self.response);
         }
         self.products = report.iterations;
         report
@@ -244,7 +244,7 @@ impl Solver {
         if !self.forms || !(taken > columns || gave_up) {
             return settings.iterations;
         }
-        self.formed.form(contacts, body, &mut self.answer);
+        self.formed.form(contacts, body, &mut self.response);
         FORMED_PRODUCTS
     }
 
@@ -320,21 +320,21 @@ pub fn inverse_mass(
 }
 
 impl Iterate {
-    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
+    /// The velocities W λ at the contacts; `response` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
     fn apply_delassus(
         &mut self,
         contacts: &[Contact],
         formed: &DelassusMatrix,
         body: &mut impl Response,
-        answer: &mut [DVec3],
+        response: &mut [DVec3],
     ) {
         if formed.is_known() {
             return formed.times(&self.lambda, &mut self.caused);
         }
-        answer.fill(DVec3::ZERO);
-        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.jacobian.scatter(*lambda, answer));
-        body.respond(answer);
+        response.fill(DVec3::ZERO);
+        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.jacobian.scatter(*lambda, response));
+        body.respond(response);
         self.caused.clear();
-        self.caused.extend(contacts.iter().map(|c| c.jacobian.velocity(answer)));
+        self.caused.extend(contacts.iter().map(|c| c.jacobian.velocity(response)));
     }
 }

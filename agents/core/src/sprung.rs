@@ -31,7 +31,7 @@ pub struct Sprung {
 impl Sprung {
     /// (M + h C + h² K)⁻¹: the answer to an impulse of a body whose springs are implicit over `h` seconds (eq. 7b).
     #[must_use]
-    pub fn answer(&self, inertia: InverseMass, h: f64) -> Mat6 {
+    pub fn response(&self, inertia: InverseMass, h: f64) -> Mat6 {
         self.resistance(inertia, h).inverse()
     }
 
@@ -70,9 +70,9 @@ const STEP_SLACK: f64 = 1e-4;
 pub struct SprungPrediction {
     sprung: Sprung,
     inertia: InverseMass,
-    /// The horizon of `answer`, seconds.
+    /// The horizon of `response`, seconds.
     horizon_s: f64,
-    answer: Mat6,
+    response: Mat6,
     /// How long until the published state, seconds; below zero it is past.
     until_published_s: f64,
     velocity: Twist,
@@ -91,12 +91,12 @@ impl SprungPrediction {
     /// A body that is where it said to be.
     pub fn new(sprung: Sprung, inertia: InverseMass, velocity: Twist) -> Self {
         let none = [DVec3::ZERO; 2];
-        let (horizon_s, answer) = (sprung.span_s, sprung.answer(inertia, sprung.span_s));
+        let (horizon_s, response) = (sprung.span_s, sprung.response(inertia, sprung.span_s));
         Self {
             sprung,
             inertia,
             horizon_s,
-            answer,
+            response,
             until_published_s: 0.0,
             velocity,
             displacement: none,
@@ -117,7 +117,7 @@ impl SprungPrediction {
         let h = h.max(self.sprung.span_s);
         self.limit_force(h);
         if h != self.horizon_s {
-            (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
+            (self.horizon_s, self.response) = (h, self.sprung.response(self.inertia, h));
         }
     }
 
@@ -133,7 +133,7 @@ impl SprungPrediction {
         self.sprung.force = [pull.clamp_length_max(limit_n), DVec3::ZERO];
         (self.sprung.rising, self.sprung.stiffness) = (none, Mat6::ZERO);
         (self.displacement, self.velocity_change, self.fresh, self.steady) = (none, none, none, None);
-        (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
+        (self.horizon_s, self.response) = (h, self.sprung.response(self.inertia, h));
     }
 
     /// The velocities that an impulse causes.
@@ -141,7 +141,7 @@ impl SprungPrediction {
         if self.in_impact {
             [impulse[0] * self.inertia.linear_per_kg, self.inertia.angular_per_kg_m2 * impulse[1]]
         } else {
-            self.answer.times(impulse)
+            self.response.times(impulse)
         }
     }
 
@@ -151,7 +151,7 @@ impl SprungPrediction {
             let turning = self.inertia.angular_per_kg_m2;
             return [self.inertia.linear_per_kg, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
         }
-        let a = &self.answer.0;
+        let a = &self.response.0;
         [(a[0][0] + a[1][1] + a[2][2]) / 3.0, (a[3][3] + a[4][4] + a[5][5]) / 3.0]
     }
 
@@ -166,7 +166,7 @@ impl SprungPrediction {
         }
         // the force of the step that is under way, answered like any other over this horizon
         let force = self.sprung.resistance(self.inertia, self.sprung.span_s).times(self.sprung.past);
-        let (behind, share) = (self.answer.times(force), self.until_published_s / h);
+        let (behind, share) = (self.response.times(force), self.until_published_s / h);
         [0, 1].map(|i| behind[i] * share + ahead[i] * (1.0 - share))
     }
 
@@ -181,7 +181,7 @@ impl SprungPrediction {
         if let Some((a, _)) = self.steady.filter(|(_, until)| since < *until && self.horizon_s <= self.sprung.span_s) {
             return a;
         }
-        self.answer.times(self.pull(h))
+        self.response.times(self.pull(h))
     }
 
     /// The force of the springs at the end of the next `h` seconds, had nothing else changed the velocities by then.

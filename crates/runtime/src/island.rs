@@ -1,6 +1,6 @@
 //! Agents that share one world for a while: one of them, the leader, makes the turns of all.
 //!
-//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_contact::Agent::lead`]).
+//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_contact::Agent::step_island`]).
 //! Out: every one's own states, account and ear, as if it made its turns itself: nobody else notices. One turn of a leader:
 //!
 //! take in    who waits at the door

@@ -104,7 +104,7 @@ impl RigidBody {
         let sprung = lean(&self.motion, &self.spread, &self.ties.all, self.gravity);
         let sprung = Sprung { past: self.hold.past, span_s: dt, ..sprung };
         let (linear_per_kg, angular_per_kg_m2) = self.motion.inverse_inertia(&self.spread);
-        let answer = sprung.answer(InverseMass { linear_per_kg, angular_per_kg_m2 }, dt);
+        let answer = sprung.response(InverseMass { linear_per_kg, angular_per_kg_m2 }, dt);
         self.hold.known = Some((sprung, answer));
     }
 }

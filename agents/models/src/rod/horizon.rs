@@ -11,7 +11,7 @@ use super::method::Integrator;
 use super::publish::bounds;
 use super::state::RodState;
 use super::step::{Setting, Stepper};
-use super::system::{Iterate, Scene, assemble};
+use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::DVec3;
 use metachron_contact::Law;
@@ -162,7 +162,7 @@ impl Stepper {
         if span_s.is_none() && (h <= 0.0 || self.factor.slots() != now.u.len()) {
             return None;
         }
-        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        let scene = SubstepProblem { matter, division, springs, ties: &[], h, until: h, integrator };
         let Self { rows, rhs, factor, horizon, footing, .. } = self;
         assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
         let lies = !footing.stance.is_empty();

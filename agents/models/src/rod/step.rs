@@ -18,7 +18,7 @@ use super::method::Integrator;
 use super::rotation::{exp, unit};
 use super::state::{DividedRod, RodMaterial, RodState};
 use super::substep::Substep;
-use super::system::{Iterate, Scene, assemble};
+use super::system::{Iterate, SubstepProblem, assemble};
 use super::xpbd::Projector;
 use glam::{DMat3, DVec3};
 use metachron_contact::Presses;
@@ -127,31 +127,31 @@ impl Stepper {
     pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Divergence> {
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
-        let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
-        while gone < ticks {
-            let substep = Substep { start_s: tick * gone as f64, span_s: tick * size as f64 };
+        let (mut elapsed, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
+        while elapsed < ticks {
+            let substep = Substep { start_s: tick * elapsed as f64, span_s: tick * size as f64 };
             self.company.aim(ties, &now.x, substep);
-            let scene = Scene {
+            let problem = SubstepProblem {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
                 ties,
                 h: substep.span_s,
-                until: tick * (gone + size) as f64,
+                until: tick * (elapsed + size) as f64,
                 integrator: setting.integrator,
             };
             let stretched = substep.span_s * now.stretch > setting.longest_s && size > 1;
             let solves = self.solves;
             let trial = Trial { bounds_turns: size > TURN_TICKS, may_divide: size > 1 };
-            if stretched || self.attempt(now, &scene, trial)? == Verdict::TooFar {
+            if stretched || self.attempt(now, &problem, trial)? == Verdict::TooFar {
                 (self.solves, size) = (solves, size / 2);
                 continue;
             }
             self.accept(now, ties, substep);
             self.remember(now, setting.integrator, ties.is_empty(), substep.span_s);
-            (gone, taken) = (gone + size, taken + 1);
+            (elapsed, taken) = (elapsed + size, taken + 1);
             // double again, where that ends on the grid of the longer substep
-            if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
+            if size < 1 << HALVINGS && elapsed.is_multiple_of(2 * size) {
                 size *= 2;
             }
         }
@@ -195,12 +195,12 @@ impl Stepper {
         }
         let Setting { matter, division, springs, dt, substeps, integrator, .. } = *setting;
         let h = dt / f64::from(substeps);
-        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        let problem = SubstepProblem { matter, division, springs, ties: &[], h, until: h, integrator };
         match integrator {
             Integrator::SymplecticEuler | Integrator::Xpbd => {
-                self.assemble_light(now, &scene, integrator == Integrator::Xpbd);
+                self.assemble_light(now, &problem, integrator == Integrator::Xpbd);
             }
-            _ => assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
+            _ => assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
         }
         self.factor.factor(&self.rows).map_err(|slot| {
             self.factor.forget();
@@ -269,12 +269,12 @@ impl Stepper {
     }
 
     /// One trial substep, from `now` into `next`.
-    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, trial: Trial) -> Result<Verdict, Divergence> {
-        match scene.integrator {
-            Integrator::SymplecticEuler => self.step_symplectic_euler(now, scene).map(|()| Verdict::Good),
-            Integrator::Xpbd => self.step_xpbd(now, scene).map(|()| Verdict::Good),
-            Integrator::ImplicitEuler => self.attempt_euler(now, scene, trial),
-            Integrator::Bdf2 | Integrator::EnergyMomentum => self.attempt_second_order(now, scene, trial),
+    fn attempt(&mut self, now: &RodState, problem: &SubstepProblem<'_>, trial: Trial) -> Result<Verdict, Divergence> {
+        match problem.integrator {
+            Integrator::SymplecticEuler => self.step_symplectic_euler(now, problem).map(|()| Verdict::Good),
+            Integrator::Xpbd => self.step_xpbd(now, problem).map(|()| Verdict::Good),
+            Integrator::ImplicitEuler => self.attempt_euler(now, problem, trial),
+            Integrator::Bdf2 | Integrator::EnergyMomentum => self.attempt_second_order(now, problem, trial),
         }
     }
 
@@ -282,41 +282,41 @@ impl Stepper {
     pub(super) fn attempt_euler(
         &mut self,
         now: &RodState,
-        scene: &Scene<'_>,
+        problem: &SubstepProblem<'_>,
         trial: Trial,
     ) -> Result<Verdict, Divergence> {
-        if let Err(divergence) = self.solve(now, scene, true) {
+        if let Err(divergence) = self.solve(now, problem, true) {
             return if trial.may_divide { Ok(Verdict::TooFar) } else { Err(divergence) };
         }
-        if trial.bounds_turns && self.fastest_spin() * scene.h > TURN_MAX_RAD {
+        if trial.bounds_turns && self.fastest_spin() * problem.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
-        self.advance(now, scene, true);
-        let mut rise = self.energy_rise(now, scene);
+        self.advance(now, problem, true);
+        let mut rise = self.energy_rise(now, problem);
         for _ in 0..ITERATIONS_MORE {
             // a state far out may have no next iterate: then the best so far is judged
-            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, scene, false).is_err() {
+            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, problem, false).is_err() {
                 break;
             }
-            self.advance(now, scene, false);
-            rise = self.energy_rise(now, scene);
+            self.advance(now, problem, false);
+            rise = self.energy_rise(now, problem);
         }
         let finite = self.next.is_finite();
         if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
         }
         if rise > 0.0 {
-            energy_limiter::remove(rise, &mut self.next, scene.matter, scene.division);
+            energy_limiter::remove(rise, &mut self.next, problem.matter, problem.division);
         }
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
     /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
-    fn solve(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) -> Result<(), Divergence> {
+    fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
-        assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        assemble(problem, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
         self.factor_and_solve()?;
-        self.solve_contacts(now, scene, first);
+        self.solve_contacts(now, problem, first);
         Ok(())
     }
 
@@ -330,9 +330,9 @@ impl Stepper {
     }
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    pub(super) fn solve_contacts(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
+    pub(super) fn solve_contacts(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
-        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h, first };
+        let solved = Solved { matter: problem.matter, division: problem.division, rows, factor, h: problem.h, first };
         // contact is a law of whole velocities, not of their change in an iteration
         let known = if first { &[][..] } else { &next.u[..] };
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
@@ -346,9 +346,9 @@ impl Stepper {
     }
 
     /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
-    pub(super) fn advance(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
+    pub(super) fn advance(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) {
         let Self { next, rhs, .. } = self;
-        let (h, count) = (scene.h, now.q.len());
+        let (h, count) = (problem.h, now.q.len());
         next.resize(count);
         for k in 0..=count {
             let v = if first { rhs[2 * k] } else { next.u[2 * k] + rhs[2 * k] };
@@ -361,22 +361,22 @@ impl Stepper {
             next.u[2 * k + 1] = spin;
             next.q[k] = unit(exp(turn * h) * from);
         }
-        next.strain(scene.matter, scene.division);
+        next.strain(problem.matter, problem.division);
     }
 
     /// Energy of `next` beyond that of `now` and the work of pulls, contact and received impulses, less rounding, J (eq. 27).
-    pub(super) fn energy_rise(&self, now: &RodState, scene: &Scene<'_>) -> f64 {
-        let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
+    pub(super) fn energy_rise(&self, now: &RodState, problem: &SubstepProblem<'_>) -> f64 {
+        let (before, after) = (energy(now, problem.springs), energy(&self.next, problem.springs));
         // energy that friction removes must not be added elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
         let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
         work += fresh;
         effort += fresh.abs();
-        for tie in scene.ties {
+        for tie in problem.ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let x = tie.mix(self.next.x[a], self.next.x[b]);
             let v = tie.mix(self.next.u[2 * a], self.next.u[2 * b]);
-            let done = tie.force(x, v, scene.until).dot(x - tie.mix(now.x[a], now.x[b]));
+            let done = tie.force(x, v, problem.until).dot(x - tie.mix(now.x[a], now.x[b]));
             work += done;
             effort += done.abs();
         }
@@ -384,7 +384,7 @@ impl Stepper {
         let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted + effort;
         // the sums themselves round at their own size, and positions at theirs
         let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
-        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * scene.matter.ea * scene.division.total_m();
+        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * problem.matter.ea * problem.division.total_m();
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
@@ -394,7 +394,7 @@ impl Stepper {
             return;
         }
         if untied && self.company.is_empty() && !self.contacts.is_touching() {
-            self.past.learn(&self.next, now, h);
+            self.past.record(&self.next, now, h);
         } else {
             self.past.forget();
         }

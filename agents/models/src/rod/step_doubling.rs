@@ -98,15 +98,15 @@ impl FinerRun {
     /// Advances by a step with the tube's stepper, its memory swapped for this one's; returns whether there is a next state.
     fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> bool {
         let Self { state, past, factor, company, ties } = self;
-        let mut lend = |stepper: &mut Stepper| {
+        let mut swap_memory = |stepper: &mut Stepper| {
             std::mem::swap(&mut stepper.factor, factor);
             std::mem::swap(&mut stepper.past, past);
             std::mem::swap(&mut stepper.company, company);
         };
         let span = stepper.span_s;
-        lend(stepper);
+        swap_memory(stepper);
         let taken = stepper.step(state, setting, ties);
-        lend(stepper);
+        swap_memory(stepper);
         stepper.span_s = span;
         taken.is_ok()
     }

@@ -227,8 +227,8 @@ impl Tube {
     /// Sets the contact radii to those at the end of the step.
     fn widen(&mut self, then: SimTime) {
         let mut contacts = std::mem::take(&mut self.stepper.contacts);
-        let met = !self.stepper.company.is_empty();
-        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_at_time_m(s, then)), met);
+        let has_peers = !self.stepper.company.is_empty();
+        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_at_time_m(s, then)), has_peers);
         self.stepper.contacts = contacts;
     }
 

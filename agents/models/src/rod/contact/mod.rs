@@ -122,10 +122,10 @@ impl TubeContacts {
         }
     }
 
-    /// Sets the outer radius at each node, metres; `met` if there are peers to touch.
-    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, met: bool) {
+    /// Sets the outer radius at each node, metres; `has_peers` if there are peers to touch.
+    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, has_peers: bool) {
         self.radii_m.clear();
-        if met || !self.is_idle() {
+        if has_peers || !self.is_idle() {
             self.radii_m.extend(radii_m);
         }
     }

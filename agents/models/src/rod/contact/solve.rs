@@ -73,13 +73,13 @@ impl TubeContacts {
         }
         self.scale(solved);
         company.mates().scale(&mut self.mobilities);
-        let met = !company.is_empty();
+        let has_peers = !company.is_empty();
         let Self { contacts, mobilities, solver, .. } = self;
-        let related_keys = &RELATED_KEYS[..if met { RELATED_KEYS.len() } else { RELATED_KEYS_WITHOUT_PEERS }];
+        let related_keys = &RELATED_KEYS[..if has_peers { RELATED_KEYS.len() } else { RELATED_KEYS_WITHOUT_PEERS }];
         let problem = Problem { contacts: &[], related_keys, h_s: solved.h, mobilities, settings: SETTINGS };
         let respond = |impulses: &mut [DVec3]| respond(solved.factor, solved.matter.held, impulses);
         company.mates_mut().solve(solver, (contacts, problem), velocities, Owner { slots: own, respond, tips: false });
-        if met {
+        if has_peers {
             company.mates_mut().watch(self.impulses(), velocities);
         }
         velocities[own..].fill(DVec3::ZERO); // the peers' motion is not this tube's work

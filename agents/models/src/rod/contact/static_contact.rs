@@ -11,7 +11,7 @@ use metachron_geometry::signed_distance::{Ball, Field};
 use metachron_geometry::{Obstacle, ShapeError};
 
 /// How much farther than needed a mesh is searched, as a share of the radius: a node found far away can be skipped for longer.
-const LOOK_RADII: f64 = 1.0;
+const SEARCH_RADII: f64 = 1.0;
 
 /// All fixed solids around a tube.
 #[derive(Debug, Clone, Default)]
@@ -173,7 +173,7 @@ impl Walls {
 impl Wall {
     /// Measures the nodes that may be near, then the spans that may be nearer than their nodes.
     fn measure(&mut self, skin: &Skin<'_>, slack_m: f64, travel_m: f64, visit: &mut impl FnMut(WallTouch)) {
-        let look_m = LOOK_RADII * skin.widest_m();
+        let search_m = SEARCH_RADII * skin.widest_m();
         if !self.bores.is_empty() {
             self.bores.leave(skin, &self.field);
         }
@@ -181,7 +181,7 @@ impl Wall {
             let margin_m = slack_m + skin.velocity(node).length() * skin.h_s;
             let (gap_m, at_m) = self.nodes[node];
             if gap_m - (travel_m - at_m) <= margin_m {
-                self.measure_node(skin, node, SearchRange { slack_m, reach_m: margin_m + look_m }, visit);
+                self.measure_node(skin, node, SearchRange { slack_m, reach_m: margin_m + search_m }, visit);
                 self.nodes[node].1 = travel_m;
             }
         }

@@ -98,19 +98,19 @@ fn a_twenty_fourth_of_many_steps_is_repeated_and_nothing_else_changes() {
 #[test]
 fn similar_tubes_do_not_repeat_their_steps_together() {
     let mut tubes = vec![let_go(Integrator::ImplicitEuler, 8, 0.0); 12];
-    let mut dear = [0; 240];
-    for dear in &mut dear {
+    let mut repeated = [0; 240];
+    for repeated in &mut repeated {
         // all move alike: a step of one that takes more than the least of all is made twice
         let step = |(tube, me): (&mut Tube, AgentId)| {
             tube.step(millis(2.0), &StepContext::alone(me, SimTime::ZERO)).unwrap().work
         };
         let work: Vec<f64> = tubes.iter_mut().zip((0..).map(AgentId)).map(step).collect();
         let least = work.iter().copied().fold(f64::INFINITY, f64::min);
-        *dear = work.iter().filter(|work| **work > least).count();
+        *repeated = work.iter().filter(|work| **work > least).count();
     }
-    assert!(dear[..FIRST as usize].iter().all(|count| *count == 0), "{dear:?}");
-    assert!(dear.iter().all(|count| *count <= 1), "{dear:?}");
-    assert!(dear.iter().sum::<usize>() >= 2 * 12, "{dear:?}");
+    assert!(repeated[..FIRST as usize].iter().all(|count| *count == 0), "{repeated:?}");
+    assert!(repeated.iter().all(|count| *count <= 1), "{repeated:?}");
+    assert!(repeated.iter().sum::<usize>() >= 2 * 12, "{repeated:?}");
 }
 
 #[test]
