@@ -22,7 +22,7 @@
 pub mod conformance;
 #[cfg(test)]
 mod harness;
-mod rest_limits;
+mod limits;
 pub mod rigid;
 pub mod rod;
 pub mod soft;

@@ -3,7 +3,7 @@
 //! In: its motion, step by step. Out: true after enough quiet time. Never here: the use of it (sleep is up to the runtime).
 
 use super::state::RodState;
-use crate::rest_limits::{ACCELERATION_MAX_M_S2, QUIET_S, SPEED_MAX_M_S};
+use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 
 /// Counts quiet time.
@@ -25,8 +25,8 @@ impl RestDetector {
         let nodes = now.u.iter().step_by(2);
         let speed2 = nodes.clone().map(|v| v.length_squared()).fold(0.0, f64::max);
         let change2 = nodes.clone().zip(&self.before).map(|(v, b)| (*v - *b).length_squared()).fold(0.0, f64::max);
-        let limit = ACCELERATION_MAX_M_S2 * dt;
-        let quiet = known && speed2 <= SPEED_MAX_M_S * SPEED_MAX_M_S && change2 <= limit * limit;
+        let limit = QUIET_ACCELERATION_M_S2 * dt;
+        let quiet = known && speed2 <= QUIET_SPEED_M_S * QUIET_SPEED_M_S && change2 <= limit * limit;
         self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
         self.before.clear();
         self.before.extend(nodes);

@@ -13,7 +13,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::step::HASTE_MAX;
 use super::step_doubling::Doubling;
 use super::system::System;
-use crate::rest_limits::{ACCELERATION_MAX_M_S2, QUIET_S, SPEED_MAX_M_S};
+use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 use metachron_contact::beside;
 use metachron_contact::beside::has_a_say;
@@ -146,7 +146,7 @@ impl SoftBody {
     fn watch_rest(&mut self, dt: f64) -> bool {
         let Self { velocities, before, .. } = self;
         let pairs = velocities.iter().zip(before.iter());
-        let limit = (SPEED_MAX_M_S, ACCELERATION_MAX_M_S2 * dt);
+        let limit = (QUIET_SPEED_M_S, QUIET_ACCELERATION_M_S2 * dt);
         let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
         let calm = self.spec.sleep && self.ties.is_empty() && self.company.is_calm();
         let quiet = calm && still.all(|still| still);
