@@ -194,7 +194,7 @@ impl Stage {
         actor.time += dt;
         let mut snapshot = Snapshot::default();
         actor.agent.write_snapshot(&mut snapshot);
-        (snapshot.time, snapshot.shorter) = (actor.time, (dt < wanted).then_some(dt));
+        (snapshot.time, snapshot.shortened_step) = (actor.time, (dt < wanted).then_some(dt));
         if !lost {
             actor.published.push(Arc::new(snapshot));
             actor.begun = Some(began);

@@ -116,7 +116,7 @@ mod tests {
         let at = |ms: u64| SimTime::ZERO + SimSpan::from_nanos(ms * 1_000_000);
         let state = |(own, put_off): (u64, u64)| Snapshot {
             time: at(own),
-            put_off: at(put_off).since(SimTime::ZERO),
+            clock_offset: at(put_off).since(SimTime::ZERO),
             body: Body::Rigid(RigidState::default()),
             ..Snapshot::default()
         };

@@ -134,7 +134,7 @@ impl SpringSet {
 fn turn_of(tool: &Other, (pull, around): (&AnchorSpring, &StepContext<'_>)) -> Option<OrientationSpring> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
-    let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
+    let clasp = state.grasp.and_then(|grasp| grasp.orientation)?;
     Some(OrientationSpring::of(state, &clasp, (pull, tool_extrapolation_s(around.time, seen.time))))
 }
 

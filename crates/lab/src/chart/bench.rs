@@ -154,7 +154,7 @@ impl Stage {
         actor.agent.step(dt, &around)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);
-        (actor.own.time, actor.own.shorter) = (time + dt, (dt < wanted).then_some(dt));
+        (actor.own.time, actor.own.shortened_step) = (time + dt, (dt < wanted).then_some(dt));
         if !lost {
             actor.shown.swap(0, 1);
             actor.shown[0] = Arc::new(actor.own.clone());
