@@ -54,7 +54,7 @@ impl Play {
             let mut snapshot = Snapshot::default();
             agent.write_snapshot(&mut snapshot);
             snapshot.time = self.time;
-            Neighbour::seen(*id, Arc::new(snapshot))
+            Neighbour::observed(*id, Arc::new(snapshot))
         };
         self.states = self.agents.iter().map(state).collect();
     }

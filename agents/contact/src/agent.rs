@@ -23,15 +23,15 @@ pub trait Agent: Send {
     /// # Errors
     /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
     /// its last snapshot stays valid.
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError>;
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError>;
 
     /// Reads its surroundings before its first step, which will be one of `dt`, so that its first publication already predicts
     /// its motion for the others. No time passes.
-    fn look(&mut self, _dt: SimSpan, _around: &StepContext<'_>) {}
+    fn observe(&mut self, _dt: SimSpan, _context: &StepContext<'_>) {}
 
     /// The length of the next step where `dt` is requested: shorter next to neighbours whose motion within `dt` cannot be predicted,
     /// never longer. Executors call this before every step.
-    fn longest_step(&self, dt: SimSpan, _around: &StepContext<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, _context: &StepContext<'_>) -> SimSpan {
         dt
     }
 
@@ -73,26 +73,26 @@ pub trait Agent: Send {
     ///
     /// # Errors
     /// [`StepError::Alone`] for a model that steps no other agents; else as [`Agent::step`].
-    fn lead(
+    fn step_island(
         &mut self,
         dt: SimSpan,
-        around: &StepContext<'_>,
-        others: &mut [Companion<'_>],
+        context: &StepContext<'_>,
+        others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
-        let _ = (dt, around, others, apart);
+        let _ = (dt, context, others, apart);
         Err(StepError::Alone { model: self.model() })
     }
 }
 
 /// An agent that is stepped in the island of another.
-pub struct Companion<'a> {
+pub struct IslandMember<'a> {
     /// The agent's number.
     pub id: AgentId,
     /// The agent.
     pub agent: &'a mut dyn Agent,
     /// The surroundings of that agent.
-    pub around: StepContext<'a>,
+    pub context: StepContext<'a>,
 }
 
 /// The other agents and springs that an agent sees while it steps.
@@ -132,7 +132,7 @@ pub struct Neighbour {
 impl Neighbour {
     /// A neighbour that is only looked at: neither in contact nor owned.
     #[must_use]
-    pub const fn seen(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
+    pub const fn observed(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
         Self { id, snapshot, form: None, law: Law::Ledger, owned: false, in_step: false, step_s: 0.0 }
     }
 }
@@ -157,9 +157,9 @@ pub struct AnchorSpring {
 /// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag what it grasps along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
-/// By how many seconds the motion of a tool, published at `seen`, is extrapolated to reach `time`.
-pub fn led_s(time: SimTime, seen: SimTime) -> f64 {
-    time.secs_after(seen).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
+/// By how many seconds the motion of a tool, published at `published`, is extrapolated to reach `time`.
+pub fn tool_extrapolation_s(time: SimTime, published: SimTime) -> f64 {
+    time.secs_after(published).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
 }
 
 impl<'a> StepContext<'a> {
@@ -170,12 +170,12 @@ impl<'a> StepContext<'a> {
     }
 
     /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.
-    pub fn pulls(&self) -> impl Iterator<Item = AnchorSpring> + 'a {
+    pub fn anchor_springs(&self) -> impl Iterator<Item = AnchorSpring> + 'a {
         let (me, time) = (self.me, self.time);
-        let held = self.neighbours.iter().filter_map(move |other| {
+        let grasps = self.neighbours.iter().filter_map(move |other| {
             let Body::Tool(tool) = &other.snapshot.body else { return None };
             let grasp = tool.grasp.filter(|g| g.target == me)?;
-            let age_s = led_s(time, other.snapshot.time);
+            let age_s = tool_extrapolation_s(time, other.snapshot.time);
             Some(AnchorSpring {
                 by: Some(other.id),
                 anchor: grasp.anchor,
@@ -185,6 +185,6 @@ impl<'a> StepContext<'a> {
                 damping_n_s_m: grasp.damping_n_s_m,
             })
         });
-        self.hands.iter().copied().chain(held)
+        self.hands.iter().copied().chain(grasps)
     }
 }

@@ -14,7 +14,7 @@ mod acted;
 use super::other::turned;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::foot::is_borne;
-use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Inertia, InverseMass, RigidState, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 
 /// An agent as the audit sees it.
@@ -63,11 +63,7 @@ pub fn audit(members: &[Member<'_>], at: SimTime, potential: &mut dyn FnMut(Agen
 }
 
 /// Visits the impulses that peers have given `member` and that it has not taken: giver, site, dJ, and t dJ − dS at its own time.
-pub fn on_their_way(
-    member: &Member<'_>,
-    members: &[Member<'_>],
-    mut visit: impl FnMut(AgentId, Site, Impulse, Impulse),
-) {
+pub fn in_flight(member: &Member<'_>, members: &[Member<'_>], mut visit: impl FnMut(AgentId, Site, Impulse, Impulse)) {
     for giver in members {
         let Some(given) = giver.snapshot.given.iter().find(|l| l.with == member.id) else { continue };
         let taken: Option<&Ledger> = member.snapshot.taken.iter().find(|l| l.with == giver.id);
@@ -87,15 +83,15 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     };
     let h = at.secs_after(member.snapshot.time);
     if let Some(sprung) = member.snapshot.sprung.get() {
-        let inertia = (*inverse_mass, *inverse_inertia);
+        let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
         let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
-        let [gone, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
-        (state.position, state.rotation) = (state.position + gone[0], turned(state.rotation, gone[1]));
+        let [displacement, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
+        (state.position, state.rotation) = (state.position + displacement[0], turned(state.rotation, displacement[1]));
         [state.velocity, state.spin] = velocity;
         return Some(state);
     }
     let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
-    on_their_way(member, members, |_, _, dj, way| {
+    in_flight(member, members, |_, _, dj, way| {
         given += dj;
         carried += way;
     });
@@ -130,7 +126,7 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
 }
 
 impl Audit {
-    fn on_its_way(&mut self, dj: Impulse) {
+    fn add_in_flight(&mut self, dj: Impulse) {
         self.in_flight_n_s += dj.linear.length();
         self.in_flight_n_m_s += dj.angular.length();
     }
@@ -145,24 +141,24 @@ fn rigid(
 ) {
     let Inertia::Rigid { inverse_mass, inverse_inertia } = member.snapshot.inertia else { return };
     let Some(state) = settled(member, members, at) else { return };
-    on_their_way(member, members, |_, _, dj, _| sum.on_its_way(dj));
+    in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
     // free rotation keeps angular momentum and energy: both are those of the published rotation
     let (mass, inertia) = (1.0 / inverse_mass, inverse_inertia.inverse());
-    let spun = inertia * state.spin;
-    let spin_j = 0.5 * state.spin.dot(spun);
+    let angular_momentum = inertia * state.spin;
+    let spin_j = 0.5 * state.spin.dot(angular_momentum);
     sum.energy_j += 0.5 * mass * state.velocity.length_squared() + spin_j + potential(member.id, &state);
     sum.momentum += state.velocity * mass;
-    sum.angular += state.position.cross(state.velocity) * mass + spun;
+    sum.angular += state.position.cross(state.velocity) * mass + angular_momentum;
 }
 
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
     let response = member.snapshot.inertia.response();
     let curve = response.and_then(|response| Some((response, response.curve()?.spins())));
-    let Some((inertia, spins)) = curve else { return still(sum, member, state) };
+    let Some((inertia, spins)) = curve else { return without_impulses(sum, member, state) };
     let mut pushed = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
     let (mut carried, mut delivered) = (pushed.clone(), DVec3::ZERO);
-    on_their_way(member, members, |_, site, dj, moved| {
-        sum.on_its_way(dj);
+    in_flight(member, members, |_, site, dj, moved| {
+        sum.add_in_flight(dj);
         let Site::Arc(arc_m) = site else { return };
         let Some((segment, share)) = state.locate(arc_m) else { return };
         delivered += dj.linear;
@@ -173,9 +169,9 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
         }
     });
     if inertia.slots() == pushed.len() {
-        let borne = is_borne(inertia.supports(), pushed.iter().step_by(2).sum());
-        inertia.respond(&mut pushed, borne);
-        inertia.respond(&mut carried, borne);
+        let supported = is_borne(inertia.supports(), pushed.iter().step_by(2).sum());
+        inertia.respond(&mut pushed, supported);
+        inertia.respond(&mut carried, supported);
     }
     let before = Motion::of(member, state, |k| state.velocities[k], |k| spins.get(k).copied().unwrap_or_default());
     let shifted = |k: usize| state.positions[k] + carried[2 * k];
@@ -189,7 +185,7 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
 }
 
 /// Adds a tube that has not stepped yet, or that no agent could have touched: no impulse is in flight to it.
-fn still(sum: &mut Audit, member: &Member<'_>, state: &CurveState) {
+fn without_impulses(sum: &mut Audit, member: &Member<'_>, state: &CurveState) {
     let motion = Motion::of(member, state, |k| state.velocities[k], |_| DVec3::ZERO);
     motion.add(sum, member.snapshot.energy_j, motion.kinetic_j);
 }

@@ -186,7 +186,7 @@ pub fn is_driven(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
 /// Whether a neighbour is a tool that a script or a hand leads on, though it may stand still: who sleeps under it gives it nothing.
 #[must_use]
 pub fn is_led_on(neighbour: &Neighbour) -> bool {
-    matches!(&neighbour.snapshot.body, Body::Tool(tool) if !tool.is_left)
+    matches!(&neighbour.snapshot.body, Body::Tool(tool) if !tool.is_idle)
 }
 
 /// Whether a neighbour bends, is driven, or moves as somebody else near here pushes it.

@@ -16,7 +16,7 @@ pub struct Contact {
     /// Its name from step to step, for the warm start; unique, and contacts are listed by rising keys.
     pub key: u64,
     /// The velocities it joins.
-    pub slots: ContactJacobian,
+    pub jacobian: ContactJacobian,
     /// Unit normal: away from the other body, so that a rising gap has a positive normal velocity.
     pub normal: DVec3,
     /// Distance of the surfaces, metres; below zero they overlap.
@@ -47,7 +47,7 @@ impl Contact {
     }
 
     /// Stops pushing out an overlap: neither depth nor rebound count any more.
-    pub fn leave_inside(&mut self) {
+    pub fn stop_push_out(&mut self) {
         (self.gap_m, self.rebound_m_s) = (self.gap_m.max(0.0), 0.0);
     }
 
@@ -71,10 +71,10 @@ mod tests {
     use super::*;
 
     fn at_rest(gap_m: f64, friction: f64) -> Contact {
-        let slots = ContactJacobian::default();
+        let jacobian = ContactJacobian::default();
         Contact {
             key: 0,
-            slots,
+            jacobian,
             normal: DVec3::Z,
             gap_m,
             friction,

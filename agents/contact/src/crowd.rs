@@ -163,7 +163,7 @@ mod tests {
         let snapshot = Arc::new(Snapshot { body, bounds, pairs, taken, ..Snapshot::default() });
         let kind = ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 };
         let form = Some(Arc::new(CollisionShape { kind, friction: 0.0, restitution: 0.0 }));
-        Neighbour { form, owned, step_s: 1.0 / 60.0, ..Neighbour::seen(AgentId(id), snapshot) }
+        Neighbour { form, owned, step_s: 1.0 / 60.0, ..Neighbour::observed(AgentId(id), snapshot) }
     }
 
     fn rigid() -> Body {

@@ -14,18 +14,18 @@ pub(super) struct DelassusMatrix {
 }
 
 impl DelassusMatrix {
-    /// Forms W from three responses for each contact; `room` has one entry for each slot.
-    pub fn form(&mut self, contacts: &[Contact], body: &mut impl Response, room: &mut [DVec3]) {
+    /// Forms W from three responses for each contact; `scratch` has one entry for each slot.
+    pub fn form(&mut self, contacts: &[Contact], body: &mut impl Response, scratch: &mut [DVec3]) {
         self.blocks.clear();
         for pushed in contacts {
             let from = self.blocks.len();
             self.blocks.resize(from + contacts.len(), DMat3::ZERO);
             for (axis, unit) in DVec3::AXES.into_iter().enumerate() {
-                room.fill(DVec3::ZERO);
-                pushed.slots.scatter(unit, room);
-                body.respond(room);
+                scratch.fill(DVec3::ZERO);
+                pushed.jacobian.scatter(unit, scratch);
+                body.respond(scratch);
                 for (block, moved) in self.blocks[from..].iter_mut().zip(contacts) {
-                    *block.col_mut(axis) = moved.slots.velocity(room);
+                    *block.col_mut(axis) = moved.jacobian.velocity(scratch);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Who owns a pair of agents, and by which law the two act on each other.
+//! Which agent owns a pair, and by which law the two act on each other.
 
 use super::beside::PART_MAX_S;
 use super::crowd::PART_S;
@@ -28,7 +28,7 @@ pub enum Law {
         /// Damping beside it, N·s/m, ≥ 0.
         damping_n_s_m: f64,
     },
-    /// They pass through each other.
+    /// No contact: the two pass through each other.
     Off,
 }
 
@@ -45,16 +45,16 @@ pub struct Link {
     pub stiffness_n_m: f64,
     /// Damping, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
-    /// The distance at which it pulls nothing, metres, ≥ 0.
+    /// The distance at which it exerts no force, metres, ≥ 0.
     pub rest_m: f64,
     /// [`Law::Ledger`] or [`Law::Tlm`].
     pub law: Law,
 }
 
-/// What decides who owns a pair.
+/// The properties of an agent that decide whether it owns a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Standing {
-    /// Its number.
+pub struct OwnershipTraits {
+    /// The agent.
     pub id: AgentId,
     /// Its model's name.
     pub model: &'static str,
@@ -62,11 +62,11 @@ pub struct Standing {
     pub rate_hz: f64,
     /// How many ends of a tube are held in place.
     pub held_ends: u8,
-    /// How high it starts, J/kg: see [`CollisionShape::height_j_kg`].
+    /// Height of its start position, J/kg: see [`CollisionShape::height_j_kg`].
     pub height_j_kg: f32,
 }
 
-impl Standing {
+impl OwnershipTraits {
     /// That of the agent `id` of a `model`, whose scene wants `rate_hz`.
     #[must_use]
     pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&CollisionShape>) -> Self {
@@ -74,7 +74,7 @@ impl Standing {
         Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, CollisionShape::height_j_kg) }
     }
 
-    fn is_led(self) -> bool {
+    fn is_driven(self) -> bool {
         self.model == "tool"
     }
 
@@ -82,11 +82,11 @@ impl Standing {
         self.model == "tube"
     }
 
-    fn bends(self) -> bool {
+    fn is_deformable(self) -> bool {
         self.is_tube() || matches!(self.model, "sheet" | "solid" | "rope")
     }
 
-    /// Below which rate the two keep the same one beside each other, Hz.
+    /// The rate below which the two keep the same one beside each other, Hz.
     fn common_hz(self, other: Self, linked: bool) -> f64 {
         match (keep_step(self, other, linked), self.is_tube() && other.is_tube()) {
             (true, _) => PART_S.recip(),
@@ -96,37 +96,38 @@ impl Standing {
     }
 }
 
-/// Whether two, whom a link by the ledger may have `linked`, keep step beside each other: who owns makes no longer steps than the other, down
-/// to those of a crowd (docs/theory/coupling.md, eq. 7o). They do where both bend, but for two tubes of whom one lies on its hold; links have
-/// clocks of their own.
+/// Whether two agents keep step beside each other: the owner's steps are no longer than the peer's, down to those of a contact cluster
+/// (docs/theory/coupling.md, eq. 7o). Two deformables do, except two tubes of which one is held, and except where a ledger link joins the two
+/// (`linked`): links have clocks of their own.
 #[must_use]
-pub fn keep_step(a: Standing, b: Standing, linked: bool) -> bool {
+pub fn keep_step(a: OwnershipTraits, b: OwnershipTraits, linked: bool) -> bool {
     let held = a.held_ends > 0 || b.held_ends > 0;
-    a.bends() && b.bends() && !linked && !(a.is_tube() && b.is_tube() && held)
+    a.is_deformable() && b.is_deformable() && !linked && !(a.is_tube() && b.is_tube() && held)
 }
 
-/// Whether `me` owns the pair with `other`, to whom a link by the ledger may have it `linked`.
+/// Whether `me` owns the pair with `other`; `linked` where a ledger link joins the two.
 ///
-/// A tool is led and owns nothing. What bends owns before a rigid body: how that answers impulses is known exactly, however long the step
-/// (docs/decisions/0012, 0013).
-/// Of two that bend the faster owns, and of two that can keep step the higher: it solves what it bears in one problem with their contact
-/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not lie on it; and of two tubes of whom
-/// one is held, and lies on its hold, the one with fewer held ends does before the faster. Who are alike in all this leave it to the
-/// rates that their scene wants, then to the lower number.
+/// A tool is driven and owns nothing. A deformable owns before a rigid body, whose response to impulses is known exactly, however long the
+/// step (docs/decisions/0012, 0013).
+/// Of two deformables the faster owns, and of two that can keep step the higher: it solves its load in one problem with their contact
+/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not rest on it; and of two tubes of which
+/// one is held, the one with fewer held ends owns before the faster. Ties are broken by the rates that the scene wants, then by the
+/// lower number.
 #[must_use]
-pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
-    if me.is_led() || other.is_led() {
-        return other.is_led() && !me.is_led();
+pub fn owns(me: OwnershipTraits, other: OwnershipTraits, linked: bool) -> bool {
+    if me.is_driven() || other.is_driven() {
+        return other.is_driven() && !me.is_driven();
     }
-    if me.bends() != other.bends() {
-        return me.bends();
+    if me.is_deformable() != other.is_deformable() {
+        return me.is_deformable();
     }
     let common_hz = me.common_hz(other, linked);
-    let rate = |s: Standing| s.rate_hz.max(common_hz);
-    let lies_on =
-        |tube: Standing, soft: Standing| !linked && tube.height_j_kg > soft.height_j_kg && rate(tube) >= rate(soft);
+    let rate = |s: OwnershipTraits| s.rate_hz.max(common_hz);
+    let rests_on = |tube: OwnershipTraits, soft: OwnershipTraits| {
+        !linked && tube.height_j_kg > soft.height_j_kg && rate(tube) >= rate(soft)
+    };
     if me.is_tube() != other.is_tube() {
-        return if me.is_tube() { lies_on(me, other) } else { !lies_on(other, me) };
+        return if me.is_tube() { rests_on(me, other) } else { !rests_on(other, me) };
     }
     let faster = rate(me).total_cmp(&rate(other));
     let order = if me.held_ends > 0 || other.held_ends > 0 {
@@ -142,76 +143,73 @@ pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
 mod tests {
     use super::*;
 
-    fn standing(id: u32, model: &'static str, rate_hz: f64) -> Standing {
-        Standing::new(AgentId(id), model, rate_hz, None)
+    fn traits(id: u32, model: &'static str, rate_hz: f64) -> OwnershipTraits {
+        OwnershipTraits::new(AgentId(id), model, rate_hz, None)
     }
 
-    fn above(s: Standing) -> Standing {
-        Standing { id: AgentId(9), height_j_kg: 1.0, ..s }
+    fn above(s: OwnershipTraits) -> OwnershipTraits {
+        OwnershipTraits { id: AgentId(9), height_j_kg: 1.0, ..s }
     }
 
     #[test]
-    fn of_every_pair_exactly_one_owns_unless_both_are_led() {
+    fn every_pair_has_one_owner_unless_both_are_driven() {
         let mut all = vec![];
         for model in ["tube", "rigid", "tool", "sheet"] {
             for (rate_hz, held_ends, height_j_kg) in
                 [(60.0, 0, 0.0), (100.0, 0, 1.0), (1000.0, 0, 2.0), (1000.0, 1, 1.0)]
             {
-                all.push(Standing { held_ends, height_j_kg, ..standing(all.len() as u32, model, rate_hz) });
+                all.push(OwnershipTraits { held_ends, height_j_kg, ..traits(all.len() as u32, model, rate_hz) });
             }
         }
         for a in &all {
             for b in all.iter().filter(|b| b.id != a.id) {
-                let both_led = a.model == "tool" && b.model == "tool";
+                let both_driven = a.model == "tool" && b.model == "tool";
                 for linked in [false, true] {
                     let owners = u32::from(owns(*a, *b, linked)) + u32::from(owns(*b, *a, linked));
-                    assert_eq!(owners, u32::from(!both_led), "{a:?} {b:?}");
+                    assert_eq!(owners, u32::from(!both_driven), "{a:?} {b:?}");
                 }
             }
         }
     }
 
     #[test]
-    fn what_bends_owns_before_a_rigid_body_and_nothing_before_it_is_led() {
+    fn a_deformable_owns_before_a_rigid_body_and_a_tool_owns_nothing() {
         let [slow, fast] = [60.0, 1000.0];
         for model in ["tube", "sheet"] {
-            assert!(owns(standing(1, model, slow), standing(0, "rigid", fast), false));
+            assert!(owns(traits(1, model, slow), traits(0, "rigid", fast), false));
         }
-        assert!(owns(standing(1, "rigid", fast), standing(0, "rigid", slow), false), "the faster");
-        assert!(owns(standing(1, "rigid", slow), standing(0, "tool", fast), false));
+        assert!(owns(traits(1, "rigid", fast), traits(0, "rigid", slow), false), "the faster");
+        assert!(owns(traits(1, "rigid", slow), traits(0, "tool", fast), false));
     }
 
     #[test]
-    fn of_two_that_bend_the_upper_one_owns_where_they_can_keep_step() {
+    fn the_upper_of_two_deformables_owns_where_they_keep_step() {
         for (upper, lower) in [("sheet", "sheet"), ("tube", "tube"), ("tube", "sheet"), ("sheet", "tube")] {
             for (upper_hz, lower_hz) in [(60.0, 60.0), (60.0, 240.0), (240.0, 60.0), (1000.0, 240.0)] {
-                let [upper, lower] = [above(standing(0, upper, upper_hz)), standing(1, lower, lower_hz)];
+                let [upper, lower] = [above(traits(0, upper, upper_hz)), traits(1, lower, lower_hz)];
                 assert!(owns(upper, lower, false), "{upper:?} on {lower:?}");
             }
         }
-        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "sheet", 60.0)), false), "the faster");
-        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "tube", 60.0)), false), "the soft one");
-        assert!(
-            owns(above(standing(0, "sheet", 60.0)), standing(1, "tube", 1000.0), false),
-            "the soft one, however slow"
-        );
-        assert!(owns(standing(2, "sheet", 240.0), standing(1, "sheet", 60.0), false), "as high, the faster");
-        assert!(owns(standing(0, "sheet", 60.0), standing(1, "sheet", 60.0), false), "of equals the lower number");
+        assert!(owns(traits(1, "sheet", 1000.0), above(traits(0, "sheet", 60.0)), false), "the faster");
+        assert!(owns(traits(1, "sheet", 1000.0), above(traits(0, "tube", 60.0)), false), "the soft one");
+        assert!(owns(above(traits(0, "sheet", 60.0)), traits(1, "tube", 1000.0), false), "the soft one, however slow");
+        assert!(owns(traits(2, "sheet", 240.0), traits(1, "sheet", 60.0), false), "as high, the faster");
+        assert!(owns(traits(0, "sheet", 60.0), traits(1, "sheet", 60.0), false), "of equals the lower number");
     }
 
     #[test]
-    fn links_and_holds_ask_for_no_height() {
-        let (sheet, tube) = (standing(1, "sheet", 60.0), standing(2, "tube", 60.0));
+    fn linked_and_held_pairs_are_owned_regardless_of_height() {
+        let (sheet, tube) = (traits(1, "sheet", 60.0), traits(2, "tube", 60.0));
         assert!(owns(sheet, above(tube), true), "the soft one");
-        assert!(owns(Standing { rate_hz: 61.0, ..sheet }, above(standing(0, "sheet", 60.0)), true), "the faster");
-        let held = |held_ends, s| Standing { held_ends, ..s };
+        assert!(owns(OwnershipTraits { rate_hz: 61.0, ..sheet }, above(traits(0, "sheet", 60.0)), true), "the faster");
+        let held = |held_ends, s| OwnershipTraits { held_ends, ..s };
         assert!(owns(tube, held(1, above(tube)), false), "the one that falls");
-        assert!(owns(standing(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
-        assert!(owns(held(2, standing(2, "tube", 1000.0)), above(tube), false), "the faster");
+        assert!(owns(traits(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
+        assert!(owns(held(2, traits(2, "tube", 1000.0)), above(tube), false), "the faster");
         assert!(owns(held(2, tube), held(2, above(tube)), false), "the lower number of those that are held alike");
         assert!(!keep_step(tube, held(1, above(tube)), false), "a held tube lies on its hold");
         assert!(keep_step(sheet, held(1, above(tube)), false) && keep_step(tube, above(tube), false));
         assert!(!keep_step(sheet, above(tube), true), "links have clocks of their own");
-        assert!(!keep_step(sheet, above(standing(0, "rigid", 60.0)), false), "what does not bend too");
+        assert!(!keep_step(sheet, above(traits(0, "rigid", 60.0)), false), "what does not bend too");
     }
 }

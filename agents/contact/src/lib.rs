@@ -8,12 +8,12 @@
 //! use metachron_contact::{Contact, Problem, Settings, Solver};
 //! use metachron_core::ContactJacobian;
 //!
-//! let mut slots = ContactJacobian::default();
-//! slots.add_linear(0, 1.0);
+//! let mut jacobian = ContactJacobian::default();
+//! jacobian.add_linear(0, 1.0);
 //! let (normal, back_m_s) = (DVec3::Z, DVec3::ZERO);
-//! let contact = Contact { key: 0, slots, normal, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s, age_s: 0.0 };
+//! let contact = Contact { key: 0, jacobian, normal, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s, age_s: 0.0 };
 //! let settings = Settings { iterations: 1000, tolerance_m_s: 1e-9 };
-//! let problem = Problem { contacts: &[contact], kin: &[], h_s: 0.01, mobilities: &[0.5], settings };
+//! let problem = Problem { contacts: &[contact], related_keys: &[], h_s: 0.01, mobilities: &[0.5], settings };
 //! let mut velocities = [DVec3::new(2.0, 0.0, -1.0)]; // of a point of 2 kg
 //! Solver::default().solve(&problem, &mut velocities, &mut |j: &mut [DVec3]| j.iter_mut().for_each(|j| *j /= 2.0));
 //! // Coulomb: stopping 1 m/s along the normal takes 0.5 m/s from the sliding
@@ -38,12 +38,12 @@ pub mod solver;
 pub mod taken;
 pub mod tank;
 
-pub use agent::{Agent, AnchorSpring, Companion, Neighbour, StepContext};
+pub use agent::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
 pub use contact::{Contact, PUSH_OUT_SHARE};
 pub use exchange::{Exchange, acknowledged};
 pub use knock::Knock;
 pub use lasting::smooth;
-pub use law::{Law, Link, Standing, keep_step, owns};
+pub use law::{Law, Link, OwnershipTraits, keep_step, owns};
 pub use mates::Feet;
 pub use mates::{Far, Mate, Mates, Owner, Pulled, Search};
 pub use other::{Astray, Other, WAKE_M_S};

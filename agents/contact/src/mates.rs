@@ -196,9 +196,9 @@ impl Mates {
             if !gives_way && !self.overspends(found(), velocities) {
                 break;
             }
-            self.leave_inside(contacts);
+            self.stop_push_out(contacts);
             velocities.copy_from_slice(&free);
-            solver.take_back();
+            solver.undo();
         }
         self.all_mut().iter_mut().for_each(|mate| mate.other.release());
         self.free = free;
@@ -209,7 +209,7 @@ impl Mates {
         let Self { list, count, impulses, .. } = self;
         impulses.clear();
         impulses.resize(slots, DVec3::ZERO);
-        contacts.for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
+        contacts.for_each(|(contact, impulse)| contact.jacobian.scatter(*impulse, impulses));
         list[..*count].iter_mut().any(|mate| mate.gives_way(impulses))
     }
 
@@ -225,9 +225,9 @@ impl Mates {
     }
 
     /// Takes push-out from the contacts with those whose tank could not bear it.
-    fn leave_inside(&self, contacts: &mut [Contact]) {
+    fn stop_push_out(&self, contacts: &mut [Contact]) {
         for mate in self.all().iter().filter(|mate| mate.is_spent()) {
-            contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::leave_inside);
+            contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::stop_push_out);
         }
     }
 
@@ -248,7 +248,7 @@ impl Mates {
         let mates = self.all_mut();
         mates.iter_mut().for_each(Mate::begin);
         for (contact, impulse) in contacts {
-            let velocity = contact.slots.velocity(velocities);
+            let velocity = contact.jacobian.velocity(velocities);
             let mate = mates.iter_mut().find(|mate| mate.is_of(contact));
             mate.into_iter().for_each(|mate| mate.spend(contact, *impulse, velocity));
         }
@@ -294,10 +294,10 @@ impl Mates {
         pressed.clear();
         pressed.resize(own, false);
         for (contact, impulse) in contacts {
-            contact.slots.scatter(*impulse, impulses);
+            contact.jacobian.scatter(*impulse, impulses);
             match mates.iter_mut().find(|mate| mate.is_of(contact)) {
                 Some(mate) => mate.note(contact, *impulse, pressed),
-                None if *impulse != DVec3::ZERO => contact.slots.mark_fixed(pressed),
+                None if *impulse != DVec3::ZERO => contact.jacobian.mark_fixed(pressed),
                 None => {}
             }
         }

@@ -20,7 +20,7 @@ use crate::{Neighbour, StepContext};
 use glam::{DQuat, DVec3};
 use lying::Lying;
 use metachron_core::Twist;
-use metachron_core::sprung::Lean;
+use metachron_core::sprung::SprungPrediction;
 use metachron_core::{AgentId, Body, ImpulseResponse, Inertia, ToolState};
 use metachron_geometry::CollisionShape;
 pub(super) use motion::turned;
@@ -34,7 +34,7 @@ pub struct Other {
     /// Velocities in slots: a rigid body's or tool's centre and spin; a tube's nodes and segments in turn; a soft body's vertices.
     velocities: Vec<DVec3>,
     /// A rigid body's springs.
-    lean: Option<Lean>,
+    lean: Option<SprungPrediction>,
     /// A tube's nodes, a soft body's vertices.
     positions: Vec<DVec3>,
     /// How a tube's segments are turned.
@@ -200,7 +200,7 @@ impl Other {
     /// Over how long a depth is taken back from it, seconds: until what was pushed out can show. Springs show it a step later.
     #[must_use]
     pub fn answers_within_s(&self) -> f64 {
-        self.age_s.max(self.lean.as_ref().map_or(0.0, Lean::span_s))
+        self.age_s.max(self.lean.as_ref().map_or(0.0, SprungPrediction::span_s))
     }
 
     /// Whether impulses do not move it: it is led, held, or at rest.

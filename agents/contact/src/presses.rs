@@ -20,7 +20,7 @@ impl Presses {
         let now = &mut self.0[0];
         now.clear();
         now.resize(slots, DVec3::ZERO);
-        contacts.for_each(|(contact, impulse)| contact.slots.scatter_known(*impulse / h, now));
+        contacts.for_each(|(contact, impulse)| contact.jacobian.scatter_known(*impulse / h, now));
     }
 
     /// Forgets what pressed: the body was divided anew, or nobody wants to know.

@@ -35,7 +35,7 @@ pub struct Problem<'a> {
     pub contacts: &'a [Contact],
     /// Differences of keys by which a contact may have been named otherwise in the last solve: a place that passes from one
     /// segment to the next takes its impulse along.
-    pub kin: &'a [i64],
+    pub related_keys: &'a [i64],
     /// The step, seconds, > 0.
     pub h_s: f64,
     /// A scale of each slot's inverse mass, 1/kg, or 1/(kg·m²) for a spin; ≥ 0. Only the speed of convergence depends on it.
@@ -66,7 +66,7 @@ pub struct Solver {
     now: Iterate,
     ahead: Iterate,
     next: Iterate,
-    answer: Vec<DVec3>,
+    response: Vec<DVec3>,
     /// Whether W may be formed: for bodies whose response is expensive compared with a product with the W of as many contacts.
     forms: bool,
     formed: DelassusMatrix,
@@ -97,7 +97,7 @@ const BOUND_DECAY: f64 = 0.9;
 /// The least mobility, 1/kg: a contact between held nodes only has none, and any number will do.
 const MOBILITY_MIN: f64 = 1e-12;
 /// Where the last solve ended before its tolerance, W is formed if that costs up to this many times the allowed responses.
-const DEAR: usize = 3;
+const COSTLY_FACTOR: usize = 3;
 /// The most products with a formed W.
 const FORMED_PRODUCTS: u32 = 2_000;
 
@@ -114,13 +114,13 @@ impl Solver {
     }
 
     /// Drops the history of all earlier solves, including the bound of eq. 11.
-    pub fn start_afresh(&mut self) {
+    pub fn reset(&mut self) {
         self.forget();
         self.stiffness = 1.0;
     }
 
     /// Undoes the last solve's effect on warm starts: its input turned out to be wrong.
-    pub fn take_back(&mut self) {
+    pub fn undo(&mut self) {
         std::mem::swap(&mut self.known, &mut self.before.0);
         self.known.iter_mut().for_each(|known| known.taken = false);
         (self.known_h, self.stiffness) = (self.before.1, self.before.2);
@@ -141,7 +141,7 @@ impl Solver {
         }
         self.prepare(problem, velocities);
         let report = self.iterate(problem, body, velocities.len());
-        velocities.iter_mut().zip(&self.answer).for_each(|(v, dv)| *v += *dv);
+        velocities.iter_mut().zip(&self.response).for_each(|(v, dv)| *v += *dv);
         self.remember(problem);
         report
     }
@@ -150,15 +150,16 @@ impl Solver {
     fn prepare(&mut self, problem: &Problem<'_>, velocities: &[DVec3]) {
         let Problem { contacts, h_s: h, mobilities, .. } = *problem;
         self.free.clear();
-        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
+        self.free
+            .extend(contacts.iter().map(|c| c.jacobian.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
         self.scale.clear();
-        self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
+        self.scale.extend(contacts.iter().map(|c| c.jacobian.mobility(mobilities).max(MOBILITY_MIN)));
         (self.before.1, self.before.2) = (self.known_h, self.stiffness);
         self.start(problem);
         self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
     }
 
-    /// Starts from the impulses of the last solve: those with the same key, then those with a related key (`kin`) that no longer exist.
+    /// Starts from the impulses of the last solve: those with the same key, then those with a related key (`related_keys`) that no longer exist.
     fn start(&mut self, problem: &Problem<'_>) {
         let Self { known, known_h, now, .. } = self;
         let longer = if *known_h > 0.0 { problem.h_s / *known_h } else { 0.0 };
@@ -175,7 +176,7 @@ impl Solver {
         for (contact, lambda) in problem.contacts.iter().zip(&mut now.lambda) {
             if lambda.is_nan() {
                 *lambda = DVec3::ZERO;
-                for offset in problem.kin {
+                for offset in problem.related_keys {
                     let key = contact.key.wrapping_add_signed(*offset);
                     let Ok(found) = known.binary_search_by_key(&key, |k| k.key) else { continue };
                     if !known[found].taken {
@@ -197,15 +198,15 @@ impl Solver {
         self.known_h = problem.h_s;
     }
 
-    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `answer`.
+    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `response`.
     fn iterate(&mut self, problem: &Problem<'_>, body: &mut impl Response, slots: usize) -> SolverReport {
         let Problem { contacts, settings, .. } = *problem;
-        self.answer.clear();
-        self.answer.resize(slots, DVec3::ZERO);
-        let most = self.form(problem, body);
+        self.response.clear();
+        self.response.resize(slots, DVec3::ZERO);
+        let limit = self.form(problem, body);
         let mut report = SolverReport::default();
         if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
-            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.now.apply_delassus(contacts, &self.formed, body, &mut self.response);
             report.iterations += 1;
         } else {
             self.now.caused.clear();
@@ -216,20 +217,20 @@ impl Solver {
         loop {
             self.descend(contacts);
             report.residual_m_s = self.residual();
-            // `answer` must belong to `now`: no stop between a rejected move and the next one
-            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= most) {
+            // `response` must belong to `now`: no stop between a rejected move and the next one
+            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= limit) {
                 break;
             }
-            self.next.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.next.apply_delassus(contacts, &self.formed, body, &mut self.response);
             report.iterations += 1;
-            taken = self.bound_holds() || report.iterations >= most;
+            taken = self.bound_holds() || report.iterations >= limit;
             if taken {
                 momentum = self.advance(momentum);
             }
         }
         if self.formed.is_known() {
             self.formed.forget();
-            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+            self.now.apply_delassus(contacts, &self.formed, body, &mut self.response);
         }
         self.products = report.iterations;
         report
@@ -239,11 +240,11 @@ impl Solver {
     fn form(&mut self, problem: &Problem<'_>, body: &mut impl Response) -> u32 {
         let Problem { contacts, settings, .. } = *problem;
         let (columns, taken) = (3 * contacts.len(), self.products as usize);
-        let gave_up = self.products >= settings.iterations && columns <= DEAR * settings.iterations as usize;
+        let gave_up = self.products >= settings.iterations && columns <= COSTLY_FACTOR * settings.iterations as usize;
         if !self.forms || !(taken > columns || gave_up) {
             return settings.iterations;
         }
-        self.formed.form(contacts, body, &mut self.answer);
+        self.formed.form(contacts, body, &mut self.response);
         FORMED_PRODUCTS
     }
 
@@ -299,39 +300,41 @@ impl Solver {
 }
 
 /// The inverse masses of both sides of a contact along its normal, 1/kg: n·J A⁻¹ Jᵀ n over the slots before `own`, and over those from
-/// there on, of `slots` in all. One response; nothing is allocated once `room` has its size.
+/// there on, of `slots` in all. One response; nothing is allocated once `scratch` has its size.
 pub fn inverse_mass(
     contact: &Contact,
-    (own, slots): (usize, usize),
+    own: usize,
+    slots: usize,
     body: &mut impl Response,
-    room: &mut Vec<DVec3>,
+    scratch: &mut Vec<DVec3>,
 ) -> [f64; 2] {
-    let Contact { slots: at, normal, .. } = contact;
-    room.clear();
-    room.resize(slots, DVec3::ZERO);
-    at.scatter(*normal, room);
-    body.respond(room);
-    let both = at.velocity(room).dot(*normal);
-    room[..own].fill(DVec3::ZERO);
-    let other = at.velocity(room).dot(*normal);
+    let Contact { jacobian: at, normal, .. } = contact;
+    scratch.clear();
+    scratch.resize(slots, DVec3::ZERO);
+    at.scatter(*normal, scratch);
+    body.respond(scratch);
+    let both = at.velocity(scratch).dot(*normal);
+    scratch[..own].fill(DVec3::ZERO);
+    let other = at.velocity(scratch).dot(*normal);
     [both - other, other]
 }
 
 impl Iterate {
-    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
-    fn cause(
+    /// The velocities W λ at the contacts; `response` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
+    fn apply_delassus(
         &mut self,
         contacts: &[Contact],
-        (formed, body): (&DelassusMatrix, &mut impl Response),
-        answer: &mut [DVec3],
+        formed: &DelassusMatrix,
+        body: &mut impl Response,
+        response: &mut [DVec3],
     ) {
         if formed.is_known() {
             return formed.times(&self.lambda, &mut self.caused);
         }
-        answer.fill(DVec3::ZERO);
-        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.slots.scatter(*lambda, answer));
-        body.respond(answer);
+        response.fill(DVec3::ZERO);
+        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.jacobian.scatter(*lambda, response));
+        body.respond(response);
         self.caused.clear();
-        self.caused.extend(contacts.iter().map(|c| c.slots.velocity(answer)));
+        self.caused.extend(contacts.iter().map(|c| c.jacobian.velocity(response)));
     }
 }

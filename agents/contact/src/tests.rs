@@ -5,9 +5,9 @@ use glam::DVec3;
 use metachron_core::ContactJacobian;
 
 /// Deterministic numbers in −1 … 1.
-struct Noise(u64);
+struct Random(u64);
 
-impl Noise {
+impl Random {
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
@@ -22,8 +22,8 @@ impl Noise {
 struct Dense(Vec<Vec<f64>>);
 
 impl Dense {
-    fn random(n: usize, noise: &mut Noise) -> Self {
-        let b: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| noise.next()).collect()).collect();
+    fn random(n: usize, random: &mut Random) -> Self {
+        let b: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| random.next()).collect()).collect();
         let entry = |i: usize, j: usize| {
             b[i].iter().zip(&b[j]).map(|(x, y)| x * y).sum::<f64>() + if i == j { 0.3 } else { 0.0 }
         };
@@ -48,19 +48,19 @@ impl Response for Dense {
     }
 }
 
-const PATIENT: Settings = Settings { iterations: 5_000, tolerance_m_s: 1e-11 };
+const STRICT: Settings = Settings { iterations: 5_000, tolerance_m_s: 1e-11 };
 
-fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> Vec<Contact> {
+fn random_contacts(count: u32, slots: u32, friction: f64, random: &mut Random) -> Vec<Contact> {
     let mut contact = |key: u32| {
         let mut at = ContactJacobian::default();
         at.add_linear(key % slots, 0.7);
         at.add_linear((key + 1) % slots, 0.3);
-        at.add_angular((key + 2) % slots, noise.vector() * 0.2);
-        let gap_m = noise.next() * 0.01;
+        at.add_angular((key + 2) % slots, random.vector() * 0.2);
+        let gap_m = random.next() * 0.01;
         Contact {
             key: u64::from(key),
-            slots: at,
-            normal: noise.vector().normalize(),
+            jacobian: at,
+            normal: random.vector().normalize(),
             gap_m,
             friction,
             rebound_m_s: 0.0,
@@ -74,7 +74,7 @@ fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> 
 fn after(contacts: &[Contact], free: &[DVec3], body: &mut Dense, settings: Settings) -> (Vec<DVec3>, Solver) {
     let (mut velocities, mut solver) = (free.to_vec(), Solver::default());
     let mobilities = body.mobilities();
-    let problem = Problem { contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings };
+    let problem = Problem { contacts, related_keys: &[], h_s: 0.01, mobilities: &mobilities, settings };
     solver.solve(&problem, &mut velocities, body);
     (velocities, solver)
 }
@@ -85,10 +85,10 @@ fn sweeps(contacts: &[Contact], free: &[DVec3], body: &mut Dense) -> Vec<DVec3> 
     let (mut velocities, mobilities) = (free.to_vec(), body.mobilities());
     for _ in 0..20_000 {
         for (contact, lambda) in contacts.iter().zip(&mut lambdas) {
-            let slope = contact.slots.velocity(&velocities) + contact.normal * contact.bias_m_s(0.01);
-            let next = contact.project(*lambda - slope / (3.0 * contact.slots.mobility(&mobilities)));
+            let slope = contact.jacobian.velocity(&velocities) + contact.normal * contact.bias_m_s(0.01);
+            let next = contact.project(*lambda - slope / (3.0 * contact.jacobian.mobility(&mobilities)));
             let mut change = vec![DVec3::ZERO; velocities.len()];
-            contact.slots.scatter(next - *lambda, &mut change);
+            contact.jacobian.scatter(next - *lambda, &mut change);
             body.respond(&mut change);
             velocities.iter_mut().zip(&change).for_each(|(v, dv)| *v += *dv);
             *lambda = next;
@@ -99,12 +99,12 @@ fn sweeps(contacts: &[Contact], free: &[DVec3], body: &mut Dense) -> Vec<DVec3> 
 
 #[test]
 fn the_solve_agrees_with_gauss_seidel_on_random_problems() {
-    let mut noise = Noise(7);
+    let mut random = Random(7);
     for trial in 0..20 {
-        let mut body = Dense::random(6, &mut noise);
-        let contacts = random_contacts(5, 6, 0.3, &mut noise);
-        let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
-        let (ours, _) = after(&contacts, &free, &mut body, PATIENT);
+        let mut body = Dense::random(6, &mut random);
+        let contacts = random_contacts(5, 6, 0.3, &mut random);
+        let free: Vec<DVec3> = (0..6).map(|_| random.vector()).collect();
+        let (ours, _) = after(&contacts, &free, &mut body, STRICT);
         let theirs = sweeps(&contacts, &free, &mut body);
         let error = ours.iter().zip(&theirs).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
         // both stop near 1e-11 m/s; the condition of these matrices is below 1e3
@@ -114,20 +114,20 @@ fn the_solve_agrees_with_gauss_seidel_on_random_problems() {
 
 /// A body that yields to nothing asks for impulses without end: who was taken for one is solved for anew.
 #[test]
-fn a_solve_that_is_taken_back_leaves_no_trace() {
-    let mut noise = Noise(17);
-    let (mut body, mut rigid) = (Dense::random(6, &mut noise), Dense::diagonal(&[1e-9; 6]));
-    let contacts = random_contacts(5, 6, 0.3, &mut noise);
-    let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
+fn an_undone_solve_leaves_no_trace() {
+    let mut random = Random(17);
+    let (mut body, mut rigid) = (Dense::random(6, &mut random), Dense::diagonal(&[1e-9; 6]));
+    let contacts = random_contacts(5, 6, 0.3, &mut random);
+    let free: Vec<DVec3> = (0..6).map(|_| random.vector()).collect();
     let mobilities = body.mobilities();
     let few = Settings { iterations: 10, tolerance_m_s: 1e-11 };
-    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings: few };
+    let problem = Problem { contacts: &contacts, related_keys: &[], h_s: 0.01, mobilities: &mobilities, settings: few };
     let [one, other] = [false, true].map(|strays| {
         let mut solver = Solver::default();
         solver.solve(&problem, &mut free.clone(), &mut body);
         if strays {
             solver.solve(&problem, &mut free.clone(), &mut rigid);
-            solver.take_back();
+            solver.undo();
         }
         let mut velocities = free.clone();
         solver.solve(&problem, &mut velocities, &mut body);
@@ -138,16 +138,17 @@ fn a_solve_that_is_taken_back_leaves_no_trace() {
 
 /// The first solve asks the body, the second one finds that W costs less.
 #[test]
-fn a_solve_forming_its_matrix_gives_what_one_that_does_not_gives() {
-    let mut noise = Noise(13);
+fn a_solve_with_a_formed_matrix_gives_the_same_impulses() {
+    let mut random = Random(13);
     let mut formed = 0;
     for trial in 0..20 {
-        let mut body = Dense::random(6, &mut noise);
-        let contacts = random_contacts(5, 6, 0.3, &mut noise);
-        let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
-        let (wanted, _) = after(&contacts, &free, &mut body, PATIENT);
+        let mut body = Dense::random(6, &mut random);
+        let contacts = random_contacts(5, 6, 0.3, &mut random);
+        let free: Vec<DVec3> = (0..6).map(|_| random.vector()).collect();
+        let (wanted, _) = after(&contacts, &free, &mut body, STRICT);
         let mobilities = body.mobilities();
-        let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings: PATIENT };
+        let problem =
+            Problem { contacts: &contacts, related_keys: &[], h_s: 0.01, mobilities: &mobilities, settings: STRICT };
         let (mut solver, mut asked) = (Solver::forming(), 0);
         for again in [false, true] {
             // no warm start: what the second gives is found by W alone
@@ -169,14 +170,14 @@ fn a_solve_forming_its_matrix_gives_what_one_that_does_not_gives() {
 
 #[test]
 fn every_law_holds_after_the_solve() {
-    let mut noise = Noise(11);
+    let mut random = Random(11);
     for _ in 0..20 {
-        let mut body = Dense::random(8, &mut noise);
-        let contacts = random_contacts(7, 8, 0.4, &mut noise);
-        let free: Vec<DVec3> = (0..8).map(|_| noise.vector()).collect();
-        let (velocities, solver) = after(&contacts, &free, &mut body, PATIENT);
+        let mut body = Dense::random(8, &mut random);
+        let contacts = random_contacts(7, 8, 0.4, &mut random);
+        let free: Vec<DVec3> = (0..8).map(|_| random.vector()).collect();
+        let (velocities, solver) = after(&contacts, &free, &mut body, STRICT);
         for (contact, impulse) in contacts.iter().zip(solver.impulses()) {
-            let u = contact.slots.velocity(&velocities);
+            let u = contact.jacobian.velocity(&velocities);
             let opening = u.dot(contact.normal) + contact.bias_m_s(0.01);
             let push = impulse.dot(contact.normal);
             // the solve stops at 1e-11 m/s; sticking contacts share it among neighbours
@@ -191,16 +192,16 @@ fn every_law_holds_after_the_solve() {
 
 #[test]
 fn a_step_with_touching_contacts_never_adds_energy() {
-    let mut noise = Noise(3);
+    let mut random = Random(3);
     for trial in 0..50 {
-        let inverse: Vec<f64> = (0..6).map(|_| 1.0 + 0.9 * noise.next()).collect();
+        let inverse: Vec<f64> = (0..6).map(|_| 1.0 + 0.9 * random.next()).collect();
         let mut body = Dense::diagonal(&inverse);
-        let mut contacts = random_contacts(8, 6, 0.5, &mut noise);
+        let mut contacts = random_contacts(8, 6, 0.5, &mut random);
         contacts.iter_mut().for_each(|c| c.gap_m = 0.0);
-        let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
+        let free: Vec<DVec3> = (0..6).map(|_| random.vector()).collect();
         let energy = |v: &[DVec3]| v.iter().zip(&inverse).map(|(v, w)| v.length_squared() / (2.0 * w)).sum::<f64>();
         for iterations in [1, 2, 4, 8, 16, 5_000] {
-            let settings = Settings { iterations, ..PATIENT };
+            let settings = Settings { iterations, ..STRICT };
             let (velocities, _) = after(&contacts, &free, &mut body, settings);
             let (before, now) = (energy(&free), energy(&velocities));
             assert!(now <= before * (1.0 + 1e-12), "trial {trial}, {iterations} iterations: {before} J -> {now} J");
@@ -210,8 +211,8 @@ fn a_step_with_touching_contacts_never_adds_energy() {
 
 #[test]
 fn contacts_between_parts_of_one_body_keep_its_momentum() {
-    let mut noise = Noise(5);
-    let masses: Vec<f64> = (0..4).map(|_| 1.0 + 0.5 * noise.next()).collect();
+    let mut random = Random(5);
+    let masses: Vec<f64> = (0..4).map(|_| 1.0 + 0.5 * random.next()).collect();
     let mut body = Dense::diagonal(&masses.iter().map(|m| 1.0 / m).collect::<Vec<_>>());
     let mut slots = ContactJacobian::default();
     for (slot, weight) in [(0, 0.3), (1, 0.7), (2, -0.6), (3, -0.4)] {
@@ -219,7 +220,7 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
     }
     let contact = Contact {
         key: 1,
-        slots,
+        jacobian: slots,
         normal: DVec3::X,
         gap_m: 0.0,
         friction: 0.4,
@@ -228,8 +229,8 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
         age_s: 0.0,
     };
     let free: Vec<DVec3> =
-        [-1.0, -1.0, 1.0, 1.0].iter().map(|&x| DVec3::new(x, 0.1, 0.0) + noise.vector() * 0.1).collect();
-    let (velocities, solver) = after(&[contact], &free, &mut body, PATIENT);
+        [-1.0, -1.0, 1.0, 1.0].iter().map(|&x| DVec3::new(x, 0.1, 0.0) + random.vector() * 0.1).collect();
+    let (velocities, solver) = after(&[contact], &free, &mut body, STRICT);
     assert!(solver.impulses()[0].x > 0.1);
     let momentum = |v: &[DVec3]| -> DVec3 { v.iter().zip(&masses).map(|(v, m)| *v * *m).sum() };
     let change = momentum(&velocities) - momentum(&free);
@@ -247,7 +248,7 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
             slots.add_linear(i, 1.0);
             Contact {
                 key: u64::from(i),
-                slots,
+                jacobian: slots,
                 normal: DVec3::Z,
                 gap_m: 0.0,
                 friction,
@@ -261,7 +262,8 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
     let settings = Settings { iterations: 50, tolerance_m_s: 1e-9 };
     for _ in 0..200 {
         velocities.iter_mut().for_each(|v| *v += gravity * h);
-        let problem = Problem { contacts: &contacts, kin: &[], h_s: h, mobilities: &[10.0; N as usize], settings };
+        let problem =
+            Problem { contacts: &contacts, related_keys: &[], h_s: h, mobilities: &[10.0; N as usize], settings };
         solver.solve(&problem, &mut velocities, &mut body);
         way += velocities[2].x * h;
     }
@@ -280,14 +282,14 @@ fn a_chain_on_an_incline_sticks_below_the_friction_angle_and_slides_above() {
 }
 
 #[test]
-fn a_warm_start_saves_most_of_the_answers() {
-    let mut noise = Noise(23);
-    let mut body = Dense::random(8, &mut noise);
-    let contacts = random_contacts(7, 8, 0.4, &mut noise);
-    let free: Vec<DVec3> = (0..8).map(|_| noise.vector()).collect();
+fn a_warm_start_saves_most_of_the_responses() {
+    let mut random = Random(23);
+    let mut body = Dense::random(8, &mut random);
+    let contacts = random_contacts(7, 8, 0.4, &mut random);
+    let free: Vec<DVec3> = (0..8).map(|_| random.vector()).collect();
     let mobilities = body.mobilities();
     let settings = Settings { iterations: 500, tolerance_m_s: 1e-6 };
-    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings };
+    let problem = Problem { contacts: &contacts, related_keys: &[], h_s: 0.01, mobilities: &mobilities, settings };
     let mut solver = Solver::default();
     let cold = solver.solve(&problem, &mut free.clone(), &mut body);
     let warm = solver.solve(&problem, &mut free.clone(), &mut body);
@@ -296,12 +298,12 @@ fn a_warm_start_saves_most_of_the_answers() {
 }
 
 #[test]
-fn contacts_that_stay_open_cost_no_answer() {
+fn contacts_that_stay_open_cost_no_response() {
     let mut slots = ContactJacobian::default();
     slots.add_linear(0, 1.0);
     let contacts = [Contact {
         key: 0,
-        slots,
+        jacobian: slots,
         normal: DVec3::Z,
         gap_m: 0.1,
         friction: 0.5,
@@ -309,7 +311,7 @@ fn contacts_that_stay_open_cost_no_answer() {
         back_m_s: DVec3::ZERO,
         age_s: 0.0,
     }];
-    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
+    let problem = Problem { contacts: &contacts, related_keys: &[], h_s: 0.01, mobilities: &[1.0], settings: STRICT };
     let mut never = |_: &mut [DVec3]| unreachable!("nothing touches");
     let mut velocities = [DVec3::new(0.0, 0.0, -5.0)];
     let report = Solver::default().solve(&problem, &mut velocities, &mut never);
@@ -317,7 +319,7 @@ fn contacts_that_stay_open_cost_no_answer() {
 }
 
 #[test]
-fn an_impulse_passes_to_the_next_of_kin() {
+fn an_impulse_passes_to_a_related_key() {
     let mut body = Dense::diagonal(&[1.0]);
     let mut slots = ContactJacobian::default();
     slots.add_linear(0, 1.0);
@@ -325,7 +327,7 @@ fn an_impulse_passes_to_the_next_of_kin() {
     let mut press = |key: u64| {
         let contacts = [Contact {
             key,
-            slots,
+            jacobian: slots,
             normal: DVec3::Z,
             gap_m: 0.0,
             friction: 0.5,
@@ -334,7 +336,8 @@ fn an_impulse_passes_to_the_next_of_kin() {
             age_s: 0.0,
         }];
         let mut velocities = [DVec3::new(0.1, 0.0, -1.0)];
-        let problem = Problem { contacts: &contacts, kin: &[-1, 1], h_s: 0.01, mobilities: &[0.3], settings: PATIENT };
+        let problem =
+            Problem { contacts: &contacts, related_keys: &[-1, 1], h_s: 0.01, mobilities: &[0.3], settings: STRICT };
         solver.solve(&problem, &mut velocities, &mut body).iterations
     };
     assert!(press(7) > 1);

@@ -88,11 +88,11 @@ pub struct ToolState {
     /// The grasp of the jaws, if any.
     pub grasp: Option<Grasp>,
     /// The rigid body that the open jaws are about to grasp, or have just released: it may come between them.
-    pub lets_in: Option<AgentId>,
+    pub admits: Option<AgentId>,
     /// Magnitude of the force that the grasped body exerts on the tool, newtons.
     pub force_n: f64,
     /// Whether nothing drives it any more: its script has ended without anything holding it back, and no user spring is on it.
-    pub is_left: bool,
+    pub is_idle: bool,
 }
 
 /// A tool's attachment to a material point of another agent.
@@ -103,7 +103,7 @@ pub struct Grasp {
     /// The material point grasped.
     pub anchor: Anchor,
     /// Rotational attachment between the jaws; `None` where the body may turn freely.
-    pub clasp: Option<GraspOrientation>,
+    pub orientation: Option<GraspOrientation>,
     /// Stiffness of the attachment, N/m, > 0.
     pub stiffness_n_m: f64,
     /// Damping of the attachment, N·s/m, ≥ 0.

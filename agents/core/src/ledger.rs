@@ -190,7 +190,7 @@ impl Page {
         self.entries[at].add(&part);
     }
 
-    fn take_out(&mut self, part: &Entry) {
+    fn subtract(&mut self, part: &Entry) {
         if let Ok(at) = self.find(part.site) {
             let entry = &mut self.entries[at];
             (entry.sum, entry.moment) = (entry.sum - part.sum, entry.moment - part.moment);
@@ -207,23 +207,23 @@ impl Ledger {
 
     /// Books an impulse that acted `after_s` seconds after `time`.
     pub fn give(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) {
-        let (page, entry) = self.book(site, time, after_s, impulse);
+        let (page, entry) = self.record(site, time, after_s, impulse);
         let grains = SimSpan::from_secs_f64(after_s).map_or(0, |after| after.as_nanos() / GRAIN_NS);
         if grains > 0 {
             let due = time + SimSpan::from_nanos(grains * GRAIN_NS);
-            self.announce(Scheduled { due, acts: due, page, entry });
+            self.schedule(Scheduled { due, acts: due, page, entry });
         }
     }
 
     /// Books an impulse that acts `acts_s` and may be taken `due_s` seconds after `time`, possibly past the end of the owner's step.
     pub fn give_late(&mut self, site: Site, time: SimTime, [acts_s, due_s]: [f64; 2], impulse: Impulse) {
-        let (page, entry) = self.book(site, time, acts_s, impulse);
+        let (page, entry) = self.record(site, time, acts_s, impulse);
         let [acts, due] = [acts_s, due_s].map(|s| time + SimSpan::from_secs_f64(s).unwrap_or(SimSpan::ZERO));
-        self.announce(Scheduled { due, acts, page, entry });
+        self.schedule(Scheduled { due, acts, page, entry });
     }
 
     /// Books on the page in use; returns its number and the booked entry.
-    fn book(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) -> (u64, Entry) {
+    fn record(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) -> (u64, Entry) {
         if self.pages.is_empty() {
             self.pages.push(Page { number: 0, origin: time, entries: Vec::new() });
         }
@@ -236,7 +236,7 @@ impl Ledger {
     }
 
     /// Lists a part of a page that acts late.
-    fn announce(&mut self, part: Scheduled) {
+    fn schedule(&mut self, part: Scheduled) {
         let same = |known: &&mut Scheduled| {
             (known.due, known.acts, known.page) == (part.due, part.acts, part.page)
                 && known.entry.site == part.entry.site
@@ -286,9 +286,9 @@ impl Ledger {
             let known = earlier.and_then(|e| e.page(page.number));
             let t = at.secs_after(page.origin);
             for entry in &page.entries {
-                let had = known.and_then(|k| k.find(entry.site).ok().map(|i| k.entries[i]));
-                let (sum, moment) = match had {
-                    Some(had) => (entry.sum - had.sum, entry.moment - had.moment),
+                let known_entry = known.and_then(|k| k.find(entry.site).ok().map(|i| k.entries[i]));
+                let (sum, moment) = match known_entry {
+                    Some(known_entry) => (entry.sum - known_entry.sum, entry.moment - known_entry.moment),
                     None => (entry.sum, entry.moment),
                 };
                 if sum != Impulse::ZERO || moment != Impulse::ZERO {
@@ -326,7 +326,7 @@ impl Ledger {
         let Self { pages, coming, .. } = self;
         coming.retain(|coming| coming.due >= until);
         for late in coming.iter() {
-            pages.iter_mut().filter(|page| page.number == late.page).for_each(|page| page.take_out(&late.entry));
+            pages.iter_mut().filter(|page| page.number == late.page).for_each(|page| page.subtract(&late.entry));
         }
     }
 
@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn what_acts_late_in_a_step_is_taken_when_its_time_has_come() {
+    fn an_impulse_late_in_a_step_is_taken_when_it_is_due() {
         let (mut given, mut taken) = (Ledger::new(AgentId(1)), Ledger::new(AgentId(0)));
         given.turn(None, at(1.0));
         for part in 0..6 {
@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn what_waits_for_an_answer_is_taken_when_that_is_read_however_often_its_owner_steps() {
+    fn a_waiting_impulse_is_taken_when_due_however_often_its_owner_steps() {
         let (mut given, mut taken) = (Ledger::new(AgentId(1)), Ledger::new(AgentId(0)));
         given.give_late(Site::Whole, at(1.0), [0.1, 0.2], pushed(0.5));
         given.turn(None, at(1.15));

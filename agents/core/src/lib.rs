@@ -51,7 +51,7 @@ pub use rebound::Rebound;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use reusable_option::ReusableOption;
 pub use snapshot::{HASH_START, Inertia, LiesOn, Snapshot, Stand, Tips, Upheld};
-pub use spatial::{Mat6, Twist};
+pub use spatial::{InverseMass, Mat6, Twist};
 pub use sprung::Sprung;
 pub use step::{DT_MAX_S, StepError, StepReport, check_span};
 pub use step_doubling::DRIFT_S;

@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wish_outside_the_range_gets_the_nearest_pair_inside() {
+    fn a_request_outside_the_range_gets_the_nearest_pair_inside() {
         let range = ResolutionRange { eps_m: (0.01, 0.1), n: (1, 4) };
         let got = range.clamp(Resolution { eps_m: 1.0, n: 9 });
         assert_eq!(got, Resolution { eps_m: 0.1, n: 4 });

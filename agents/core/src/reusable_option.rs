@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_that_comes_again_lies_where_it_lay() {
+    fn a_value_set_again_reuses_its_storage() {
         let mut rare = ReusableOption::default();
         assert_eq!(rare.get(), None);
         rare.set(Some([1.0; 90]));

@@ -5,6 +5,23 @@
 
 use glam::DVec3;
 
+/// A block of a matrix: the coupling of one body with another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BlockIndex {
+    /// The body whose rows it is in.
+    pub row: usize,
+    /// The body whose columns it is in, at most `row` in the lower half.
+    pub column: usize,
+}
+
+impl BlockIndex {
+    /// The block on the diagonal of a body.
+    #[must_use]
+    pub const fn diagonal(body: usize) -> Self {
+        Self { row: body, column: body }
+    }
+}
+
 /// The lower half of a matrix with B rows per body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SkylineCholesky<const B: usize> {
@@ -37,8 +54,9 @@ impl<const B: usize> SkylineCholesky<B> {
         first_body.iter().enumerate().map(|(body, &first)| B * (B * (body + 1 - first as usize)).pow(2)).sum()
     }
 
-    /// Adds `weight` · left rightᵀ to the block of the bodies `row` ≥ `column`; on the diagonal only the lower half counts.
-    pub fn add(&mut self, (row, column): (usize, usize), weight: f64, left: [f64; B], right: [f64; B]) {
+    /// Adds `weight` · left rightᵀ to a block of the lower half; of one on the diagonal only the lower half counts.
+    pub fn add(&mut self, block: BlockIndex, weight: f64, left: [f64; B], right: [f64; B]) {
+        let BlockIndex { row, column } = block;
         for (i, &l) in left.iter().enumerate() {
             let at = B * row + i;
             let columns = if row == column { i + 1 } else { B };
@@ -48,9 +66,10 @@ impl<const B: usize> SkylineCholesky<B> {
         }
     }
 
-    /// Adds a whole block to that of the bodies `row` ≥ `column`, given by rows; on the diagonal only the lower half counts.
-    pub fn add_block(&mut self, (row, column): (usize, usize), block: [[f64; B]; B]) {
-        for (i, values) in block.iter().enumerate() {
+    /// Adds numbers, given by rows, to a block of the lower half; of one on the diagonal only the lower half counts.
+    pub fn add_block(&mut self, block: BlockIndex, numbers: [[f64; B]; B]) {
+        let BlockIndex { row, column } = block;
+        for (i, values) in numbers.iter().enumerate() {
             let at = B * row + i;
             let columns = if row == column { i + 1 } else { B };
             let from = self.start[at] + B * column - self.first[at];
@@ -202,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vectors_are_solved_as_numbers_are() {
+    fn solving_vectors_gives_what_solving_numbers_gives() {
         let first_body = [0, 0, 1, 0, 3];
         let mut matrix = SkylineCholesky::<3>::default();
         matrix.shape(&first_body);
@@ -212,7 +231,7 @@ mod tests {
                 let own = if row == column { 3.0 } else { 0.0 };
                 let block: [[f64; 3]; 3] =
                     std::array::from_fn(|i| std::array::from_fn(|j| value(3 * i + j) + if i == j { own } else { 0.0 }));
-                matrix.add_block((row, column), block);
+                matrix.add_block(BlockIndex { row, column }, block);
             }
         }
         assert!(matrix.factor());
@@ -234,16 +253,16 @@ mod tests {
         let unit = |i: usize| std::array::from_fn(|k| f64::from(u8::from(k == i)));
         for body in 0..5 {
             for i in 0..6 {
-                matrix.add((body, body), 3.0, unit(i), unit(i));
+                matrix.add(BlockIndex::diagonal(body), 3.0, unit(i), unit(i));
                 full[6 * body + i][6 * body + i] += 3.0;
             }
         }
         for (seed, (a, b)) in [(1, 0), (2, 1), (3, 0), (4, 3), (3, 2)].into_iter().enumerate() {
             let row = |k: usize| std::array::from_fn::<f64, 6, _>(|i| libm::sin((seed * 13 + k * 7 + i) as f64));
             let (left, right) = (row(0), row(1));
-            matrix.add((a, a), 10.0, left, left);
-            matrix.add((b, b), 10.0, right, right);
-            matrix.add((a, b), 10.0, left, right);
+            matrix.add(BlockIndex::diagonal(a), 10.0, left, left);
+            matrix.add(BlockIndex::diagonal(b), 10.0, right, right);
+            matrix.add(BlockIndex { row: a, column: b }, 10.0, left, right);
             for i in 0..6 {
                 for j in 0..6 {
                     full[6 * a + i][6 * a + j] += 10.0 * left[i] * left[j];

@@ -8,6 +8,15 @@ use glam::{DMat3, DVec3};
 /// A linear and an angular part about a body's centre of mass: velocities (m/s, rad/s) or forces (N, N·m).
 pub type Twist = [DVec3; 2];
 
+/// How a rigid body resists: the inverse of its mass and of its inertia about its centre of mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InverseMass {
+    /// Inverse of the mass, 1/kg, ≥ 0.
+    pub linear_per_kg: f64,
+    /// Inverse of the inertia tensor in world axes, 1/(kg·m²).
+    pub angular_per_kg_m2: DMat3,
+}
+
 /// A matrix that maps one [`Twist`] to another, rows first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mat6(pub [[f64; 6]; 6]);

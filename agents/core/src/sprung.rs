@@ -6,8 +6,8 @@
 //! A constant acceleration carried on through a stiff spring's period would blow up; a linear model taken implicitly over the
 //! horizon cannot, and in a balance of spring and contact it is exact.
 
-use super::spatial::{Mat6, Twist};
-use glam::{DMat3, DVec3};
+use super::spatial::{InverseMass, Mat6, Twist};
+use glam::DVec3;
 
 /// What a body on springs publishes beside its mass: forces, and how they change, about its centre of mass in world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,13 +31,13 @@ pub struct Sprung {
 impl Sprung {
     /// (M + h C + h² K)⁻¹: the answer to an impulse of a body whose springs are implicit over `h` seconds (eq. 7b).
     #[must_use]
-    pub fn answer(&self, inertia: (f64, DMat3), h: f64) -> Mat6 {
+    pub fn response(&self, inertia: InverseMass, h: f64) -> Mat6 {
         self.resistance(inertia, h).inverse()
     }
 
     /// M + h C + h² K.
-    fn resistance(&self, (inverse_mass, inverse_inertia): (f64, DMat3), h: f64) -> Mat6 {
-        let mut whole = Mat6::mass(inverse_mass.recip(), inverse_inertia.inverse());
+    fn resistance(&self, inertia: InverseMass, h: f64) -> Mat6 {
+        let mut whole = Mat6::mass(inertia.linear_per_kg.recip(), inertia.angular_per_kg_m2.inverse());
         whole.add(&self.damping, h);
         whole.add(&self.stiffness, h * h);
         whole
@@ -46,12 +46,12 @@ impl Sprung {
     /// How far a body comes in `h` seconds, and its velocities then, with what is on its way to it: how much that changes
     /// its velocities, and how far it has carried it by now.
     #[must_use]
-    pub fn settled(&self, inertia: (f64, DMat3), velocity: Twist, way: [Twist; 2], h: f64) -> [Twist; 2] {
-        let mut lean = Lean::new(*self, inertia, velocity);
-        let [change, carried] = way.map(|impulse| lean.respond(impulse));
-        lean.deliver(change, carried);
-        let gone = lean.go_on(h);
-        [[0, 1].map(|i| carried[i] + gone[i]), lean.velocity()]
+    pub fn settled(&self, inertia: InverseMass, velocity: Twist, way: [Twist; 2], h: f64) -> [Twist; 2] {
+        let mut prediction = SprungPrediction::new(*self, inertia, velocity);
+        let [change, carried] = way.map(|impulse| prediction.respond(impulse));
+        prediction.deliver(change, carried);
+        let way = prediction.go_on(h);
+        [[0, 1].map(|i| carried[i] + way[i]), prediction.velocity()]
     }
 
     /// Whether every number is finite.
@@ -67,63 +67,63 @@ const STEP_SLACK: f64 = 1e-4;
 
 /// A body on springs at a neighbour's own time: how far it is from what it published.
 #[derive(Debug, Clone, Copy)]
-pub struct Lean {
+pub struct SprungPrediction {
     sprung: Sprung,
-    inertia: (f64, DMat3),
-    /// The horizon of `answer`, seconds.
+    inertia: InverseMass,
+    /// The horizon of `response`, seconds.
     horizon_s: f64,
-    answer: Mat6,
+    response: Mat6,
     /// How long until the published state, seconds; below zero it is past.
-    left_s: f64,
+    until_published_s: f64,
     velocity: Twist,
     /// By how much place and velocity differ from the published ones, or, before those are reached, from the way to them.
-    off: Twist,
-    faster: Twist,
+    displacement: Twist,
+    velocity_change: Twist,
     /// What impulses that last have just added to the velocity: as long as the next stretch does, so they carry half as far.
     fresh: Twist,
     /// The acceleration with which the body makes its next step, and how long after the published state that ends, seconds.
     steady: Option<(Twist, f64)>,
     /// Whether a blow meets it: in no time a drive of limited force gives nothing, and its mass alone answers.
-    struck: bool,
+    in_impact: bool,
 }
 
-impl Lean {
+impl SprungPrediction {
     /// A body that is where it said to be.
-    pub fn new(sprung: Sprung, inertia: (f64, DMat3), velocity: Twist) -> Self {
+    pub fn new(sprung: Sprung, inertia: InverseMass, velocity: Twist) -> Self {
         let none = [DVec3::ZERO; 2];
-        let (horizon_s, answer) = (sprung.span_s, sprung.answer(inertia, sprung.span_s));
+        let (horizon_s, response) = (sprung.span_s, sprung.response(inertia, sprung.span_s));
         Self {
             sprung,
             inertia,
             horizon_s,
-            answer,
-            left_s: 0.0,
+            response,
+            until_published_s: 0.0,
             velocity,
-            off: none,
-            faster: none,
+            displacement: none,
+            velocity_change: none,
             fresh: none,
             steady: None,
-            struck: false,
+            in_impact: false,
         }
     }
 
     /// A blow begins or ends (eq. 9h).
-    pub fn strike(&mut self, struck: bool) {
-        self.struck = struck && self.sprung.limit_n.is_finite();
+    pub fn strike(&mut self, in_impact: bool) {
+        self.in_impact = in_impact && self.sprung.limit_n.is_finite();
     }
 
     /// Takes impulses that last for `h` seconds, or for the body's own step where that is longer, from now on.
     pub fn foresee(&mut self, h: f64) {
         let h = h.max(self.sprung.span_s);
-        self.give_way(h);
+        self.limit_force(h);
         if h != self.horizon_s {
-            (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
+            (self.horizon_s, self.response) = (h, self.sprung.response(self.inertia, h));
         }
     }
 
     /// Springs that would have to give more than they can in the next `h` seconds give that and no more, however far the body goes
     /// (eq. 9f).
-    fn give_way(&mut self, h: f64) {
+    fn limit_force(&mut self, h: f64) {
         let limit_n = self.sprung.limit_n;
         let pull = if limit_n.is_finite() { self.pull(h)[0] } else { DVec3::ZERO };
         if pull.length() <= limit_n {
@@ -132,26 +132,26 @@ impl Lean {
         let none = [DVec3::ZERO; 2];
         self.sprung.force = [pull.clamp_length_max(limit_n), DVec3::ZERO];
         (self.sprung.rising, self.sprung.stiffness) = (none, Mat6::ZERO);
-        (self.off, self.faster, self.fresh, self.steady) = (none, none, none, None);
-        (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
+        (self.displacement, self.velocity_change, self.fresh, self.steady) = (none, none, none, None);
+        (self.horizon_s, self.response) = (h, self.sprung.response(self.inertia, h));
     }
 
     /// The velocities that an impulse causes.
     pub fn respond(&self, impulse: Twist) -> Twist {
-        if self.struck {
-            [impulse[0] * self.inertia.0, self.inertia.1 * impulse[1]]
+        if self.in_impact {
+            [impulse[0] * self.inertia.linear_per_kg, self.inertia.angular_per_kg_m2 * impulse[1]]
         } else {
-            self.answer.times(impulse)
+            self.response.times(impulse)
         }
     }
 
     /// The inverse mass (1/kg) and the mean inverse inertia (1/(kg·m²)) with which it answers.
     pub fn mobility(&self) -> [f64; 2] {
-        if self.struck {
-            let turning = self.inertia.1;
-            return [self.inertia.0, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
+        if self.in_impact {
+            let turning = self.inertia.angular_per_kg_m2;
+            return [self.inertia.linear_per_kg, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
         }
-        let a = &self.answer.0;
+        let a = &self.response.0;
         [(a[0][0] + a[1][1] + a[2][2]) / 3.0, (a[3][3] + a[4][4] + a[5][5]) / 3.0]
     }
 
@@ -161,38 +161,38 @@ impl Lean {
             return self.sprung.past;
         }
         let ahead = self.ahead(h);
-        if self.left_s <= 0.0 {
+        if self.until_published_s <= 0.0 {
             return ahead;
         }
         // the force of the step that is under way, answered like any other over this horizon
         let force = self.sprung.resistance(self.inertia, self.sprung.span_s).times(self.sprung.past);
-        let (behind, share) = (self.answer.times(force), self.left_s / h);
+        let (behind, share) = (self.response.times(force), self.until_published_s / h);
         [0, 1].map(|i| behind[i] * share + ahead[i] * (1.0 - share))
     }
 
     /// Whether the published state is still to come after `h` seconds.
     fn is_behind(&self, h: f64) -> bool {
-        self.left_s > 0.0 && self.left_s >= h
+        self.until_published_s > 0.0 && self.until_published_s >= h
     }
 
     /// The mean acceleration past the published state.
     fn ahead(&self, h: f64) -> Twist {
-        let since = (-self.left_s).max(0.0);
+        let since = (-self.until_published_s).max(0.0);
         if let Some((a, _)) = self.steady.filter(|(_, until)| since < *until && self.horizon_s <= self.sprung.span_s) {
             return a;
         }
-        self.answer.times(self.pull(h))
+        self.response.times(self.pull(h))
     }
 
     /// The force of the springs at the end of the next `h` seconds, had nothing else changed the velocities by then.
     fn pull(&self, h: f64) -> Twist {
-        let Self { sprung, off, .. } = self;
-        let since = (-self.left_s).max(0.0);
+        let Self { sprung, displacement, .. } = self;
+        let since = (-self.until_published_s).max(0.0);
         // what the body took ahead will have been given by the time of its state
-        let there = if self.left_s > 0.0 { 0.0 } else { 1.0 };
+        let there = if self.until_published_s > 0.0 { 0.0 } else { 1.0 };
         let without = |all: &Twist| [0, 1].map(|i| all[i] - self.fresh[i]);
-        let pulled = sprung.stiffness.times(off.map(|x| x * there));
-        let damped = sprung.damping.times(without(&self.faster).map(|v| v * there));
+        let pulled = sprung.stiffness.times(displacement.map(|x| x * there));
+        let damped = sprung.damping.times(without(&self.velocity_change).map(|v| v * there));
         let falling = sprung.stiffness.times(without(&self.velocity));
         let late = h.max(self.horizon_s);
         let force =
@@ -203,15 +203,15 @@ impl Lean {
     /// Adds to its velocities what an impulse has caused, which `lasts` through the next stretch or was a blow.
     pub fn push(&mut self, change: Twist, lasts: bool) {
         add(&mut self.velocity, change, 1.0);
-        add(&mut self.faster, change, 1.0);
+        add(&mut self.velocity_change, change, 1.0);
         add(&mut self.fresh, change, if lasts { 1.0 } else { 0.0 });
     }
 
     /// Adds what impulses on their way have done meanwhile.
     pub fn deliver(&mut self, change: Twist, way: Twist) {
         add(&mut self.velocity, change, 1.0);
-        add(&mut self.faster, change, 1.0);
-        add(&mut self.off, way, 1.0);
+        add(&mut self.velocity_change, change, 1.0);
+        add(&mut self.displacement, way, 1.0);
     }
 
     /// Lets `h` seconds pass, back where `h` is below zero: how far it comes (eq. 7d).
@@ -221,27 +221,27 @@ impl Lean {
         }
         let past = h < 0.0 || self.is_behind(h);
         let a = if h < 0.0 { self.sprung.past } else { self.acceleration(h) };
-        self.hold_on(a, h);
+        self.keep_acceleration(a, h);
         let mut way = [DVec3::ZERO; 2];
         add(&mut way, self.velocity, h);
         add(&mut way, self.fresh, -0.5 * h);
         add(&mut way, a, 0.5 * h * h);
         if past {
-            add(&mut self.off, self.faster, h);
-            add(&mut self.off, self.fresh, -0.5 * h);
+            add(&mut self.displacement, self.velocity_change, h);
+            add(&mut self.displacement, self.fresh, -0.5 * h);
         } else {
-            add(&mut self.off, way, 1.0);
-            add(&mut self.faster, a, h);
+            add(&mut self.displacement, way, 1.0);
+            add(&mut self.velocity_change, a, h);
         }
         add(&mut self.velocity, a, h);
-        self.left_s -= h;
+        self.until_published_s -= h;
         self.fresh = [DVec3::ZERO; 2];
         way
     }
 
     /// Past the published state the body itself keeps one acceleration for a whole step.
-    fn hold_on(&mut self, a: Twist, h: f64) {
-        let since = -self.left_s;
+    fn keep_acceleration(&mut self, a: Twist, h: f64) {
+        let since = -self.until_published_s;
         let over = self.steady.is_none_or(|(_, until)| since >= until);
         if h > 0.0 && since >= 0.0 && over {
             self.steady = Some((a, since + (1.0 - STEP_SLACK) * self.sprung.span_s));

@@ -1,4 +1,4 @@
-//! What a step took, and why one is refused or given up.
+//! The report of a step, and the errors of one that is refused or diverges.
 
 use crate::SimSpan;
 
@@ -20,7 +20,7 @@ pub struct StepReport {
 #[non_exhaustive]
 pub enum StepError {
     /// The span was zero, or longer than the model can take. State: untouched.
-    #[error("step span is {dt_s} s; it must be above zero and at most {max_s} s")]
+    #[error("the step length is {dt_s} s; expected above 0 and at most {max_s} s")]
     BadSpan {
         /// The requested span, in seconds.
         dt_s: f64,
@@ -28,7 +28,7 @@ pub enum StepError {
         max_s: f64,
     },
     /// The state is no longer finite. The agent must not step again; its last snapshot stays valid.
-    #[error("the state of this {model} is no longer finite after a step of {dt_s} s: {what}")]
+    #[error("the {model} diverged in a step of {dt_s} s: {what}")]
     Diverged {
         /// The model's name.
         model: &'static str,
@@ -39,7 +39,7 @@ pub enum StepError {
     },
     /// The substeps are too long for the integrator. State: untouched.
     #[error(
-        "a substep of {substep_s:.2e} s is too long for {integrator}, which carries at most {limit_s:.2e} s with the {segments} segments of this {model}: give it more substeps or a shorter step, fewer segments, or an implicit integrator"
+        "the substep of this {model} is {substep_s:.2e} s; {integrator} is stable up to {limit_s:.2e} s with {segments} segments: use more substeps, a shorter step, fewer segments or an implicit integrator"
     )]
     Unstable {
         /// The model's name.
@@ -54,7 +54,7 @@ pub enum StepError {
         limit_s: f64,
     },
     /// The model cannot step other agents in an island of its own. State: untouched.
-    #[error("a {model} has no world that others could share")]
+    #[error("agents of model {model} cannot step other agents in an island")]
     Alone {
         /// The model's name.
         model: &'static str,

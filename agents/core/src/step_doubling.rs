@@ -23,7 +23,7 @@ const GOLDEN: u32 = 2_654_435_769;
 
 /// The error estimate of one object's steps.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Watch {
+pub struct DoublingSchedule {
     /// Number of steps of the present row that have been repeated; `None` between rows.
     made: Option<u32>,
     /// Their length, seconds.
@@ -32,10 +32,10 @@ pub struct Watch {
     error_m: f64,
 }
 
-impl Watch {
-    /// Starts a row of the object number `whose` if step number `steps` is its first; returns whether it does.
-    pub fn begins(&mut self, steps: u64, whose: AgentId) -> bool {
-        let first = FIRST + u64::from(STEPS) * row(whose);
+impl DoublingSchedule {
+    /// Starts a row of the object number `agent` if step number `steps` is its first; returns whether it does.
+    pub fn begins(&mut self, steps: u64, agent: AgentId) -> bool {
+        let first = FIRST + u64::from(STEPS) * row(agent);
         let begins = steps >= first && (steps - first).is_multiple_of(EVERY);
         if begins {
             (self.made, self.span_s) = (Some(0), 0.0);
@@ -49,12 +49,12 @@ impl Watch {
     }
 
     /// Abandons the row: it gives no estimate.
-    pub fn give_up(&mut self) {
+    pub fn cancel(&mut self) {
         self.made = None;
     }
 
     /// Counts a repeated step of `dt_s` seconds; returns whether it was the last of its row.
-    pub fn made_twice(&mut self, dt_s: f64) -> bool {
+    pub fn finish_step(&mut self, dt_s: f64) -> bool {
         self.span_s += dt_s;
         let made = self.made.map_or(0, |made| made + 1);
         self.made = (made < STEPS).then_some(made);
@@ -62,7 +62,7 @@ impl Watch {
     }
 
     /// Ends the row `apart_m` away from the same span in halves, by a rule of this order: halves leave 2⁻ᵖ of the error (eq. 31).
-    pub fn learn(&mut self, apart_m: f64, order: i32) {
+    pub fn record(&mut self, apart_m: f64, order: i32) {
         let error_m = apart_m / (1.0 - 0.5_f64.powi(order)) * DRIFT_S / self.span_s;
         if error_m.is_finite() {
             self.error_m = error_m;
@@ -81,8 +81,8 @@ impl Watch {
 }
 
 /// Index of an object's row among [`ROWS`]: consecutive numbers get different rows.
-fn row(whose: AgentId) -> u64 {
-    (u64::from(whose.0.wrapping_mul(GOLDEN)) * ROWS) >> 32
+fn row(agent: AgentId) -> u64 {
+    (u64::from(agent.0.wrapping_mul(GOLDEN)) * ROWS) >> 32
 }
 
 /// The greatest distance between corresponding points of two states, metres.
@@ -95,39 +95,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_thousand_steps_a_twenty_fourth_is_made_again_in_halves() {
-        let mut watch = Watch::default();
+    fn a_twenty_fourth_of_a_thousand_steps_is_repeated_in_halves() {
+        let mut schedule = DoublingSchedule::default();
         let mut again = 0;
         for step in 0..960 {
-            watch.begins(step, AgentId(0));
-            if watch.is_on() {
+            schedule.begins(step, AgentId(0));
+            if schedule.is_on() {
                 again += 2;
-                if watch.made_twice(1e-3) {
-                    watch.learn(1e-6, 1);
+                if schedule.finish_step(1e-3) {
+                    schedule.record(1e-6, 1);
                 }
             }
         }
         assert_eq!(again, 40); // 4.2 %
         // two steps of 1 ms end 1 µs apart: their error is 2 µs, that of a hundred steps 100 µs
-        assert!((watch.error_m() - 1e-4).abs() < 1e-15);
-        watch.learn(f64::NAN, 1);
-        assert!((watch.error_m() - 1e-4).abs() < 1e-15);
-        watch.rest();
-        assert_eq!(watch.error_m(), 0.0);
+        assert!((schedule.error_m() - 1e-4).abs() < 1e-15);
+        schedule.record(f64::NAN, 1);
+        assert!((schedule.error_m() - 1e-4).abs() < 1e-15);
+        schedule.rest();
+        assert_eq!(schedule.error_m(), 0.0);
     }
     #[test]
-    fn alike_objects_take_turns_and_none_is_early() {
+    fn similar_objects_are_staggered_and_none_starts_early() {
         // (number of objects of one rate, the most of them that repeat a step simultaneously); the mean stays as without staggering
         for (count, most) in [(1, 1), (10, 1), (24, 1), (48, 2), (96, 3), (1000, 22)] {
-            let mut watches = vec![Watch::default(); count];
+            let mut schedules = vec![DoublingSchedule::default(); count];
             let (mut first, mut busiest, mut again) = (u64::MAX, 0, 0);
             for step in 0..960 {
                 let mut now = 0;
-                for (watch, whose) in watches.iter_mut().zip((0..).map(AgentId)) {
-                    watch.begins(step, whose);
-                    if watch.is_on() {
+                for (schedule, agent) in schedules.iter_mut().zip((0..).map(AgentId)) {
+                    schedule.begins(step, agent);
+                    if schedule.is_on() {
                         now += 1;
-                        watch.made_twice(1e-3);
+                        schedule.finish_step(1e-3);
                     }
                 }
                 first = if now > 0 { first.min(step) } else { first };

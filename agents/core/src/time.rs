@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_that_is_no_length_is_refused() {
+    fn an_invalid_span_is_refused() {
         for bad in [-1.0, f64::NAN, f64::INFINITY, 1e300] {
             assert_eq!(SimSpan::from_secs_f64(bad), None, "{bad}");
         }

@@ -113,7 +113,7 @@ impl<'a> Suite<'a> {
 
     /// Builds the agent and its clock.
     fn start(&self) -> Run<'_> {
-        Run { agent: (self.make)(), time: SimTime::ZERO, around: &self.neighbours }
+        Run { agent: (self.make)(), time: SimTime::ZERO, neighbours: &self.neighbours }
     }
 }
 
@@ -140,20 +140,20 @@ const ME: AgentId = AgentId(0);
 struct Run<'a> {
     agent: Box<dyn Agent>,
     time: SimTime,
-    around: &'a [Neighbour],
+    neighbours: &'a [Neighbour],
 }
 
 impl Run<'_> {
     fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
-        let around = StepContext { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
-        self.agent.step(dt, &around)?;
+        let context = StepContext { me: ME, time: self.time, neighbours: self.neighbours, hands, links: &[] };
+        self.agent.step(dt, &context)?;
         self.time += dt;
         Ok(())
     }
 
     /// A step that must succeed.
     fn must_step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), String> {
-        self.step(dt, hands).map_err(|error| format!("a good step at {} s failed: {error}", self.time.as_secs_f64()))
+        self.step(dt, hands).map_err(|error| format!("a valid step at {} s failed: {error}", self.time.as_secs_f64()))
     }
 
     fn snapshot(&self) -> Snapshot {

@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec3};
 use metachron_contact::audit::{Member, settled};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_contact::{Law, Link, Standing, acknowledged, keep_step, owns};
+use metachron_contact::{Law, Link, OwnershipTraits, acknowledged, keep_step, owns};
 use metachron_core::Impulse;
 use metachron_core::{AgentId, Inertia, RigidState, SimSpan, SimTime, Snapshot};
 use std::sync::Arc;
@@ -170,7 +170,7 @@ impl Stage {
             let neighbours: Vec<_> =
                 (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(me, AgentId(j as u32))).collect();
             let Actor { agent, time, hands, links, published, .. } = &mut self.actors[i];
-            agent.look(dt, &StepContext { me, time: *time, neighbours: &neighbours, hands, links });
+            agent.observe(dt, &StepContext { me, time: *time, neighbours: &neighbours, hands, links });
             let mut snapshot = Snapshot::default();
             agent.write_snapshot(&mut snapshot);
             published.push(Arc::new(snapshot));
@@ -194,7 +194,7 @@ impl Stage {
         actor.time += dt;
         let mut snapshot = Snapshot::default();
         actor.agent.write_snapshot(&mut snapshot);
-        (snapshot.time, snapshot.shorter) = (actor.time, (dt < wanted).then_some(dt));
+        (snapshot.time, snapshot.shortened_step) = (actor.time, (dt < wanted).then_some(dt));
         if !lost {
             actor.published.push(Arc::new(snapshot));
             actor.begun = Some(began);
@@ -219,9 +219,9 @@ impl Stage {
         Neighbour { id, snapshot, form: actor.agent.form(), law, owned, in_step, step_s }
     }
 
-    fn standing(&self, id: AgentId) -> Standing {
+    fn standing(&self, id: AgentId) -> OwnershipTraits {
         let actor = &self.actors[id.0 as usize];
-        Standing::new(id, actor.agent.model(), actor.rate_hz, actor.agent.form().as_deref())
+        OwnershipTraits::new(id, actor.agent.model(), actor.rate_hz, actor.agent.form().as_deref())
     }
 
     fn are_linked(&self, me: AgentId, other: AgentId) -> bool {
@@ -237,7 +237,7 @@ impl Stage {
     pub(crate) fn on_their_way(&self, id: AgentId, at: SimTime, mut visit: impl FnMut(Impulse, Impulse)) {
         let newest = self.newest(id);
         for other in (0..self.actors.len()).map(|j| AgentId(j as u32)).filter(|j| *j != id) {
-            let seen = Neighbour::seen(other, Arc::new(newest.clone()));
+            let seen = Neighbour::observed(other, Arc::new(newest.clone()));
             for ledger in self.newest(other).given.iter().filter(|ledger| ledger.with == id) {
                 ledger.since(acknowledged(&seen, other), at, |_, sum, carried| visit(sum, carried));
             }

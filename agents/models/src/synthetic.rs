@@ -26,7 +26,7 @@ pub struct SyntheticSpec {
 #[non_exhaustive]
 pub enum SyntheticError {
     /// A number of the curves is negative or not finite.
-    #[error("{what} is {value}; it must be finite and not negative")]
+    #[error("the synthetic agent's {what} is {value}; expected finite and not negative")]
     BadNumber {
         /// Name of the number.
         what: &'static str,
@@ -34,7 +34,7 @@ pub enum SyntheticError {
         value: f64,
     },
     /// The range of spacings is empty, or its finest end is not above zero.
-    #[error("the spacings are {finest_m} … {coarsest_m} m; they must be finite, above zero and rising")]
+    #[error("the synthetic agent's spacings are {finest_m} … {coarsest_m} m; expected finite, above 0 and rising")]
     BadRange {
         /// Finest spacing given.
         finest_m: f64,
@@ -51,10 +51,10 @@ pub enum SyntheticError {
 pub struct Synthetic {
     spec: SyntheticSpec,
     range: ResolutionRange,
-    held: Resolution,
-    burns: bool,
+    resolution: Resolution,
+    does_work: bool,
     steps: u64,
-    ash: u64,
+    sink: u64,
 }
 
 /// Links of the burning chain per nominal microsecond: a 64-bit multiply and an add take 4 cycles, 3 GHz gives 750.
@@ -69,10 +69,10 @@ impl Synthetic {
     /// [`SyntheticError`] for a curve with a negative or non-finite number and for an empty range.
     pub fn new(spec: SyntheticSpec, range: ResolutionRange, start: Resolution) -> Result<Self, SyntheticError> {
         let numbers = [
-            ("the cost", spec.cost_us),
-            ("the order of the cost", spec.cost_order),
-            ("the error", spec.error_m),
-            ("the order of the error", spec.error_order),
+            ("cost", spec.cost_us),
+            ("order of the cost", spec.cost_order),
+            ("error", spec.error_m),
+            ("order of the error", spec.error_order),
         ];
         for (what, value) in numbers {
             if !(value.is_finite() && value >= 0.0) {
@@ -83,33 +83,33 @@ impl Synthetic {
         if !(finest_m > 0.0 && finest_m <= coarsest_m && coarsest_m.is_finite()) {
             return Err(SyntheticError::BadRange { finest_m, coarsest_m });
         }
-        Ok(Self { spec, range, held: range.clamp(start), burns: true, steps: 0, ash: 0 })
+        Ok(Self { spec, range, resolution: range.clamp(start), does_work: true, steps: 0, sink: 0 })
     }
 
     /// The same agent, declaring its cost without burning it: for lockstep, where only declared costs matter.
     #[must_use]
     pub fn declared_only(self) -> Self {
-        Self { burns: false, ..self }
+        Self { does_work: false, ..self }
     }
 
     /// Cost of a step at the present spacing, microseconds, at most 1e6.
     #[must_use]
     pub fn cost_us(&self) -> f64 {
-        let finer = self.range.eps_m.1 / self.held.eps_m;
+        let finer = self.range.eps_m.1 / self.resolution.eps_m;
         (self.spec.cost_us * libm::pow(finer, self.spec.cost_order)).min(COST_MAX_US)
     }
 
     /// Error at the present spacing, metres.
     #[must_use]
     pub fn error_m(&self) -> f64 {
-        self.spec.error_m * libm::pow(self.held.eps_m / self.range.eps_m.1, self.spec.error_order)
+        self.spec.error_m * libm::pow(self.resolution.eps_m / self.range.eps_m.1, self.spec.error_order)
     }
 
     /// A chain of multiplications, each dependent on the one before.
-    fn burn(&mut self) {
+    fn do_work(&mut self) {
         let links = (self.cost_us() * LINKS_PER_US) as u64;
         for _ in 0..links {
-            self.ash = std::hint::black_box(self.ash.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1));
+            self.sink = std::hint::black_box(self.sink.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1));
         }
     }
 }
@@ -120,26 +120,26 @@ impl Agent for Synthetic {
     }
 
     /// Burns its cost and counts the step.
-    fn step(&mut self, dt: SimSpan, _around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
         check_span(dt)?;
-        if self.burns {
-            self.burn();
+        if self.does_work {
+            self.do_work();
         }
         self.steps += 1;
         Ok(StepReport { work: self.cost_us(), substeps: 1, at_rest: false })
     }
 
     fn resolution(&self) -> Option<Resolution> {
-        Some(self.held)
+        Some(self.resolution)
     }
 
     fn set_resolution(&mut self, wanted: Resolution) {
-        self.held = self.range.clamp(wanted);
+        self.resolution = self.range.clamp(wanted);
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.steps = self.steps;
-        into.resolution = Some(self.held);
+        into.resolution = Some(self.resolution);
         into.body = Body::Nothing;
         into.energy_j = 0.0;
         into.residual_m = self.error_m();
@@ -186,10 +186,10 @@ mod tests {
     }
 
     #[test]
-    fn curves_and_ranges_that_are_none_are_refused() {
+    fn invalid_curves_and_ranges_are_refused() {
         for bad in [-1.0, f64::NAN, f64::INFINITY] {
             let error = Synthetic::new(SyntheticSpec { cost_us: bad, ..SPEC }, RANGE, at(0.01)).unwrap_err();
-            assert!(matches!(error, SyntheticError::BadNumber { what: "the cost", .. }), "{error}");
+            assert!(matches!(error, SyntheticError::BadNumber { what: "cost", .. }), "{error}");
         }
         for eps_m in [(0.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0)] {
             let error = Synthetic::new(SPEC, ResolutionRange { eps_m, ..RANGE }, at(0.01)).unwrap_err();

@@ -38,7 +38,7 @@ fn falling_bodies_of_different_clocks_keep_the_energy_of_the_fall() {
 }
 
 #[test]
-fn a_blow_that_only_its_owner_has_felt_is_whole() {
+fn an_impulse_that_only_its_owner_has_applied_is_counted_once() {
     // one of two equal bodies meets the other, elastically, at 0.15 s: it has stopped, and the other has not received its impulse
     let blow = DVec3::X * 2.0;
     let mut owner = ball(0.2, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
@@ -89,12 +89,12 @@ fn swung() -> Tube {
 }
 
 #[test]
-fn a_tube_s_sums_are_its_own() {
+fn the_audit_of_a_tube_gives_its_own_energy_and_momentum() {
     let tube = swung();
     let mut snapshot = Snapshot::default();
     tube.write_snapshot(&mut snapshot);
     let spec = tube.spec();
-    let (mass_per_length_kg_m, rotary_kg_m) = (spec.mass_per_length_kg_m, spec.section.rotary_kg_m);
+    let (mass_per_length_kg_m, rotary_kg_m) = (spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m);
     let member = Member { id: AgentId(0), snapshot: &snapshot, mass_per_length_kg_m, rotary_kg_m };
     let sum = audit(&[member], SimTime::ZERO, &mut |_, _| 0.0);
     let (momentum, angular) = tube.momentum();

@@ -179,8 +179,8 @@ fn a_tube_of_one_size_allocates_nothing_once_warm() {
 #[test]
 fn a_tool_that_grasps_keeps_every_promise() {
     let curve = tube(false, 0.0);
-    let mut seen = Snapshot::default();
-    curve.write_snapshot(&mut seen);
+    let mut snapshot = Snapshot::default();
+    curve.write_snapshot(&mut snapshot);
     let held = AgentId(1);
     let key = |at_s, z, jaw| Keyframe { at_s, tip_m: DVec3::new(0.5, 0.0, z), rotation: DQuat::IDENTITY, jaw };
     let spec = ToolSpec {
@@ -195,7 +195,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
     };
     let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let suite = Suite {
-        neighbours: vec![Neighbour::seen(held, Arc::new(seen))],
+        neighbours: vec![Neighbour::observed(held, Arc::new(snapshot))],
         pull: Some(hand(Anchor::Local(DVec3::ZERO), DVec3::new(0.4, 0.1, 0.1))),
         absurd: absurd(Anchor::Local(DVec3::ZERO)),
         allocations: Some((&count, 0.0)),
@@ -205,7 +205,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
 }
 
 #[test]
-fn a_tool_led_at_even_speed_keeps_every_promise() {
+fn a_tool_driven_at_constant_speed_keeps_every_promise() {
     // collinear keyframes at even times: between the second and the last but one the curve is a straight line in time
     let key = |i: u32| Keyframe {
         at_s: 0.1 * f64::from(i),

@@ -59,8 +59,8 @@ impl Pair {
 
     fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds / DT.as_secs_f64()).round() as u32 {
-            let tube = [Neighbour::seen(TUBE, Self::published(&self.tube, self.time))];
-            let tool = [Neighbour::seen(TOOL, Self::published(&self.tool, self.time))];
+            let tube = [Neighbour::observed(TUBE, Self::published(&self.tube, self.time))];
+            let tool = [Neighbour::observed(TOOL, Self::published(&self.tool, self.time))];
             let around = |me, neighbours| StepContext { neighbours, ..StepContext::alone(me, self.time) };
             self.rested = self.tube.step(DT, &around(TUBE, &tool)).unwrap().at_rest;
             self.tool.step(DT, &around(TOOL, &tube)).unwrap();

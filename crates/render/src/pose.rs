@@ -91,9 +91,9 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
                 spin: a.spin.lerp(b.spin, w),
                 jaw: a.jaw + (b.jaw - a.jaw) * w,
                 grasp: b.grasp,
-                lets_in: b.lets_in,
+                admits: b.admits,
                 force_n: a.force_n + (b.force_n - a.force_n) * w,
-                is_left: b.is_left,
+                is_idle: b.is_idle,
             });
         }
         (Body::Soft(a), Body::Soft(b)) if a.positions.len() == b.positions.len() => {

@@ -157,7 +157,7 @@ impl AgentRunner {
         let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
         let looked = contained(|| {
-            agent.look(dt, &around);
+            agent.observe(dt, &around);
             Ok(())
         });
         match looked {

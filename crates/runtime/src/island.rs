@@ -1,6 +1,6 @@
 //! Agents that share one world for a while: one of them, the leader, makes the turns of all.
 //!
-//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_contact::Agent::lead`]).
+//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_contact::Agent::step_island`]).
 //! Out: every one's own states, account and ear, as if it made its turns itself: nobody else notices. One turn of a leader:
 //!
 //! take in    who waits at the door
@@ -20,7 +20,7 @@ use super::agent_clock::Timeline;
 use super::agent_runner::{AgentRunner, Made, PendingTurn, contained};
 use super::fellows::Fellows;
 use super::metrics::Entry;
-use metachron_contact::{Companion, StepContext};
+use metachron_contact::{IslandMember, StepContext};
 use metachron_core::{DT_MAX_S, SimSpan, SimTime, StepReport};
 use std::time::Duration;
 
@@ -108,20 +108,20 @@ impl AgentRunner {
         company.apart.clear();
         // nobody's step is longer than any of them may make
         let own = agent.longest_step(dt, &around).min(dt);
-        let dt = others.iter().map(|c| c.agent.longest_step(dt, &c.around)).fold(own, SimSpan::min);
-        let report = agent.lead(dt, &around, &mut others, &mut company.apart).map_err(|e| e.to_string());
+        let dt = others.iter().map(|c| c.agent.longest_step(dt, &c.context)).fold(own, SimSpan::min);
+        let report = agent.step_island(dt, &around, &mut others, &mut company.apart).map_err(|e| e.to_string());
         company.companions = emptied(others);
         company.note_apart(time);
         report.map(|report| Made { report, dt })
     }
 
     /// This agent, as one who leads it wants it.
-    fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> Companion<'_> {
+    fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> IslandMember<'_> {
         let id = self.shared.id;
         self.eyes.look(&self.peers, &self.writer, (id, self.pace.scene_time(), dt), fellows);
         let neighbours = self.eyes.neighbours();
         let around = StepContext { me: id, time, neighbours, hands: &self.hands, links: &self.links };
-        Companion { id, agent: &mut *self.agent, around }
+        IslandMember { id, agent: &mut *self.agent, context: around }
     }
 
     /// Whether nothing keeps it from resting, nor any of those it leads.
@@ -174,7 +174,7 @@ fn portion(left: SimSpan, dt: SimSpan) -> SimSpan {
 }
 
 /// The storage of `companions` for other ones.
-fn emptied<'b>(mut companions: Vec<Companion<'_>>) -> Vec<Companion<'b>> {
+fn emptied<'b>(mut companions: Vec<IslandMember<'_>>) -> Vec<IslandMember<'b>> {
     companions.clear();
     // nothing is left to be mapped; the standard library collects in place, so that the storage stays
     companions.into_iter().map(|_| unreachable!("cleared above")).collect()

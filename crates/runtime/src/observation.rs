@@ -10,7 +10,7 @@ use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
-use metachron_contact::{Law, Standing, acknowledged, keep_step, owns};
+use metachron_contact::{Law, OwnershipTraits, acknowledged, keep_step, owns};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -62,8 +62,8 @@ impl std::fmt::Debug for Peer {
 }
 
 impl Peer {
-    fn standing(&self) -> Standing {
-        Standing::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
+    fn standing(&self) -> OwnershipTraits {
+        OwnershipTraits::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
     }
 
     fn law(&self, other: AgentId) -> Law {

@@ -40,7 +40,7 @@ impl AgentRunner {
         let finite = self.writer.fill(|into| {
             into.clear();
             agent.write_snapshot(into);
-            (into.time, into.put_off, into.shorter, into.at_rest) = (time, put_off, shorter, at_rest);
+            (into.time, into.clock_offset, into.shortened_step, into.at_rest) = (time, put_off, shorter, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;

@@ -5,7 +5,7 @@ use super::spawn::AgentSpawn;
 use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
 use metachron_contact::Exchange;
-use metachron_contact::{Agent, Companion, StepContext};
+use metachron_contact::{Agent, IslandMember, StepContext};
 use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport,
@@ -222,7 +222,7 @@ impl Agent for Dummy {
         }
         self.steps += 1;
         let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
-        let pulled = around.pulls().map(|p| p.target.x);
+        let pulled = around.anchor_springs().map(|p| p.target.x);
         self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
         self.trade(around, dt_s);
         (self.me, self.time) = (around.me, around.time + dt);
@@ -281,17 +281,17 @@ impl Agent for Dummy {
         })
     }
 
-    fn lead(
+    fn step_island(
         &mut self,
         dt: SimSpan,
         around: &StepContext<'_>,
-        others: &mut [Companion<'_>],
+        others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
         let mut report = self.step(dt, around)?;
         for other in others.iter_mut() {
-            let one = other.agent.step(dt, &other.around)?;
+            let one = other.agent.step(dt, &other.context)?;
             report.work += one.work;
             report.at_rest &= one.at_rest;
         }

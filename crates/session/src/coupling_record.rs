@@ -384,9 +384,9 @@ mod tests {
             spin: still,
             jaw: 0.0,
             grasp: None,
-            lets_in: None,
+            admits: None,
             force_n: 0.0,
-            is_left: false,
+            is_idle: false,
         };
         for (kind, body, want) in [
             (PairKind::Ledger, Body::Nothing, (0, 1, [3.0, 2.0])),

@@ -111,7 +111,7 @@ pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
         matter: SoftMatter {
             young_pa: tube.section.ea_n / area_m2,
             poisson: 0.3,
-            density_kg_m3: tube.mass_per_length_kg_m / area_m2,
+            density_kg_m3: tube.section.mass_per_length_kg_m / area_m2,
             damping_per_s: tube.damping_per_s,
         },
         position: glam::DVec3::ZERO,

@@ -81,7 +81,7 @@ pub(super) fn points(body: &Body) -> impl Iterator<Item = (DVec3, DVec3)> {
 pub(super) fn momentum(spec: &Spec, body: &Body) -> DVec3 {
     match (spec, body) {
         (Spec::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
-        (Spec::Tube(spec), Body::Curve(curve)) => flow(curve) * spec.mass_per_length_kg_m,
+        (Spec::Tube(spec), Body::Curve(curve)) => flow(curve) * spec.section.mass_per_length_kg_m,
         _ => DVec3::ZERO,
     }
 }
@@ -91,7 +91,7 @@ pub(super) fn mass_kg(spec: &Spec, body: &Body) -> f64 {
     match (spec, body) {
         (Spec::Rigid(spec), _) => spec.mass_kg,
         (Spec::Tube(spec), Body::Curve(curve)) => {
-            spec.mass_per_length_kg_m * curve.arc_m.last().copied().unwrap_or(0.0)
+            spec.section.mass_per_length_kg_m * curve.arc_m.last().copied().unwrap_or(0.0)
         }
         _ => 0.0,
     }
@@ -116,7 +116,7 @@ mod tests {
         let at = |ms: u64| SimTime::ZERO + SimSpan::from_nanos(ms * 1_000_000);
         let state = |(own, put_off): (u64, u64)| Snapshot {
             time: at(own),
-            put_off: at(put_off).since(SimTime::ZERO),
+            clock_offset: at(put_off).since(SimTime::ZERO),
             body: Body::Rigid(RigidState::default()),
             ..Snapshot::default()
         };

@@ -180,7 +180,7 @@ pub(super) fn mass_kg(spec: &Spec) -> f64 {
     match spec {
         Spec::Tube(tube) => {
             let length: f64 = tube.path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
-            (tube.mass_per_length_kg_m * length).min(STRETCH_MASS_KG)
+            (tube.section.mass_per_length_kg_m * length).min(STRETCH_MASS_KG)
         }
         Spec::Rigid(body) => body.mass_kg,
         Spec::Soft(_) => STRETCH_MASS_KG,

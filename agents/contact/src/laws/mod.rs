@@ -7,5 +7,5 @@ mod penalty;
 mod tlm;
 
 pub use metachron_core::Wave;
-pub use penalty::push_off_n;
-pub use tlm::{Drawn, End, Line};
+pub use penalty::{Approach, push_off_n};
+pub use tlm::{Line, LineEnd, LinkForces};

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 
 /// One end of a link during a step.
 #[derive(Debug, Clone, Copy)]
-pub struct End {
+pub struct LineEnd {
     /// Start time of the step, and its length, seconds.
     pub step: (SimTime, f64),
     /// Its own velocity at the end of the step without the link, m/s.
@@ -36,7 +36,7 @@ pub struct End {
 
 /// The forces of a link at one end.
 #[derive(Debug, Clone, Copy)]
-pub struct Drawn {
+pub struct LinkForces {
     /// The force on this end, N.
     pub force: DVec3,
     /// The part of the arriving wave that the line reflects, N: the part along the link where that has a rest length.
@@ -51,7 +51,7 @@ pub struct Line {
     stiffness_n_m: f64,
     delay_s: f64,
     /// (time, ∫ w dt) of the other end, by rising times.
-    heard: VecDeque<(SimTime, DVec3)>,
+    received: VecDeque<(SimTime, DVec3)>,
     /// How much of the other end's integral has arrived here.
     arrived: DVec3,
     sent: DVec3,
@@ -60,7 +60,7 @@ pub struct Line {
 }
 
 /// The most states of the other end that are stored: those of one delay, at a hundred times this end's rate.
-const HEARD_MAX: usize = 256;
+const RECEIVED_MAX: usize = 256;
 /// The delay is this many of the longer of both sides' steps: one for publication, one for a lost or late message.
 const DELAY_STEPS: f64 = 2.0;
 
@@ -73,21 +73,21 @@ impl Line {
 
     /// Stores the wave that the other end published at its time `at`. The end that `decides` chooses the delay from its own step of
     /// `dt_s` and the other's step; the other end adopts it.
-    pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
+    pub fn receive(&mut self, at: SimTime, wave: Option<Wave>, decides: bool, dt_s: f64) {
         let wave = wave.unwrap_or_default();
         let sane = wave.sent.is_finite() && wave.start.is_finite();
-        let back_s = self.heard.back().map_or(-1.0, |&(last, _)| last.secs_after(at));
-        if (0.0..=MEETS_S).contains(&back_s) || !sane {
+        let age_s = self.received.back().map_or(-1.0, |&(last, _)| last.secs_after(at));
+        if (0.0..=MEETS_S).contains(&age_s) || !sane {
             return;
         }
-        if back_s > MEETS_S {
+        if age_s > MEETS_S {
             // not an old message: the other end has renamed its time
-            self.heard.clear();
+            self.received.clear();
         }
         if self.delay_s == 0.0 {
-            let theirs = self.heard.back().map(|&(last, _)| at.secs_after(last));
-            self.delay_s = match theirs {
-                Some(theirs) if decides => DELAY_STEPS * theirs.max(dt_s),
+            let other_step_s = self.received.back().map(|&(last, _)| at.secs_after(last));
+            self.delay_s = match other_step_s {
+                Some(other_step_s) if decides => DELAY_STEPS * other_step_s.max(dt_s),
                 _ if decides => 0.0,
                 _ => wave.delay_s,
             };
@@ -97,13 +97,13 @@ impl Line {
             } else {
                 (self.start, self.since) = (-wave.start, wave.since);
             }
-            self.heard.clear();
+            self.received.clear();
             self.arrived = wave.sent;
         }
-        if self.heard.len() == HEARD_MAX {
-            self.heard.pop_front();
+        if self.received.len() == RECEIVED_MAX {
+            self.received.pop_front();
         }
-        self.heard.push_back((at, wave.sent));
+        self.received.push_back((at, wave.sent));
     }
 
     /// At the end that decides: stores `way`, the vector to the other end in metres, when the line is made, in its step from `at` on.
@@ -118,23 +118,23 @@ impl Line {
     /// The line carries the changes since it was made; its stretch at that time acts as a constant force. Without a rest
     /// length the link is isotropic, else it acts along itself.
     #[must_use]
-    pub fn draw(&self, end: &End) -> Drawn {
-        let along = end.way.normalize_or_zero();
+    pub fn forces(&self, end: &LineEnd) -> LinkForces {
+        let direction = end.way.normalize_or_zero();
         let here = if end.rest_m > 0.0 {
-            DMat3::from_cols(along * along.x, along * along.y, along * along.z)
+            DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z)
         } else {
             DMat3::IDENTITY
         };
         let (at, h) = end.step;
-        let felt = (1.0 - self.since.secs_after(at) / h).clamp(0.0, 1.0);
-        let taut = if self.delay_s > 0.0 { felt * self.stiffness_n_m } else { 0.0 };
-        let start = if end.rest_m > 0.0 { along * (self.start.length() - end.rest_m) } else { self.start };
+        let acting_share = (1.0 - self.since.secs_after(at) / h).clamp(0.0, 1.0);
+        let stiffness = if self.delay_s > 0.0 { acting_share * self.stiffness_n_m } else { 0.0 };
+        let start = if end.rest_m > 0.0 { direction * (self.start.length() - end.rest_m) } else { self.start };
         let (z, c) = (self.impedance(), end.damping_n_s_m);
         let arriving = here * end.arriving;
-        let drive = start * taut - arriving + here * ((end.far - end.own) * c - end.own * z);
+        let drive = start * stiffness - arriving + here * ((end.far - end.own) * c - end.own * z);
         let force = (DMat3::IDENTITY + here * end.yields * (z + c)).inverse() * drive;
         let into_line = here * (end.own + end.yields * force) * z + arriving;
-        Drawn { force, arriving, into_line }
+        LinkForces { force, arriving, into_line }
     }
 
     /// The average of the wave that arrives in the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
@@ -175,13 +175,13 @@ impl Line {
 
     /// The other end's ∫ w dt at `after_s` seconds after `at`, interpolated between received values.
     fn integral(&self, at: SimTime, after_s: f64) -> DVec3 {
-        let Some(&(first, start)) = self.heard.front() else { return self.arrived };
+        let Some(&(first, start)) = self.received.front() else { return self.arrived };
         let when = |t: SimTime| t.secs_after(at) - after_s; // seconds past the requested time
-        if when(first) >= 0.0 || self.heard.len() == 1 {
+        if when(first) >= 0.0 || self.received.len() == 1 {
             return start;
         }
-        let after = self.heard.partition_point(|&(t, _)| when(t) < 0.0).min(self.heard.len() - 1);
-        let ((t0, w0), (t1, w1)) = (self.heard[after - 1], self.heard[after]);
+        let after = self.received.partition_point(|&(t, _)| when(t) < 0.0).min(self.received.len() - 1);
+        let ((t0, w0), (t1, w1)) = (self.received[after - 1], self.received[after]);
         w0 + (w1 - w0) * (-when(t0) / t1.secs_after(t0))
     }
 }
@@ -199,7 +199,7 @@ mod tests {
         while t[0].as_secs_f64() < seconds {
             let i = usize::from(t[1] < t[0]);
             let (h, other) = (steps[i], 1 - i);
-            lines[i].hear(shown[other].0, shown[other].1, (i == 0, h));
+            lines[i].receive(shown[other].0, shown[other].1, i == 0, h);
             let c = lines[i].arriving(t[i], h);
             let z = lines[i].impedance();
             let force = (c.x + z * v[i]) / (1.0 + z * h); // of 1 kg

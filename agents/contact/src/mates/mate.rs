@@ -215,7 +215,7 @@ impl Mate {
     ) -> bool {
         let Some(account) = self.other.id().and_then(|id| tanks.get(id)).filter(|_| !self.spent) else { return false };
         let own = contacts.filter(|(contact, _)| self.is_of(contact));
-        let work_j: f64 = own.map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
+        let work_j: f64 = own.map(|(contact, impulse)| contact.jacobian.velocity(velocities).dot(*impulse)).sum();
         self.spent = work_j > account.most_j();
         self.spent
     }
@@ -251,9 +251,9 @@ impl Mate {
         self.span_s = h;
         for touch in touches {
             let mut contact = self.contact(touch);
-            let closing = contact.slots.velocity(velocities).dot(contact.normal);
+            let closing = contact.jacobian.velocity(velocities).dot(contact.normal);
             // something fixed may stop the owner on a way on which it would be out of reach
-            let towards = contact.slots.velocity_from(self.slots.0, velocities).dot(contact.normal);
+            let towards = contact.jacobian.velocity_from(self.slots.0, velocities).dot(contact.normal);
             if touch.gap_m + closing.min(towards) * h > slack_m {
                 continue;
             }
@@ -276,7 +276,7 @@ impl Mate {
         let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
         Contact {
             key: self.key() | place,
-            slots,
+            jacobian: slots,
             normal: touch.normal,
             gap_m: if touch.gap_m < 0.0 { touch.gap_m * self.fade } else { touch.gap_m },
             friction: self.friction,
@@ -423,7 +423,7 @@ impl Mate {
             respond(&mut impulses[..own]);
             self.other.respond(self.slots_mut(impulses));
         };
-        self.weighed = Some(inverse_mass(&contact, (own, self.end()), &mut answer, &mut room));
+        self.weighed = Some(inverse_mass(&contact, own, self.end(), &mut answer, &mut room));
         self.room = room;
     }
 

@@ -5,8 +5,8 @@
 use super::{Other, Pose};
 use glam::{DQuat, DVec3};
 use metachron_core::Inertia;
-use metachron_core::sprung::Lean;
-use metachron_core::{Sprung, Twist};
+use metachron_core::sprung::SprungPrediction;
+use metachron_core::{InverseMass, Sprung, Twist};
 
 impl Other {
     /// Its smooth acceleration and the mean of what others give it, m/s²: none where impulses do not move it.
@@ -79,13 +79,14 @@ impl Other {
     /// The mean inverse mass (1/kg) and inverse inertia of a body on springs.
     #[must_use]
     pub fn mobility(&self) -> Option<[f64; 2]> {
-        self.lean.as_ref().map(Lean::mobility)
+        self.lean.as_ref().map(SprungPrediction::mobility)
     }
 
-    pub(super) fn lean_of(&self, sprung: Option<Sprung>, velocity: Twist) -> Option<Lean> {
+    pub(super) fn lean_of(&self, sprung: Option<Sprung>, velocity: Twist) -> Option<SprungPrediction> {
         match (sprung.filter(|_| !self.held), &self.neighbour.as_ref()?.snapshot.inertia) {
             (Some(sprung), Inertia::Rigid { inverse_mass, inverse_inertia }) => {
-                Some(Lean::new(sprung, (*inverse_mass, *inverse_inertia), velocity))
+                let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
+                Some(SprungPrediction::new(sprung, inertia, velocity))
             }
             _ => None,
         }

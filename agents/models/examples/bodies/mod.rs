@@ -3,7 +3,7 @@
 //! In: shapes, places, masses. Out: specs and bodies. Never here: what is measured.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Companion, StepContext};
+use metachron_contact::{Agent, IslandMember, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime, StepReport};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
@@ -35,9 +35,11 @@ pub fn built(specs: impl IntoIterator<Item = RigidSpec>) -> Vec<RigidBody> {
 pub fn step(bodies: &mut [RigidBody], span: SimSpan, apart: &mut Vec<u32>) -> (StepReport, f64) {
     let around = |i| StepContext::alone(AgentId(i), SimTime::ZERO);
     let (leader, others) = bodies.split_first_mut().expect("there is a body");
-    let mut others: Vec<Companion<'_>> =
-        (1..).zip(others.iter_mut()).map(|(i, agent)| Companion { id: AgentId(i), agent, around: around(i) }).collect();
+    let mut others: Vec<IslandMember<'_>> = (1..)
+        .zip(others.iter_mut())
+        .map(|(i, agent)| IslandMember { id: AgentId(i), agent, context: around(i) })
+        .collect();
     let start = std::time::Instant::now();
-    let report = leader.lead(span, &around(0), &mut others, apart).expect("nobody is lost");
+    let report = leader.step_island(span, &around(0), &mut others, apart).expect("nobody is lost");
     (report, start.elapsed().as_secs_f64())
 }

@@ -7,21 +7,26 @@ use metachron_core::{SimSpan, StepError};
 
 /// A refused step changes no bit, neither of the state nor of the steps after it.
 pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
-    let (mut tried, mut spared) = (suite.start(), suite.start());
+    let (mut refusing, mut reference) = (suite.start(), suite.start());
     for i in 0..suite.steps.min(50) {
-        let before = tried.hash();
+        let before = refusing.hash();
         for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
-            match tried.step(bad, &[]) {
+            match refusing.step(bad, &[]) {
                 Err(StepError::BadSpan { .. }) => {}
-                other => return Err(format!("a step of {} s gave {other:?}", bad.as_secs_f64())),
+                other => {
+                    return Err(format!(
+                        "a step of {} s gave {other:?}; expected StepError::BadSpan",
+                        bad.as_secs_f64()
+                    ));
+                }
             }
-            if tried.hash() != before {
+            if refusing.hash() != before {
                 return Err(format!("a refused step of {} s changed the state", bad.as_secs_f64()));
             }
         }
-        tried.must_step(suite.dt, &[])?;
-        spared.must_step(suite.dt, &[])?;
-        if tried.hash() != spared.hash() {
+        refusing.must_step(suite.dt, &[])?;
+        reference.must_step(suite.dt, &[])?;
+        if refusing.hash() != reference.hash() {
             return Err(format!("step {i} differs after steps were refused"));
         }
     }
@@ -67,14 +72,14 @@ pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
         return Err(error.to_string());
     }
     let each = counted as f64 / f64::from(suite.steps);
-    if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; {allowed} are allowed")) }
+    if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; expected at most {allowed}")) }
 }
 
 /// Under any pull no state is written that is not finite: the agent reports that it has diverged, or ignores the pull.
 pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
     let mut run = suite.start();
     for i in 0..suite.steps {
-        shows_finite(&run).map_err(|what| format!("before step {i}: {what}"))?;
+        check_finite(&run).map_err(|what| format!("before step {i}: {what}"))?;
         run.must_step(suite.dt, suite.pull.as_slice())?;
     }
     for pull in &suite.absurd {
@@ -82,27 +87,32 @@ pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
         run.must_step(suite.dt, &[])?;
         match run.step(suite.dt, &[*pull]) {
             Ok(()) | Err(StepError::Diverged { .. }) => {}
-            Err(other) => return Err(format!("a pull to {} gave {other:?}", pull.target)),
+            Err(other) => {
+                return Err(format!(
+                    "a pull to {} gave {other:?}; expected a step or StepError::Diverged",
+                    pull.target
+                ));
+            }
         }
-        shows_finite(&run).map_err(|what| format!("after a pull to {}: {what}", pull.target))?;
+        check_finite(&run).map_err(|what| format!("after a pull to {}: {what}", pull.target))?;
     }
     Ok(())
 }
 
-fn shows_finite(run: &Run<'_>) -> Result<(), String> {
+fn check_finite(run: &Run<'_>) -> Result<(), String> {
     let snapshot = run.snapshot();
     let numbers = [("energy", snapshot.energy_j), ("residual", snapshot.residual_m), ("mass", run.agent.mass_kg())];
     if let Some((what, value)) = numbers.iter().find(|(_, value)| !value.is_finite()) {
-        return Err(format!("its {what} is {value}"));
+        return Err(format!("the {what} is {value}"));
     }
     if snapshot.residual_m < 0.0 {
-        return Err(format!("its residual is {}", snapshot.residual_m));
+        return Err(format!("the residual is {}", snapshot.residual_m));
     }
     if !snapshot.body.is_finite() {
-        return Err("its body is not finite".to_owned());
+        return Err("the body is not finite".to_owned());
     }
     if let Some(grip) = snapshot.grips.iter().find(|grip| !grip.force_n.is_finite()) {
-        return Err(format!("its grip is {}", grip.force_n));
+        return Err(format!("the grip force is {}", grip.force_n));
     }
     Ok(())
 }

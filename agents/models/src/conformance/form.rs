@@ -23,14 +23,16 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
         }
         let counted = run.snapshot().steps - steps_before;
         if counted != u64::from(suite.steps) {
-            return Err(format!("{} steps were counted as {counted}", suite.steps));
+            return Err(format!("{} steps were made, the snapshot counts {counted}", suite.steps));
         }
         if let Some((deviation, allowed)) = suite.closed_form {
             let wrong = deviation(run.agent.as_ref(), run.time.as_secs_f64());
             // NaN is a failure too
             if wrong.is_nan() || wrong > allowed {
                 let t = run.time.as_secs_f64();
-                return Err(format!("after {t} s it is {wrong:e} from its closed form; {allowed:e} is allowed"));
+                return Err(format!(
+                    "after {t} s the deviation from the closed form is {wrong:e}; expected at most {allowed:e}"
+                ));
             }
         }
     }
@@ -38,7 +40,7 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
 }
 
 /// Quantities that a change of resolution must conserve.
-struct Kept {
+struct Invariants {
     mass_kg: f64,
     length_m: f64,
     linear: glam::DVec3,
@@ -49,7 +51,7 @@ struct Kept {
     swing: f64,
 }
 
-impl Kept {
+impl Invariants {
     fn of(run: &Run<'_>) -> Self {
         let body = run.snapshot().body;
         let (linear, angular) = run.agent.momentum();
@@ -75,13 +77,17 @@ pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
         let before = run.hash();
         let wanted = run.agent.resolution().unwrap_or(Resolution { eps_m: 0.01, n: 2 });
         run.agent.set_resolution(wanted);
-        return if run.hash() == before { Ok(()) } else { Err("a wish for what it holds changed it".to_owned()) };
+        return if run.hash() == before {
+            Ok(())
+        } else {
+            Err("set_resolution with the present resolution changed the state".to_owned())
+        };
     }
     // coarse to fine and back: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
-        let (before, held_before) = (Kept::of(&run), run.agent.resolution());
+        let (before, held_before) = (Invariants::of(&run), run.agent.resolution());
         run.agent.set_resolution(*wanted);
-        let after = Kept::of(&run);
+        let after = Invariants::of(&run);
         let eps_m = run.agent.resolution().map_or(0.0, |r| r.eps_m).max(held_before.map_or(0.0, |r| r.eps_m));
         compare(&before, &after, eps_m).map_err(|what| format!("retuned to ε {} m, {what}", wanted.eps_m))?;
         run.must_step(suite.dt, suite.pull.as_slice())?;
@@ -89,7 +95,7 @@ pub(super) fn set_resolution(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-fn compare(before: &Kept, after: &Kept, eps_m: f64) -> Result<(), String> {
+fn compare(before: &Invariants, after: &Invariants, eps_m: f64) -> Result<(), String> {
     if (after.mass_kg - before.mass_kg).abs() > ROUNDING * before.mass_kg {
         return Err(format!("mass went from {} to {} kg", before.mass_kg, after.mass_kg));
     }
@@ -118,7 +124,10 @@ pub(super) fn residual(suite: &Suite<'_>) -> Result<(), String> {
         }
         let now = run.snapshot().residual_m;
         if let Some((eps_m, coarser)) = last.filter(|(_, coarser)| now > RESIDUAL_SLACK * coarser) {
-            return Err(format!("ε {eps_m} m leaves {coarser:e} m, the finer {} m leaves {now:e} m", wanted.eps_m));
+            return Err(format!(
+                "the residual is {coarser:e} m at ε {eps_m} m and {now:e} m at the finer ε {} m",
+                wanted.eps_m
+            ));
         }
         last = Some((wanted.eps_m, now));
     }

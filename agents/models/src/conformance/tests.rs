@@ -35,12 +35,12 @@ impl Agent for Row {
         "row"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         if self.breaks(Promise::RefusedSpan) {
             self.height += 1e-12;
         }
         let dt_s = check_span(dt)?;
-        if around.hands.iter().any(|hand| !hand.target.is_finite()) {
+        if context.hands.iter().any(|hand| !hand.target.is_finite()) {
             if !self.breaks(Promise::Finite) {
                 return Err(StepError::Diverged { model: "row", dt_s, what: "a hand".to_owned() });
             }
@@ -121,12 +121,12 @@ fn broken(breaks: Option<Promise>) -> Vec<Promise> {
 }
 
 #[test]
-fn an_agent_that_keeps_every_promise_has_no_breach() {
+fn a_conforming_agent_has_no_breach() {
     assert_eq!(broken(None), []);
 }
 
 #[test]
-fn every_broken_promise_is_found_and_no_other_is_blamed() {
+fn every_broken_promise_is_reported_and_no_other() {
     let all = [
         Promise::ExactTime,
         Promise::RefusedSpan,

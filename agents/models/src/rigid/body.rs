@@ -18,12 +18,13 @@ use super::spring_set::SpringSet;
 use super::static_shapes::StaticShapes;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, linear_spring};
+use crate::limits::PART_MAX_S;
 use glam::DVec3;
 use metachron_contact::beside;
 use metachron_contact::beside::{bends, is_driven};
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
-use metachron_contact::{Agent, Companion, Neighbour, StepContext};
+use metachron_contact::{Agent, IslandMember, Neighbour, StepContext};
 use metachron_core::DRIFT_S;
 use metachron_core::{
     AgentId, Body, Grip, LiesOn, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport, Tips,
@@ -104,8 +105,6 @@ pub struct RigidBody {
     drift_m: f64,
 }
 
-/// The longest part of a step in contact or under a spring, seconds.
-const PART_MAX_S: f64 = 1.0 / 240.0;
 /// A body in contact that moves slower than this everywhere is calm, m/s: above the solver's own jitter
 /// (measured: below 1e-4 m/s for a box of 1 m at rest), below the visible.
 const CALM_M_S: f64 = 2e-3;
@@ -331,7 +330,7 @@ impl Agent for RigidBody {
     }
 
     /// Publishes how springs hold it before it has moved.
-    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
+    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
             self.company.gather(around, (&self.world.mover, &self.motion), &[]);
             self.ties.gather(around, &self.company);
@@ -388,11 +387,11 @@ impl Agent for RigidBody {
         Some(self)
     }
 
-    fn lead(
+    fn step_island(
         &mut self,
         dt: SimSpan,
         around: &StepContext<'_>,
-        others: &mut [Companion<'_>],
+        others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         island::lead(self, dt, around, others, apart)

@@ -346,7 +346,7 @@ fn is_met(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
 
 /// Whether `neighbour` is a tool that holds `me`, or has its jaws open for it.
 fn lets_in(neighbour: &Neighbour, me: AgentId) -> bool {
-    let open = matches!(&neighbour.snapshot.body, Body::Tool(tool) if tool.lets_in == Some(me));
+    let open = matches!(&neighbour.snapshot.body, Body::Tool(tool) if tool.admits == Some(me));
     open || holds(neighbour, me)
 }
 

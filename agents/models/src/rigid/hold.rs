@@ -9,7 +9,7 @@ use super::linear_spring::{Pulled, Under, lean};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::StepContext;
-use metachron_core::{Impulse, Mat6, Sprung, Twist};
+use metachron_core::{Impulse, InverseMass, Mat6, Sprung, Twist};
 
 /// What such a body keeps from step to step.
 #[derive(Default)]
@@ -103,7 +103,8 @@ impl RigidBody {
         self.ties.aim(&self.company);
         let sprung = lean(&self.motion, &self.spread, &self.ties.all, self.gravity);
         let sprung = Sprung { past: self.hold.past, span_s: dt, ..sprung };
-        let answer = sprung.answer(self.motion.inverse_inertia(&self.spread), dt);
+        let (linear_per_kg, angular_per_kg_m2) = self.motion.inverse_inertia(&self.spread);
+        let answer = sprung.response(InverseMass { linear_per_kg, angular_per_kg_m2 }, dt);
         self.hold.known = Some((sprung, answer));
     }
 }

@@ -118,7 +118,7 @@ impl Meeting {
     /// Solves a blow, and gives everybody what it is.
     fn exchange_blow(&mut self, me: &mut Me<'_>, company: &mut Company) {
         self.wake(company);
-        self.blow.start_afresh();
+        self.blow.reset();
         self.solve(company, 1.0, true);
         self.strike_in_turn(company);
         self.give(me, company, 0.0);
@@ -140,7 +140,7 @@ impl Meeting {
                 self.found.iter_mut().for_each(|found| found.contact.rebound_m_s = 0.0);
             }
             self.velocities.clone_from(&self.before);
-            self.blow.start_afresh();
+            self.blow.reset();
             self.solve(company, 1.0, true);
         }
     }
@@ -149,7 +149,7 @@ impl Meeting {
     fn makes_energy(&self) -> bool {
         let (mut work_j, mut effort_j) = (0.0, 0.0);
         for (contact, impulse) in self.contacts.iter().zip(self.blow.impulses()) {
-            let [before, after] = [&self.before, &self.velocities].map(|all| contact.slots.velocity(all));
+            let [before, after] = [&self.before, &self.velocities].map(|all| contact.jacobian.velocity(all));
             work_j += 0.5 * impulse.dot(before + after);
             effort_j += impulse.length() * (before.length() + after.length());
         }
@@ -246,7 +246,7 @@ impl Meeting {
                 break;
             }
             self.velocities.clone_from(&self.free);
-            if is_blow { self.blow.take_back() } else { self.press.take_back() }
+            if is_blow { self.blow.undo() } else { self.press.undo() }
         }
         company.release();
     }
@@ -263,12 +263,12 @@ impl Meeting {
             }
         };
         let (solver, settings) = if is_blow { (blow, BLOW) } else { (press, PRESS) };
-        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings };
+        let problem = Problem { contacts, related_keys: &[], h_s: h, mobilities, settings };
         solver.solve(&problem, velocities, &mut answer);
         let solver = if is_blow { &self.blow } else { &self.press };
         self.given.clear();
         self.given.resize(self.velocities.len(), DVec3::ZERO);
-        self.contacts.iter().zip(solver.impulses()).for_each(|(c, j)| c.slots.scatter(*j, &mut self.given));
+        self.contacts.iter().zip(solver.impulses()).for_each(|(c, j)| c.jacobian.scatter(*j, &mut self.given));
     }
 
     /// Scales the slots of tubes by their inverse mass at their first contact: one answer tells it.
@@ -277,7 +277,7 @@ impl Meeting {
             company.guests().iter().zip(&self.bases).enumerate().filter(|(_, (g, _))| g.touchable && g.is_chain());
         for (i, (guest, &base)) in tubes {
             let Some(found) = self.found.iter().find(|found| found.guest == Some(i)) else { continue };
-            let Contact { slots, normal, .. } = &found.contact;
+            let Contact { jacobian: slots, normal, .. } = &found.contact;
             self.given.clear();
             self.given.resize(self.velocities.len(), DVec3::ZERO);
             slots.scatter(*normal, &mut self.given);
@@ -338,7 +338,7 @@ impl Meeting {
         for i in (0..company.guests().len()).filter(|&i| company.guests()[i].is_tool()) {
             let mut given = vec![DVec3::ZERO; self.velocities.len()];
             for (found, impulse) in self.found.iter().zip(self.press.impulses()).filter(|(f, _)| f.guest == Some(i)) {
-                found.contact.slots.scatter(*impulse, &mut given);
+                found.contact.jacobian.scatter(*impulse, &mut given);
             }
             leant.extend(Leant::new(company, i, [given[0], given[1]]));
         }
@@ -360,7 +360,7 @@ impl Meeting {
             impulses[1] = inverse.1 * impulses[1];
             other.respond(&mut impulses[its.clone()]);
         };
-        let weighed = inverse_mass(&contact, (2, its.end), &mut answer, room);
+        let weighed = inverse_mass(&contact, 2, its.end, &mut answer, room);
         exchange.pair_mut(id).inverse_mass_per_kg = Some(weighed);
     }
 
@@ -369,7 +369,7 @@ impl Meeting {
         let impulses = if h > 0.0 { self.press.impulses() } else { self.blow.impulses() };
         let (mut places, mut depth_m, mut work_j, mut along) = (0, 0.0_f64, 0.0, 0.0);
         for (found, impulse) in self.found.iter().zip(impulses).filter(|(found, _)| found.guest == Some(i)) {
-            let slots = &found.contact.slots;
+            let slots = &found.contact.jacobian;
             let mean = 0.5 * (slots.velocity(&self.before) + slots.velocity(&self.velocities));
             work_j += impulse.dot(mean);
             along += impulse.dot(found.contact.normal);

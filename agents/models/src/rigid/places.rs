@@ -54,7 +54,7 @@ impl Meeting {
             let from = self.found.len();
             self.take_up(me, None, (friction, still, 0.0));
             for found in &mut self.found[from..] {
-                let pressed_m_s = -found.contact.slots.velocity(&strike.pressed).dot(found.contact.normal);
+                let pressed_m_s = -found.contact.jacobian.velocity(&strike.pressed).dot(found.contact.normal);
                 // a hop that gravity and what presses would end within the step is none; what hardly loses anything hops on
                 let hop_m_s = 2.0 * restitution * found.approach_m_s;
                 let is_short = hop_m_s < span.gravity.length() * span.dt_s + pressed_m_s;
@@ -140,8 +140,16 @@ impl Meeting {
             let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
             let key = mixed(touch.key ^ mixed(with));
             let (normal, gap_m) = (touch.normal, touch.gap_m);
-            let contact =
-                Contact { key, slots, normal, gap_m, friction, rebound_m_s, back_m_s: DVec3::ZERO, age_s: 0.0 };
+            let contact = Contact {
+                key,
+                jacobian: slots,
+                normal,
+                gap_m,
+                friction,
+                rebound_m_s,
+                back_m_s: DVec3::ZERO,
+                age_s: 0.0,
+            };
             self.found.push(Found { contact, guest: guest.map(|(i, _)| i), approach_m_s });
         }
     }

@@ -9,8 +9,7 @@ use super::motion::Motion;
 use super::places::halfway;
 use glam::{DMat3, DVec3};
 use metachron_contact::StepContext;
-use metachron_contact::laws::push_off_n;
-use metachron_contact::laws::{Drawn, End, Line};
+use metachron_contact::laws::{Approach, Line, LineEnd, LinkForces, push_off_n};
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, SimTime, Stand};
 use metachron_core::{ContactJacobian, Impulse, PairKind};
@@ -93,8 +92,8 @@ impl Sided {
             let guest = &company.guests()[i];
             let slots = slots_of(touch, motion, guest);
             let velocity = slots.velocity(&self.velocities);
-            let push =
-                push_off_n((touch.gap_m, touch.normal, velocity), (stiffness_n_m, damping_n_s_m), guest.friction);
+            let approach = Approach { gap_m: touch.gap_m, normal: touch.normal, velocity_m_s: velocity };
+            let push = push_off_n(approach, stiffness_n_m, damping_n_s_m, guest.friction);
             slots.scatter(push * span.dt_s, &mut self.given);
             force += push;
             depth_m = depth_m.max(-touch.gap_m);
@@ -186,8 +185,8 @@ impl Sided {
         let [x, y, z] = DVec3::AXES.map(|axis| answer_of(motion, spread, &slots, axis) * span.dt_s);
         let yields = DMat3::from_cols(x, y, z);
         let step = (span.at, span.dt_s);
-        let end = End { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
-        let Drawn { force, arriving, into_line } = self.line(id, stiffness_n_m).draw(&end);
+        let end = LineEnd { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
+        let LinkForces { force, arriving, into_line } = self.line(id, stiffness_n_m).forces(&end);
         let mut given = [DVec3::ZERO; 2];
         slots.scatter(force * span.dt_s, &mut given);
         motion.velocity += given[0] / spread.mass_kg;
@@ -215,7 +214,7 @@ impl Sided {
         let (at, wave) = (neighbour.snapshot.time, pair.and_then(|pair| pair.wave));
         let decides = neighbour.owned;
         let line = self.line(Some(neighbour.id), stiffness);
-        line.hear(at, wave, (decides, span.dt_s));
+        line.receive(at, wave, decides, span.dt_s);
         line.arriving(span.at, span.dt_s)
     }
 

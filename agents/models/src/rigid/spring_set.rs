@@ -7,7 +7,7 @@ use super::company::Company;
 use super::linear_spring::LinearSpring;
 use super::orientation_spring::OrientationSpring;
 use glam::{DMat3, DVec3};
-use metachron_contact::agent::led_s;
+use metachron_contact::agent::tool_extrapolation_s;
 use metachron_contact::{AnchorSpring, StepContext};
 use metachron_contact::{Law, Link, Other};
 use metachron_core::{Anchor, Body};
@@ -49,7 +49,7 @@ impl SpringSet {
     pub(super) fn gather(&mut self, around: &StepContext<'_>, company: &Company) {
         self.all.clear();
         self.ends.clear();
-        for pull in around.pulls() {
+        for pull in around.anchor_springs() {
             let by = pull.by.map(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
             if by == Some(None) {
                 continue; // a tool with a non-finite state holds nothing
@@ -134,8 +134,8 @@ impl SpringSet {
 fn turn_of(tool: &Other, (pull, around): (&AnchorSpring, &StepContext<'_>)) -> Option<OrientationSpring> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
-    let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
-    Some(OrientationSpring::of(state, &clasp, (pull, led_s(around.time, seen.time))))
+    let clasp = state.grasp.and_then(|grasp| grasp.orientation)?;
+    Some(OrientationSpring::of(state, &clasp, (pull, tool_extrapolation_s(around.time, seen.time))))
 }
 
 /// A link as a spring; its target is set later.

@@ -5,6 +5,7 @@
 
 use super::discretization::Discretization;
 use super::spec::Attachment;
+use super::substep::Substep;
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 use metachron_contact::AnchorSpring;
@@ -116,7 +117,7 @@ pub struct Tie {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum End {
     /// A user spring or a tool: driven, never yields.
-    Led,
+    Driven,
     /// A point of another agent, which yields.
     Linked(Link),
 }
@@ -125,21 +126,21 @@ impl Tie {
     /// The tie of a pull; `None` where it has no point on this tube or is not finite.
     pub fn new(pull: &AnchorSpring, division: &Discretization) -> Option<Self> {
         let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
-        let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), division)?;
+        let tie = Self::at(pull.anchor, pull.stiffness_n_m, pull.damping_n_s_m, division)?;
         let (target, target_velocity) = (pull.target, pull.target_velocity);
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
-    /// The tie of a link, whose far end is set later ([`Tie::aim`]); `None` where it has no point on this tube.
+    /// The tie of a link, whose far end is set later ([`Tie::set_far_end`]); `None` where it has no point on this tube.
     pub fn of_link(link: &Link, division: &Discretization) -> Option<Self> {
-        let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), division)?;
+        let tie = Self::at(link.here, link.stiffness_n_m, link.damping_n_s_m, division)?;
         Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
     }
 
-    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), division: &Discretization) -> Option<Self> {
+    fn at(anchor: Anchor, stiffness_n_m: f64, damping_n_s_m: f64, division: &Discretization) -> Option<Self> {
         let Anchor::Arc(arc_m) = anchor else { return None };
         let fair = |c: f64| c.is_finite() && c >= 0.0;
-        if !(arc_m.is_finite() && fair(stiffness) && fair(damping)) {
+        if !(arc_m.is_finite() && fair(stiffness_n_m) && fair(damping_n_s_m)) {
             return None;
         }
         let (segment, share) = division.locate(arc_m);
@@ -147,11 +148,11 @@ impl Tie {
             by: None,
             segment,
             share,
-            end: End::Led,
+            end: End::Driven,
             target: DVec3::ZERO,
             target_velocity: DVec3::ZERO,
-            stiffness: Sym3::identity(stiffness),
-            damping: Sym3::identity(damping),
+            stiffness: Sym3::identity(stiffness_n_m),
+            damping: Sym3::identity(damping_n_s_m),
             ease: DMat3::IDENTITY,
             impulse: DVec3::ZERO,
             given: DVec3::ZERO,
@@ -160,9 +161,9 @@ impl Tie {
         })
     }
 
-    /// Sets the far end of a link for the substep from `start` to `start + h` seconds of the step; `point` is
-    /// the near end at its start (eq. 35, 36).
-    pub fn aim(&mut self, far: &Far, point: DVec3, (start, h): (f64, f64)) {
+    /// Sets the far end of a link for a substep; `point` is the near end at its start (eq. 35, 36).
+    pub fn set_far_end(&mut self, far: &Far, point: DVec3, substep: Substep) {
+        let Substep { start_s: start, span_s: h } = substep;
         let End::Linked(link) = self.end else { return };
         let spring = far.spring(&link, point);
         (self.stiffness, self.damping) = (Sym3::of(&spring.stiffness), Sym3::of(&spring.damping));
@@ -177,10 +178,11 @@ impl Tie {
         a * (1.0 - self.share) + b * self.share
     }
 
-    /// Records the impulse of a substep of `h` seconds that ended `after` seconds into the step with the point at `x` and velocity `v`,
-    /// including what the tie has taken up since the last one.
-    pub fn book(&mut self, (x, v): (DVec3, DVec3), (h, after): (f64, f64)) {
-        self.given = self.force(x, v, after) * h + self.taken;
+    /// Records the impulse of a substep that has ended with the point at `x` and velocity `v`, including what the tie has taken up since
+    /// the last one.
+    pub fn record(&mut self, x: DVec3, v: DVec3, substep: Substep) {
+        let h = substep.span_s;
+        self.given = self.force(x, v, substep.end_s()) * h + self.taken;
         self.impulse += self.given;
         (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
     }
@@ -193,12 +195,12 @@ impl Tie {
 
     /// Records the impulse that the tie takes up where an impulse from another agent changes the velocities at the ends of its segment
     /// by `a` and `b`: the factor of that response includes the tie (eq. 37a).
-    pub fn take(&mut self, a: DVec3, b: DVec3) {
+    pub fn absorb(&mut self, a: DVec3, b: DVec3) {
         self.taken -= self.resistance * self.mix(a, b);
     }
 
     /// Continues the same tie of the step before: inherits the impulse still owed to the far end.
-    pub fn follow(&mut self, before: &[Self]) {
+    pub fn continue_from(&mut self, before: &[Self]) {
         let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
         self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
     }
@@ -219,7 +221,7 @@ impl Tie {
     pub fn implicit(&self, h: f64) -> Sym3 {
         let resistance = self.stiffness * (h * h) + self.damping * h;
         match self.end {
-            End::Led => resistance,
+            End::Driven => resistance,
             End::Linked(_) => Sym3::of(&(self.ease * resistance.full())),
         }
     }

@@ -8,7 +8,7 @@ use super::banded_ldl::Factor;
 use super::contact::TubeContacts;
 use super::discretization::Discretization;
 use super::rotation::{exp, unit};
-use super::state::{RodMaterial, RodState};
+use super::state::{DividedRod, RodState};
 use glam::DVec3;
 use metachron_contact::Neighbour;
 use metachron_core::SimTime;
@@ -21,9 +21,28 @@ const TIMELY_STEPS: f64 = 2.0;
 /// How often that displacement is halved before it is dropped.
 const WAY_HALVINGS: u32 = 6;
 
+/// A factored system, with the springs and supports that it includes.
+pub struct FactoredSystem<'a> {
+    /// The factor of its matrix.
+    pub factor: &'a Factor,
+    /// Springs: each records the impulse that it takes.
+    pub ties: &'a mut [Tie],
+    /// Contact points on moving supports: the impulses that they take act on the tube through the coming substep.
+    pub feet: &'a [Foot],
+}
+
+/// What limits the displacement of a tube by received impulses.
+#[derive(Clone, Copy)]
+pub struct DisplacementLimit<'a> {
+    /// Contacts with fixed solids, which no node may enter.
+    pub walls: &'a TubeContacts,
+    /// The longest displacement of a node, metres; may be infinite.
+    pub way_m: f64,
+}
+
 /// Received impulses, gathered in slots.
 #[derive(Debug, Clone, Default)]
-pub struct Received {
+pub struct ReceivedImpulses {
     /// dJ: N·s at nodes, N·m·s at segments.
     sum: Vec<DVec3>,
     /// t dJ − dS: seconds times that.
@@ -40,7 +59,7 @@ pub struct Received {
     trial: RodState,
 }
 
-impl Received {
+impl ReceivedImpulses {
     /// Empties the slots of a tube with that many.
     pub fn clear(&mut self, slots: usize) {
         (self.slots, self.any, self.untimely) = (slots, false, false);
@@ -75,7 +94,7 @@ impl Received {
     }
 
     /// Defers the part that has not yet acted for a substep of `h` seconds to the coming one (docs/theory/soft.md, eq. 16b).
-    pub fn put_off(&mut self, h: f64) {
+    pub fn defer(&mut self, h: f64) {
         let Self { sum, carried, fresh, .. } = self;
         fresh.clear();
         fresh.extend(sum.iter_mut().zip(&*carried).map(|(sum, carried)| {
@@ -87,7 +106,7 @@ impl Received {
     }
 
     /// Checks the clock of an agent that gave impulses, for a tube about to make a step of `dt` seconds from `now`.
-    pub fn note(&mut self, giver: &Neighbour, now: SimTime, dt: f64) {
+    pub fn check_clock(&mut self, giver: &Neighbour, now: SimTime, dt: f64) {
         let ahead_s = giver.snapshot.time.secs_after(now);
         // its last impulse acted at the start of its step
         self.untimely |= ahead_s - giver.step_s > TIMELY_STEPS * dt || -ahead_s > TIMELY_STEPS * dt.max(giver.step_s);
@@ -123,19 +142,20 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; recomputes the strains. Needs a factor of this division.
     ///
-    /// `feet` are the contact points on moving supports that the factor includes: the impulses they take act on the tube through the coming
-    /// substep. No node is displaced by more than `way_m`, and untimely displacements are shortened until they do not strain the tube.
-    /// `ties` are those in the factor: each records the impulse it takes.
+    /// Displacements stay within `limit`, and untimely ones are shortened until they do not strain the tube.
     pub fn apply(
         &mut self,
         state: &mut RodState,
-        (factor, ties): (&Factor, &mut [Tie]),
-        (matter, division): (&RodMaterial, &Discretization),
-        (walls, feet, way_m): (&TubeContacts, &[Foot], f64),
+        system: FactoredSystem<'_>,
+        rod: DividedRod<'_>,
+        limit: DisplacementLimit<'_>,
     ) {
+        let FactoredSystem { factor, ties, feet } = system;
+        let DividedRod { matter, division } = rod;
+        let DisplacementLimit { walls, way_m } = limit;
         let Self { sum, carried, fresh, slots, .. } = self;
         for list in [&mut *sum, &mut *carried] {
-            hold(list, matter.held);
+            zero_held_ends(list, matter.held);
             factor.solve(list);
         }
         if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
@@ -146,33 +166,28 @@ impl Received {
             press(feet, sum, fresh);
         }
         if !fresh.is_empty() {
-            hold(fresh, matter.held);
+            zero_held_ends(fresh, matter.held);
         }
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };
-        let share = if self.untimely { self.unstrained(state, (matter, division), share) } else { share };
+        let share = if self.untimely { self.unstrained(state, rod, share) } else { share };
         let Self { sum, carried, .. } = self;
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
-        ties.iter_mut().for_each(|tie| tie.take(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
-        carry(state, carried, share);
+        ties.iter_mut().for_each(|tie| tie.absorb(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
+        displace(state, carried, share);
         walls.hold_back(&mut state.x, carried.iter().step_by(2).map(|way| *way * share), &division.arc_m);
         state.strain(matter, division);
     }
 
     /// The share of the displacement of `state`, at most `share`, halved until it does not increase the tube's strain energy; zero where a
     /// few halvings do not suffice (eq. 37b).
-    fn unstrained(
-        &mut self,
-        state: &RodState,
-        (matter, division): (&RodMaterial, &Discretization),
-        mut share: f64,
-    ) -> f64 {
+    fn unstrained(&mut self, state: &RodState, rod: DividedRod<'_>, mut share: f64) -> f64 {
         let Self { carried, trial, .. } = self;
         for _ in 0..WAY_HALVINGS {
             trial.resize(state.q.len());
             trial.copy_from(state);
-            carry(trial, carried, share);
-            trial.strain(matter, division);
+            displace(trial, carried, share);
+            trial.strain(rod.matter, rod.division);
             if trial.elastic_j <= state.elastic_j {
                 return share;
             }
@@ -183,14 +198,14 @@ impl Received {
 }
 
 /// Moves and turns a state by a share of each slot's displacement.
-fn carry(state: &mut RodState, carried: &[DVec3], share: f64) {
+fn displace(state: &mut RodState, carried: &[DVec3], share: f64) {
     state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
     let turns = carried.iter().skip(1).step_by(2);
     state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
 }
 
 /// Zeroes held ends in an array of slots.
-fn hold(list: &mut [DVec3], held: [bool; 2]) {
+fn zero_held_ends(list: &mut [DVec3], held: [bool; 2]) {
     let last = list.len() - 1;
     for (end, slot) in [(0, 0), (1, last)] {
         if held[end] {

@@ -29,7 +29,7 @@ pub struct Row {
 
 /// A row as elimination reads it, counted from the front's own end.
 #[derive(Clone, Copy)]
-struct Met<T> {
+struct InputRow<T> {
     diag: Symmetric<T>,
     near: Matrix<T>,
     far: Symmetric<T>,
@@ -56,7 +56,7 @@ struct Front<T> {
 }
 
 /// The result of eliminating the earlier rows from one row.
-struct Reached<T> {
+struct EliminatedRow<T> {
     near: Matrix<T>,
     far: Matrix<T>,
     /// N_i.
@@ -78,13 +78,13 @@ impl Row {
     pub const ZERO: Self = Self { diag: Sym3::ZERO, near: DMat3::ZERO, far: Sym3::ZERO };
 }
 
-impl From<&Row> for Met<f64> {
+impl From<&Row> for InputRow<f64> {
     fn from(row: &Row) -> Self {
         Self { diag: row.diag.into(), near: row.near.into(), far: row.far.into() }
     }
 }
 
-impl Met<f64x2> {
+impl InputRow<f64x2> {
     /// Row i as the front elimination reads it, and row n − 1 − i as the back one does.
     #[inline(always)]
     fn both(rows: &[Row], i: usize) -> Self {
@@ -111,19 +111,19 @@ impl<T: Number> Front<T> {
 
     /// Eliminates the earlier rows from the next one (eq. 16).
     #[inline(always)]
-    fn reach(&self, row: &Met<T>) -> Reached<T> {
+    fn reach(&self, row: &InputRow<T>) -> EliminatedRow<T> {
         let across = row.far.full();
         let far = self.before.after(&across);
         let changed = row.near.minus_across(&far, &self.last_near);
         let near = self.last.after(&changed);
         let pivot = row.diag.minus_across(&far, &across).minus_across(&near, &changed);
-        Reached { near, far, changed, pivot }
+        EliminatedRow { near, far, changed, pivot }
     }
 
     /// Eliminates the next row; also returns the minors that must be positive and finite.
     #[inline(always)]
-    fn eliminate(&mut self, row: &Met<T>) -> (Factored<T>, [T; 3]) {
-        let Reached { near, far, changed, pivot } = self.reach(row);
+    fn eliminate(&mut self, row: &InputRow<T>) -> (Factored<T>, [T; 3]) {
+        let EliminatedRow { near, far, changed, pivot } = self.reach(row);
         let (inverse, minors) = pivot.inverse();
         self.pass(changed, inverse);
         (Factored { inverse, near, far }, minors)
@@ -180,7 +180,7 @@ impl Factor {
         self.ends.resize(pairs + 2, Factored::default());
         let mut front = Front::START;
         for (i, out) in self.ends[..pairs].iter_mut().enumerate() {
-            let (row, minors) = front.eliminate(&Met::both(rows, i));
+            let (row, minors) = front.eliminate(&InputRow::both(rows, i));
             if let Some(lane) = Column(minors).apart().iter().position(|&Column(minors)| !positive(minors)) {
                 return Err([i, rows.len() - 1 - i][lane]);
             }
@@ -199,16 +199,17 @@ impl Factor {
     }
 
     /// Stores the couplings of the three middle rows to those eliminated before, and returns the middle with those eliminated.
-    fn link(&mut self, mut front: Front<f64x2>, rows: &[Row]) -> [Met<f64>; 3] {
+    fn link(&mut self, mut front: Front<f64x2>, rows: &[Row]) -> [InputRow<f64>; 3] {
         let pairs = self.pairs();
-        let first = front.reach(&Met { diag: Symmetric::ZERO, ..Met::both(rows, pairs) });
+        let first = front.reach(&InputRow { diag: Symmetric::ZERO, ..InputRow::both(rows, pairs) });
         front.pass(first.changed, Symmetric::ZERO);
         // the couplings within the middle are eliminated later, in `factor`
-        let second = front.reach(&Met { diag: Symmetric::ZERO, near: Matrix::ZERO, ..Met::both(rows, pairs + 1) });
+        let second =
+            front.reach(&InputRow { diag: Symmetric::ZERO, near: Matrix::ZERO, ..InputRow::both(rows, pairs + 1) });
         for (out, reached) in self.ends[pairs..].iter_mut().zip([&first, &second]) {
             *out = Factored { inverse: Symmetric::ZERO, near: reached.near, far: reached.far };
         }
-        let mut middle: [Met<f64>; 3] = std::array::from_fn(|i| Met::from(&rows[pairs + i]));
+        let mut middle: [InputRow<f64>; 3] = std::array::from_fn(|i| InputRow::from(&rows[pairs + i]));
         (middle[0].near, middle[0].far, middle[1].far) = (Matrix::ZERO, Symmetric::ZERO, Symmetric::ZERO);
         let ([front, back], [front_next, back_next]) = (first.pivot.apart(), second.pivot.apart());
         let [front_link, back_link] = second.changed.apart();

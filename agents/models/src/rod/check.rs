@@ -9,13 +9,15 @@ use metachron_geometry::ShapeError;
 #[non_exhaustive]
 pub enum TubeError {
     /// The path has fewer than two points.
-    #[error("a tube's path needs at least 2 points, this one has {count}")]
+    #[error("the tube's path has {count} points; expected at least 2")]
     ShortPath {
         /// Number of points.
         count: usize,
     },
     /// A point of the path is not finite, or the same as the one before it.
-    #[error("point {index} of the tube's path, {point}, is not finite or repeats the one before it")]
+    #[error(
+        "point {index} of the tube's path is {point}; expected finite coordinates that differ from the point before"
+    )]
     BadPoint {
         /// Index of the point, from 0.
         index: usize,
@@ -23,7 +25,7 @@ pub enum TubeError {
         point: DVec3,
     },
     /// The path turns back on itself.
-    #[error("the tube's path turns back on itself at point {index} (by {degrees:.0}°; at most 170° can be followed)")]
+    #[error("the tube's path turns by {degrees:.0}° at point {index}; expected at most 170°")]
     Cusp {
         /// Index of the point, from 0.
         index: usize,
@@ -31,7 +33,7 @@ pub enum TubeError {
         degrees: f64,
     },
     /// A number is outside its range.
-    #[error("{name} of the tube is {value}; it must be {range}")]
+    #[error("the tube's {name} is {value}; expected {range}")]
     OutOfRange {
         /// Name of the number.
         name: &'static str,
@@ -41,7 +43,7 @@ pub enum TubeError {
         range: &'static str,
     },
     /// An obstacle has no shape.
-    #[error("obstacle: {0}")]
+    #[error("static solid near the tube: {0}")]
     Obstacle(#[from] ShapeError),
 }
 
@@ -105,14 +107,14 @@ fn check_section(spec: &TubeSpec) -> Result<(), TubeError> {
     positive("ei_n_m2", s.ei_n_m2)?;
     positive("gj_n_m2", s.gj_n_m2)?;
     positive("rotary_kg_m", s.rotary_kg_m)?;
-    positive("mass_per_length_kg_m", spec.mass_per_length_kg_m)
+    positive("mass_per_length_kg_m", s.mass_per_length_kg_m)
 }
 
 fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
     let (fine, coarse) = spec.range.eps_m;
     positive("eps_m", spec.resolution.eps_m)?;
-    positive("the finest eps_m", fine)?;
-    number("the coarsest eps_m", coarse, coarse >= fine, "finite and at least the finest")?;
+    positive("finest eps_m", fine)?;
+    number("coarsest eps_m", coarse, coarse >= fine, "finite and at least the finest")?;
     if let Some(count) = spec.segments {
         let ok = (crate::rod::SEGMENTS_MIN..=crate::rod::SEGMENTS_MAX).contains(&count);
         number("segments", count as f64, ok, "2 to 4096")?;

@@ -5,10 +5,11 @@
 //! Theory: docs/theory/coupling.md.
 
 use super::anchor_springs::{End, Tie};
-use super::apply_impulses::Received;
+use super::apply_impulses::ReceivedImpulses;
 use super::contact::Skin;
 use super::discretization::Discretization;
 use super::sided::Sided;
+use super::substep::Substep;
 use glam::DVec3;
 use metachron_contact::beside::{may_touch, parts};
 use metachron_contact::{Contact, Exchange, Law, Mates, Search, WAKE_M_S};
@@ -25,7 +26,7 @@ use std::sync::Arc;
 pub struct Company {
     form: Option<Arc<CollisionShape>>,
     mates: Mates,
-    received: Received,
+    received: ReceivedImpulses,
     room: Room,
     touches: Vec<Touch>,
     sided: Sided,
@@ -78,7 +79,7 @@ impl Company {
             exchange.take(around, until, |id, site, sum, carried| {
                 received.add(division, site, sum, carried);
                 let giver = around.neighbours.iter().find(|n| n.id == id);
-                giver.into_iter().for_each(|giver| received.note(giver, around.time, dt));
+                giver.into_iter().for_each(|giver| received.check_clock(giver, around.time, dt));
             });
         }
     }
@@ -125,7 +126,7 @@ impl Company {
     }
 
     /// What others gave since the last step.
-    pub fn received(&mut self) -> &mut Received {
+    pub fn received(&mut self) -> &mut ReceivedImpulses {
         &mut self.received
     }
 
@@ -190,13 +191,13 @@ impl Company {
         contacts[first..].sort_unstable_by_key(|contact| contact.key);
     }
 
-    /// Tells links where their far ends are for the substep from `start` to `start + h` seconds of the step.
-    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], (start, h): (f64, f64)) {
+    /// Tells links where their far ends are for a substep.
+    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], substep: Substep) {
         for tie in ties {
             let End::Linked(link) = tie.end else { continue };
-            let Some(far) = self.mates.far(&link, h) else { continue };
+            let Some(far) = self.mates.far(&link, substep.span_s) else { continue };
             let point = tie.mix(positions[tie.segment], positions[tie.segment + 1]);
-            tie.aim(&far, point, (start, h));
+            tie.set_far_end(&far, point, substep);
         }
     }
 

@@ -10,7 +10,7 @@ use glam::DVec3;
 
 /// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of what differs from
 /// the rigid motion with the same momentum.
-pub fn take(excess: f64, state: &mut RodState, matter: &RodMaterial, division: &Discretization) {
+pub fn remove(excess: f64, state: &mut RodState, matter: &RodMaterial, division: &Discretization) {
     let held = matter.held[0] || matter.held[1];
     let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };
     rigid.add(state, -1.0);
@@ -68,12 +68,12 @@ mod tests {
     use crate::rod::tests::{free_tube, shake};
 
     #[test]
-    fn energy_is_taken_and_momentum_is_kept() {
+    fn removing_energy_keeps_momentum() {
         let tube = free_tube(12);
         let (matter, division) = (tube.matter(), tube.division());
         let mut state = shake(&tube, 3);
         let (energy, momentum) = (state.kinetic_j, state.momentum(matter, division));
-        take(0.3 * energy, &mut state, matter, division);
+        remove(0.3 * energy, &mut state, matter, division);
         let (after, kept) = (state.kinetic_j, state.momentum(matter, division));
         // rounding of sums of a dozen terms
         assert!((after - 0.7 * energy).abs() < 1e-12 * energy, "{after} of {energy}");

@@ -9,29 +9,29 @@ use super::banded_ldl::Row;
 use super::rotation::{bend_share, cayley};
 use super::state::{Joint, RodMaterial, RodState};
 use super::sym3::Sym3;
-use super::system::Scene;
+use super::system::SubstepProblem;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Below this difference between the turns of a joint's two segments, radians, the work of the joint is indistinguishable from rounding.
 const TURN_MIN_RAD: f64 = 1e-6;
 
-/// Fills `rhs` with M (v_n − v) + 2 h f̄, and adds springs to both; `scene.h` is half the substep.
-pub fn fill_mean(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
-    fill_segments(scene, (now, next), rhs);
-    fill_joints(scene, (now, next), rhs);
-    add_springs(scene, (now, next), rows, rhs);
+/// Fills `rhs` with M (v_n − v) + 2 h f̄, and adds springs to both; `problem.h` is half the substep.
+pub fn fill_mean(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rows: &mut [Row], rhs: &mut [DVec3]) {
+    fill_segments(problem, now, next, rhs);
+    fill_joints(problem, now, next, rhs);
+    add_springs(problem, now, next, rows, rhs);
 }
 
 /// Change of momentum, weight, stretch and shear (eq. 45, 47).
-fn fill_segments(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
-    let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *scene.matter;
-    let h = scene.h;
+fn fill_segments(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
+    let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *problem.matter;
+    let h = problem.h;
     let want = |slot: usize| now.u[slot] - next.u[slot];
     let stiffness = DVec3::new(ga, ga, ea);
     let mut a = want(0);
     rhs[0] = DVec3::ZERO;
     for k in 0..now.q.len() {
-        let (l, rest) = (scene.division.length[k], DVec3::Z * scene.division.chord[k]);
+        let (l, rest) = (problem.division.length[k], DVec3::Z * problem.division.chord[k]);
         let (before, after) = (DMat3::from_quat(now.q[k]), DMat3::from_quat(next.q[k]));
         let (e0, e1) = (now.e[k], next.e[k]);
         let strains = before.transpose() * e0 + after.transpose() * e1 - rest * 2.0;
@@ -49,26 +49,26 @@ fn fill_segments(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &m
 }
 
 /// Bend and twist (eq. 48).
-fn fill_joints(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rhs: &mut [DVec3]) {
-    let Scene { matter, division, .. } = *scene;
+fn fill_joints(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
+    let SubstepProblem { matter, division, .. } = *problem;
     let (count, wall) = (now.q.len(), division.wall);
     let ends = |k: usize| (now.q[k], next.q[k]);
     if matter.clamp[0] {
-        rhs[1] -= moment(scene, 0, [(wall[0], wall[0]), ends(0)]) * scene.h;
+        rhs[1] -= moment(problem, 0, [(wall[0], wall[0]), ends(0)]) * problem.h;
     }
     for k in 1..count {
-        let m = moment(scene, k, [ends(k - 1), ends(k)]) * scene.h;
+        let m = moment(problem, k, [ends(k - 1), ends(k)]) * problem.h;
         rhs[2 * k - 1] += m;
         rhs[2 * k + 1] -= m;
     }
     if matter.clamp[1] {
-        rhs[2 * count - 1] += moment(scene, count, [ends(count - 1), (wall[1], wall[1])]) * scene.h;
+        rhs[2 * count - 1] += moment(problem, count, [ends(count - 1), (wall[1], wall[1])]) * problem.h;
     }
 }
 
 /// Twice the mean moment of joint `k` between two segments, each given as (before, after).
-fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DVec3 {
-    let Scene { matter, division, .. } = *scene;
+fn moment(problem: &SubstepProblem<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DVec3 {
+    let SubstepProblem { matter, division, .. } = *problem;
     let joints = [Joint::between(division, k, left.0, right.0), Joint::between(division, k, left.1, right.1)];
     let own = [left.0.conjugate() * joints[0].strain, left.1.conjugate() * joints[1].strain];
     let stiffness = DVec3::new(matter.ei, matter.ei, matter.gj) * division.joint[k];
@@ -86,9 +86,9 @@ fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DV
 }
 
 /// Attachments: the mean of the forces at both ends of the substep, corrected along the displacement so that work equals energy change.
-fn add_springs(scene: &Scene<'_>, (now, next): (&RodState, &RodState), rows: &mut [Row], rhs: &mut [DVec3]) {
-    let h = scene.h;
-    for spring in scene.springs {
+fn add_springs(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rows: &mut [Row], rhs: &mut [DVec3]) {
+    let h = problem.h;
+    for spring in problem.springs {
         let (k, slot) = (spring.node, 2 * spring.node);
         let (before, after) = (spring.linear(now.x[k]), spring.linear(next.x[k]));
         let (way, sum) = (next.x[k] - now.x[k], before.force + after.force);
@@ -106,17 +106,24 @@ mod tests {
     use crate::rod::tests::{free_tube, shake};
 
     #[test]
-    fn mean_forces_do_what_energies_change_by_and_drive_no_momentum() {
+    fn mean_forces_do_work_equal_to_the_energy_change_and_keep_momentum() {
         let tube = free_tube(9);
         let (matter, division) = (tube.matter(), tube.division());
         let (mut now, mut next) = (shake(&tube, 3), shake(&tube, 8));
         // elasticity only: both velocities are zero
         now.u.fill(DVec3::ZERO);
         next.u.fill(DVec3::ZERO);
-        let scene =
-            Scene { matter, division, springs: &[], ties: &[], h: 1.0, until: 0.0, integrator: Default::default() };
+        let problem = SubstepProblem {
+            matter,
+            division,
+            springs: &[],
+            ties: &[],
+            h: 1.0,
+            until: 0.0,
+            integrator: Default::default(),
+        };
         let (mut rows, mut rhs) = (vec![Row::ZERO; now.u.len()], vec![DVec3::ZERO; now.u.len()]);
-        fill_mean(&scene, (&now, &next), &mut rows, &mut rhs);
+        fill_mean(&problem, &now, &next, &mut rows, &mut rhs);
         let mut work = 0.0;
         let (mut push, mut turn) = (DVec3::ZERO, DVec3::ZERO);
         for k in 0..now.x.len() {

@@ -28,7 +28,7 @@ impl Footing {
             slots.linear().iter().map(size).sum()
         };
         let carry = |feet: &mut Vec<Foot>| mates.carry(contacts.impulses(), rows.len(), feet);
-        self.stance.find(contacts.footholds(), carry, inertia);
+        self.stance.find(contacts.supporting_contacts(), carry, inertia);
         if self.stance.is_empty() {
             return;
         }

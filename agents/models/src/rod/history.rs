@@ -17,12 +17,12 @@ pub struct History {
     /// The length of that substep, seconds; zero where there is no past.
     span_s: f64,
     /// Energy that backward differences have lost since velocities last jumped, and may regain, J.
-    spare_j: f64,
+    reserve_j: f64,
 }
 
 impl History {
     /// Stores the changes of a substep of `h` seconds.
-    pub fn learn(&mut self, from: &RodState, to: &RodState, h: f64) {
+    pub fn record(&mut self, from: &RodState, to: &RodState, h: f64) {
         self.span_s = h;
         self.gain.clear();
         self.gain.extend(to.u.iter().zip(&from.u).map(|(b, a)| *b - *a));
@@ -39,22 +39,22 @@ impl History {
     pub fn copy_from(&mut self, other: &Self) {
         self.way.clone_from(&other.way);
         self.gain.clone_from(&other.gain);
-        (self.span_s, self.spare_j) = (other.span_s, other.spare_j);
+        (self.span_s, self.reserve_j) = (other.span_s, other.reserve_j);
     }
 
     /// Discards the past: velocities have jumped, or the tube was divided anew.
     pub fn forget(&mut self) {
-        (self.span_s, self.spare_j) = (0.0, 0.0);
+        (self.span_s, self.reserve_j) = (0.0, 0.0);
     }
 
     /// Energy that a substep may regain, J: backward differences alternately lose and regain it, and lose on the whole.
-    pub fn spare_j(&self) -> f64 {
-        self.spare_j
+    pub fn reserve_j(&self) -> f64 {
+        self.reserve_j
     }
 
     /// Books the rise of energy of a substep, J; a loss is stored for later.
     pub fn spend(&mut self, rise_j: f64) {
-        self.spare_j = (self.spare_j - rise_j).max(0.0);
+        self.reserve_j = (self.reserve_j - rise_j).max(0.0);
     }
 
     /// Predicted change of velocity in the next `h` seconds, by linear extrapolation.

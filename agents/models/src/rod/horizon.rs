@@ -11,7 +11,7 @@ use super::method::Integrator;
 use super::publish::bounds;
 use super::state::RodState;
 use super::step::{Setting, Stepper};
-use super::system::{Iterate, Scene, assemble};
+use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::DVec3;
 use metachron_contact::Law;
@@ -131,13 +131,13 @@ impl Tube {
     pub(super) fn foretell(&mut self, dt: f64) {
         let Self { now, matter, division, accelerations: list, stepper, .. } = self;
         list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
-        momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
+        momenta(matter.mu, matter.rotary, division.length.iter().copied().zip(now.t.iter().copied()), list);
         list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
         list.iter_mut().zip(stepper.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * dt);
         let standing = stepper.footing.factor();
         self.standing_accelerations.extend(list.iter().filter(|_| standing.is_some()));
         let accelerate = |factor: &Factor, list: &mut Vec<DVec3>| {
-            respond((factor, matter.held), list);
+            respond(factor, matter.held, list);
             list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
         };
         accelerate(stepper.factor(), list);
@@ -162,7 +162,7 @@ impl Stepper {
         if span_s.is_none() && (h <= 0.0 || self.factor.slots() != now.u.len()) {
             return None;
         }
-        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        let scene = SubstepProblem { matter, division, springs, ties: &[], h, until: h, integrator };
         let Self { rows, rhs, factor, horizon, footing, .. } = self;
         assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
         let lies = !footing.stance.is_empty();

@@ -35,7 +35,7 @@ pub struct CurveInertia {
 
 impl CurveInertia {
     /// Copies the factor of a substep of `span_s` seconds and the velocities of all slots, into the existing storage.
-    pub(super) fn copy_from(&mut self, (factor, span_s): (&Factor, f64), held: [bool; 2], velocities: &[DVec3]) {
+    pub(super) fn copy_from(&mut self, factor: &Factor, span_s: f64, held: [bool; 2], velocities: &[DVec3]) {
         self.span_s = span_s;
         self.factor.copy_from(factor);
         self.held = held;
@@ -44,12 +44,12 @@ impl CurveInertia {
     }
 
     /// Copies the supports and the accelerations there.
-    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
+    pub(super) fn copy_supports(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
     /// Copies mass, rotary inertia and damping, and lengths and directions of segments.
-    pub(super) fn weigh(&mut self, matter: &RodMaterial, length_m: &[f64], directions: &[DVec3]) {
+    pub(super) fn copy_masses(&mut self, matter: &RodMaterial, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();
         self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));
@@ -64,7 +64,7 @@ impl ImpulseResponse for CurveInertia {
 
     fn respond(&self, impulses: &mut [DVec3], supported: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        respond((self.standing.factor().filter(|_| supported).unwrap_or(&self.factor), self.held), impulses);
+        respond(self.standing.factor().filter(|_| supported).unwrap_or(&self.factor), self.held, impulses);
     }
 
     fn append_mobilities(&self, into: &mut Vec<f64>) {
@@ -121,13 +121,13 @@ impl CurveResponse for CurveInertia {
     }
 
     fn momenta(&self, velocities: &mut [DVec3]) {
-        momenta((self.mu, self.rotary), self.segments.iter().copied(), velocities);
+        momenta(self.mu, self.rotary, self.segments.iter().copied(), velocities);
     }
 }
 
 /// Turns velocities in slots into momenta, by mass and rotary inertia per length and the length and direction of each segment
 /// (docs/theory/rod.md, eq. 11).
-pub(super) fn momenta((mu, rotary): (f64, f64), segments: impl Iterator<Item = (f64, DVec3)>, list: &mut [DVec3]) {
+pub(super) fn momenta(mu: f64, rotary: f64, segments: impl Iterator<Item = (f64, DVec3)>, list: &mut [DVec3]) {
     let mut left = list[0];
     list[0] = DVec3::ZERO;
     for (k, (length_m, t)) in segments.enumerate() {

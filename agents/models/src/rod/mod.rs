@@ -39,6 +39,7 @@ mod spec;
 mod state;
 mod step;
 mod step_doubling;
+mod substep;
 mod sym3;
 mod system;
 #[cfg(test)]

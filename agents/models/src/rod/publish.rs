@@ -52,12 +52,12 @@ impl Tube {
         if company.is_watched() || self.steps == 0 {
             into.acceleration = if self.steps == 0 { self.spec.gravity } else { self.acceleration };
             let inertia = into.inertia.response_mut::<CurveInertia>();
-            let (answer, lies) = self.stepper.told();
-            inertia.copy_from(answer, self.matter.held, &self.now.u);
-            inertia.stand(lies, &self.standing_accelerations);
+            let response = self.stepper.published_response();
+            inertia.copy_from(response.factor, response.span_s, self.matter.held, &self.now.u);
+            inertia.copy_supports(response.supported, &self.standing_accelerations);
             inertia.accelerations.clone_from(&self.accelerations);
             inertia.ahead_s = self.ahead_s;
-            inertia.weigh(&self.matter, &self.division.length, &self.now.t);
+            inertia.copy_masses(&self.matter, &self.division.length, &self.now.t);
         } else {
             into.inertia = Inertia::Immovable;
         }

@@ -8,11 +8,20 @@ use super::rotation::between;
 use super::state::{RodMaterial, RodState};
 use glam::{DQuat, DVec3};
 
+/// A state of a tube on the division that it belongs to.
+#[derive(Debug, Clone, Copy)]
+pub struct MeshedRod<'a> {
+    /// The state.
+    pub state: &'a RodState,
+    /// The division.
+    pub division: &'a Discretization,
+}
+
 /// Working storage.
 #[derive(Debug, Clone, Default)]
 pub struct Remesher {
     /// Rotations from rest to now, sampled at the arc lengths `at`.
-    turns: Vec<DQuat>,
+    rotations: Vec<DQuat>,
     at: Vec<f64>,
     /// Strains beyond rest in the segments' own axes.
     strains: Vec<DVec3>,
@@ -35,63 +44,51 @@ impl Remesher {
         &self.arcs
     }
 
-    /// Writes the state `from` on division `old` into `to` on division `new`.
-    pub fn carry(
-        &mut self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    /// Writes the state of `old` into `to` on division `new`.
+    pub fn transfer(&mut self, matter: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         to.resize(new.segments());
-        self.learn(matter, from, old);
-        self.shape(matter, (from, old), (to, new));
-        self.motion(matter, (from, old), (to, new));
+        self.sample(matter, old);
+        self.shape(matter, old, to, new);
+        self.motion(matter, old, to, new);
     }
 
     /// Samples rotations and strains of the old segments relative to rest.
-    fn learn(&mut self, matter: &RodMaterial, from: &RodState, old: &Discretization) {
-        self.turns.clear();
+    fn sample(&mut self, matter: &RodMaterial, old: MeshedRod<'_>) {
+        let MeshedRod { state: from, division: old } = old;
+        self.rotations.clear();
         self.at.clear();
         self.strains.clear();
         if matter.clamp[0] {
-            self.turns.push(DQuat::IDENTITY); // a wall does not turn
+            self.rotations.push(DQuat::IDENTITY); // a wall does not turn
             self.at.push(0.0);
         }
         for k in 0..old.segments() {
-            self.turns.push(from.q[k] * old.frame[k].conjugate());
+            self.rotations.push(from.q[k] * old.frame[k].conjugate());
             self.at.push(old.middle_m(k));
             self.strains.push(from.q[k].conjugate() * from.e[k] - DVec3::Z * old.chord[k]);
         }
         if matter.clamp[1] {
-            self.turns.push(DQuat::IDENTITY);
+            self.rotations.push(DQuat::IDENTITY);
             self.at.push(old.total_m());
         }
     }
 
     /// Frames by interpolated rotations (eq. 30), positions by summing the strained segments (eq. 31).
-    fn shape(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn shape(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         to.x[0] = from.x[0];
         for k in 0..new.segments() {
             let s = new.middle_m(k);
-            to.q[k] = (self.turn_at(s) * new.frame[k]).normalize();
+            to.q[k] = (self.rotation_at(s) * new.frame[k]).normalize();
             let strain = self.strain_at(old, s) + DVec3::Z * new.chord[k];
             to.x[k + 1] = to.x[k] + to.q[k] * strain * new.length[k];
         }
-        self.place(matter, (from, old), (to, new));
+        self.place(matter, rod, to, new);
     }
 
     /// Restores held ends, or the centre of mass where none is held.
-    fn place(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn place(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         let gap = from.x[old.segments()] - to.x[new.segments()];
         match matter.held {
             [true, false] => {}
@@ -109,12 +106,8 @@ impl Remesher {
     }
 
     /// Velocities by interpolation, then the missing momentum spread evenly over the free nodes (eq. 32).
-    fn motion(
-        &self,
-        matter: &RodMaterial,
-        (from, old): (&RodState, &Discretization),
-        (to, new): (&mut RodState, &Discretization),
-    ) {
+    fn motion(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+        let MeshedRod { state: from, division: old } = rod;
         let count = new.segments();
         for (k, &s) in new.arc_m.iter().enumerate() {
             let (left, w) = old.locate(s);
@@ -133,15 +126,15 @@ impl Remesher {
         let mass: f64 = (0..=count).filter(|&k| free(k)).map(share).sum();
         // twice: the second pass removes the rounding error of the first
         for _ in 0..2 {
-            let lack = (flow(from, old) - flow(to, new)) / mass;
-            (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += lack);
+            let missing = (flow(from, old) - flow(to, new)) / mass;
+            (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += missing);
         }
     }
 
-    fn turn_at(&self, s: f64) -> DQuat {
+    fn rotation_at(&self, s: f64) -> DQuat {
         let (left, w) = bracket(self.at.len(), |i| self.at[i], s);
         let right = (left + 1).min(self.at.len() - 1);
-        between(self.turns[left], self.turns[right], w)
+        between(self.rotations[left], self.rotations[right], w)
     }
 
     fn strain_at(&self, old: &Discretization, s: f64) -> DVec3 {

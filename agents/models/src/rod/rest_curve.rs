@@ -26,13 +26,13 @@ const INVERSIONS: usize = 4;
 struct Span {
     from: DVec3,
     to: DVec3,
-    leave: DVec3,
-    arrive: DVec3,
+    slope_start: DVec3,
+    slope_end: DVec3,
 }
 
 /// A frame at the start of a bin.
 #[derive(Debug, Clone, Copy)]
-struct Knot {
+struct FrameSample {
     arc_m: f64,
     frame: DQuat,
 }
@@ -41,7 +41,7 @@ struct Knot {
 #[derive(Debug, Clone)]
 pub struct RestCurve {
     spans: Vec<Span>,
-    knots: Vec<Knot>,
+    samples: Vec<FrameSample>,
     straight: bool,
     unbent: bool,
     twist_rad: f64,
@@ -62,14 +62,14 @@ impl Span {
     fn at(&self, w: f64) -> DVec3 {
         let (w2, w3) = (w * w, w * w * w);
         let s = 3.0 * w2 - 2.0 * w3;
-        self.from + (self.to - self.from) * s + self.leave * (w3 - 2.0 * w2 + w) + self.arrive * (w3 - w2)
+        self.from + (self.to - self.from) * s + self.slope_start * (w3 - 2.0 * w2 + w) + self.slope_end * (w3 - w2)
     }
 
     fn slope(&self, w: f64) -> DVec3 {
         let w2 = w * w;
         (self.to - self.from) * (6.0 * (w - w2))
-            + self.leave * (3.0 * w2 - 4.0 * w + 1.0)
-            + self.arrive * (3.0 * w2 - 2.0 * w)
+            + self.slope_start * (3.0 * w2 - 4.0 * w + 1.0)
+            + self.slope_end * (3.0 * w2 - 2.0 * w)
     }
 
     fn length(&self, a: f64, b: f64) -> f64 {
@@ -87,17 +87,17 @@ impl RestCurve {
             let w = if i / BINS == spans.len() { 1.0 } else { (i % BINS) as f64 / BINS as f64 };
             span.slope(w).normalize()
         };
-        let mut knots = vec![Knot { arc_m: 0.0, frame: first_frame(tangent(0)) }];
+        let mut samples = vec![FrameSample { arc_m: 0.0, frame: first_frame(tangent(0)) }];
         for i in 0..spans.len() * BINS {
             let (span, bin) = (&spans[i / BINS], i % BINS);
             let (a, b) = (bin as f64 / BINS as f64, (bin + 1) as f64 / BINS as f64);
-            let from = knots[i];
+            let from = samples[i];
             let frame = transport(from.frame, span.at(b) - span.at(a), tangent(i), tangent(i + 1));
             // a line is measured as a whole: sums of bins would round its length
             let arc_m = if straight { (path[1] - path[0]).length() * b } else { from.arc_m + span.length(a, b) };
-            knots.push(Knot { arc_m, frame });
+            samples.push(FrameSample { arc_m, frame });
         }
-        Self { spans, knots, straight, unbent: straight, twist_rad: 0.0 }
+        Self { spans, samples, straight, unbent: straight, twist_rad: 0.0 }
     }
 
     /// The same for a tube that the path strains: one that is straight when unloaded, or whose sections are twisted
@@ -123,7 +123,7 @@ impl RestCurve {
 
     /// Rest length, metres.
     pub fn length_m(&self) -> f64 {
-        self.knots[self.knots.len() - 1].arc_m
+        self.samples[self.samples.len() - 1].arc_m
     }
 
     /// The point at `arc_m`, clamped to the curve.
@@ -131,27 +131,27 @@ impl RestCurve {
         let arc_m = arc_m.clamp(0.0, self.length_m());
         if self.straight {
             let Span { from, to, .. } = self.spans[0];
-            let (tangent, frame) = ((to - from).normalize(), self.knots[0].frame);
+            let (tangent, frame) = ((to - from).normalize(), self.samples[0].frame);
             return Station { position: from.lerp(to, arc_m / self.length_m()), tangent, frame };
         }
-        let right = self.knots.partition_point(|k| k.arc_m <= arc_m).clamp(1, self.knots.len() - 1);
-        let knot = self.knots[right - 1];
+        let right = self.samples.partition_point(|k| k.arc_m <= arc_m).clamp(1, self.samples.len() - 1);
+        let sample = self.samples[right - 1];
         let (span, bin) = (&self.spans[(right - 1) / BINS], (right - 1) % BINS);
         let start = bin as f64 / BINS as f64;
-        let size = self.knots[right].arc_m - knot.arc_m;
-        let mut w = start + (arc_m - knot.arc_m) / size / BINS as f64;
+        let size = self.samples[right].arc_m - sample.arc_m;
+        let mut w = start + (arc_m - sample.arc_m) / size / BINS as f64;
         for _ in 0..INVERSIONS {
-            w -= (span.length(start, w) - (arc_m - knot.arc_m)) / span.slope(w).length();
+            w -= (span.length(start, w) - (arc_m - sample.arc_m)) / span.slope(w).length();
         }
         let w = w.clamp(0.0, 1.0);
         let tangent = span.slope(w).normalize();
-        let frame = unit(shortest_arc(knot.frame * DVec3::Z, tangent) * knot.frame).normalize();
+        let frame = unit(shortest_arc(sample.frame * DVec3::Z, tangent) * sample.frame).normalize();
         Station { position: span.at(w), tangent, frame }
     }
 
     /// The angle that frames sweep along the whole curve, radians: turning of the tangent plus twist.
     pub fn turning_rad(&self) -> f64 {
-        let tangents = self.knots.iter().map(|k| k.frame * DVec3::Z);
+        let tangents = self.samples.iter().map(|k| k.frame * DVec3::Z);
         let bends = tangents.clone().zip(tangents.skip(1)).map(|(a, b)| libm::atan2(a.cross(b).length(), a.dot(b)));
         bends.sum::<f64>() + self.twist_rad.abs()
     }
@@ -172,7 +172,12 @@ fn spans_of(path: &[DVec3]) -> Vec<Span> {
         }
     };
     (0..chords.len())
-        .map(|i| Span { from: path[i], to: path[i + 1], leave: slope(i) * steps[i], arrive: slope(i + 1) * steps[i] })
+        .map(|i| Span {
+            from: path[i],
+            to: path[i + 1],
+            slope_start: slope(i) * steps[i],
+            slope_end: slope(i + 1) * steps[i],
+        })
         .collect()
 }
 

@@ -9,13 +9,13 @@ use super::energy_momentum::fill_mean;
 use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
 use super::state::{RodMaterial, RodState};
-use super::step::{Lost, Stepper, TURN_MAX_RAD, Verdict};
-use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
+use super::step::{Divergence, Stepper, TURN_MAX_RAD, Trial, Verdict};
+use super::system::{Iterate, SubstepProblem, assemble, fill_matrix, hold_ends};
 
 /// Newton iterations of BDF2 (least, most): with a single one it damps like implicit Euler, and an unconverged one never comes to rest.
-const BACK_ITERATIONS: (u32, u32) = (2, 6);
+const BDF2_ITERATIONS: (u32, u32) = (2, 6);
 /// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-4.
-const BACK_SLACK: f64 = 1e-8;
+const BDF2_SLACK: f64 = 1e-8;
 /// The most Newton iterations of the energy-momentum rule: one that needs more has stalled, and halving the substep is cheaper.
 const MEAN_ITERATIONS: u32 = 12;
 /// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-7.
@@ -23,62 +23,62 @@ const MEAN_ITERATIONS: u32 = 12;
 const MEAN_SLACK: f64 = 1e-14;
 
 impl Stepper {
-    /// One trial substep of second order (eq. 43–48); `bound` limits turns, `divide` allows a smaller substep.
-    pub(super) fn glide(
+    /// One trial substep of second order (eq. 43–48).
+    pub(super) fn attempt_second_order(
         &mut self,
         now: &RodState,
-        scene: &Scene<'_>,
-        (bound, divide): (bool, bool),
-    ) -> Result<Verdict, Lost> {
-        let free = scene.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
+        problem: &SubstepProblem<'_>,
+        trial: Trial,
+    ) -> Result<Verdict, Divergence> {
+        let free = problem.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
         if free {
-            let ended = match scene.integrator {
-                Integrator::EnergyMomentum => self.keep(now, scene),
-                _ => self.look_back(now, scene),
+            let converged = match problem.integrator {
+                Integrator::EnergyMomentum => self.solve_energy_momentum(now, problem),
+                _ => self.solve_bdf2(now, problem),
             };
-            let rise = self.energy_rise(now, scene);
-            let ended = ended && rise <= self.past.spare_j() && self.next.is_finite();
-            if bound && !(ended && self.farthest_turn(now) <= TURN_MAX_RAD) {
+            let rise = self.energy_rise(now, problem);
+            let converged = converged && rise <= self.past.reserve_j() && self.next.is_finite();
+            if trial.bounds_turns && !(converged && self.farthest_turn(now) <= TURN_MAX_RAD) {
                 return Ok(Verdict::TooFar);
             }
-            if ended && !self.would_touch(now, scene) {
+            if converged && !self.would_touch(now, problem) {
                 self.past.spend(rise);
                 return Ok(Verdict::Good);
             }
         }
-        self.attempt_euler(now, scene, (bound, divide))
+        self.attempt_euler(now, problem, trial)
     }
 
     /// Backward differences (eq. 43): implicit Euler of another length from another state; returns whether the iteration converged.
-    fn look_back(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
+    fn solve_bdf2(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
         let mut start = std::mem::take(&mut self.ahead);
-        let h = self.past.start(now, &mut start, scene.h);
-        let scene = Scene { h, ..*scene };
-        self.guess(now, &start, (h, scene.h));
-        let mut ended = false;
-        for done in 1..=BACK_ITERATIONS.1 {
-            self.next.strain(scene.matter, scene.division);
+        let h = self.past.start(now, &mut start, problem.h);
+        let problem = SubstepProblem { h, ..*problem };
+        self.predict(now, &start, h, problem.h);
+        let mut converged = false;
+        for done in 1..=BDF2_ITERATIONS.1 {
+            self.next.strain(problem.matter, problem.division);
             let iterate = Iterate { start: &start, at: &self.next, first: false };
-            assemble(&scene, &iterate, &mut self.rows, &mut self.rhs);
+            assemble(&problem, &iterate, &mut self.rows, &mut self.rhs);
             self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 break;
             }
             self.factor.solve(&mut self.rhs);
             let at_work = now.kinetic_j + now.elastic_j + self.next.elastic_j;
-            ended = done >= BACK_ITERATIONS.0 && self.change_j(&scene) <= BACK_SLACK * at_work;
-            self.follow(&start, h);
-            if ended {
+            converged = done >= BDF2_ITERATIONS.0 && self.change_j(&problem) <= BDF2_SLACK * at_work;
+            self.update_iterate(&start, h);
+            if converged {
                 break;
             }
         }
-        self.next.strain(scene.matter, scene.division);
+        self.next.strain(problem.matter, problem.division);
         self.ahead = start;
-        ended
+        converged
     }
 
     /// The first iterate: velocities extrapolated from the past, and the positions they reach from `start`.
-    fn guess(&mut self, now: &RodState, start: &RodState, (h, whole): (f64, f64)) {
+    fn predict(&mut self, now: &RodState, start: &RodState, h: f64, whole: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -94,7 +94,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves accordingly (eq. 20).
-    fn follow(&mut self, start: &RodState, h: f64) {
+    fn update_iterate(&mut self, start: &RodState, h: f64) {
         let Self { next, rhs, .. } = self;
         next.u.iter_mut().zip(&*rhs).for_each(|(u, change)| *u += *change);
         for (k, x) in next.x.iter_mut().enumerate() {
@@ -109,35 +109,35 @@ impl Stepper {
     /// converged.
     ///
     /// Damping of the mean velocity would not act on motion that changes sign in every substep.
-    fn keep(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
-        let slower = libm::exp(-0.5 * scene.h * scene.matter.damping);
-        let undamped = RodMaterial { damping: 0.0, ..*scene.matter };
+    fn solve_energy_momentum(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
+        let decay = libm::exp(-0.5 * problem.h * problem.matter.damping);
+        let undamped = RodMaterial { damping: 0.0, ..*problem.matter };
         let mut start = std::mem::take(&mut self.ahead);
         start.copy_from(now);
-        start.u.iter_mut().for_each(|u| *u *= slower);
-        let ended = self.keep_undamped(&start, &Scene { matter: &undamped, ..*scene });
+        start.u.iter_mut().for_each(|u| *u *= decay);
+        let converged = self.solve_undamped(&start, &SubstepProblem { matter: &undamped, ..*problem });
         self.ahead = start;
-        self.next.u.iter_mut().for_each(|u| *u *= slower);
-        self.next.strain(scene.matter, scene.division);
-        ended
+        self.next.u.iter_mut().for_each(|u| *u *= decay);
+        self.next.strain(problem.matter, problem.division);
+        converged
     }
 
-    fn keep_undamped(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
-        let half = 0.5 * scene.h;
-        let tangent = Scene { h: half, ..*scene };
-        self.guess_mean(now, scene.h);
+    fn solve_undamped(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
+        let half = 0.5 * problem.h;
+        let tangent = SubstepProblem { h: half, ..*problem };
+        self.predict_mean(now, problem.h);
         for _ in 0..MEAN_ITERATIONS {
-            self.next.strain(scene.matter, scene.division);
+            self.next.strain(problem.matter, problem.division);
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
-            fill_mean(&tangent, (now, &self.next), &mut self.rows, &mut self.rhs);
-            hold_ends(scene.matter, &mut self.rows, &mut self.rhs);
+            fill_mean(&tangent, now, &self.next, &mut self.rows, &mut self.rhs);
+            hold_ends(problem.matter, &mut self.rows, &mut self.rhs);
             self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 return false;
             }
             self.factor.solve(&mut self.rhs);
-            let change_j = self.change_j(scene);
-            self.follow_mean(now, half);
+            let change_j = self.change_j(problem);
+            self.update_mean_iterate(now, half);
             if change_j <= MEAN_SLACK * (now.kinetic_j + now.elastic_j + self.next.elastic_j) {
                 return true;
             }
@@ -149,7 +149,7 @@ impl Stepper {
     }
 
     /// The first iterate of the energy-momentum rule.
-    fn guess_mean(&mut self, now: &RodState, h: f64) {
+    fn predict_mean(&mut self, now: &RodState, h: f64) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
         next.resize(count);
@@ -165,7 +165,7 @@ impl Stepper {
     }
 
     /// Adds the change of velocities just solved, and moves by the mean of old and new.
-    fn follow_mean(&mut self, now: &RodState, half: f64) {
+    fn update_mean_iterate(&mut self, now: &RodState, half: f64) {
         let Self { next, rhs, .. } = self;
         for k in 0..next.x.len() {
             next.u[2 * k] += rhs[2 * k];
@@ -187,14 +187,14 @@ impl Stepper {
     }
 
     /// The kinetic energy of the change of velocities in `rhs`, J, with lumped masses.
-    fn change_j(&self, scene: &Scene<'_>) -> f64 {
-        let matter = scene.matter;
+    fn change_j(&self, problem: &SubstepProblem<'_>) -> f64 {
+        let matter = problem.matter;
         let part = |(k, l): (usize, &f64)| {
             let (a, w, b) = (self.rhs[2 * k], self.rhs[2 * k + 1], self.rhs[2 * k + 2]);
             let nodes = matter.mu * 0.25 * (a.length_squared() + b.length_squared());
             l * (nodes + matter.rotary * 0.5 * w.length_squared())
         };
-        scene.division.length.iter().enumerate().map(part).sum()
+        problem.division.length.iter().enumerate().map(part).sum()
     }
 
     /// The largest turn of a segment from `now` to the next state, radians.
@@ -207,15 +207,16 @@ impl Stepper {
     }
 
     /// Whether the skin comes near itself or a fixed solid on the way to the next state.
-    fn would_touch(&mut self, now: &RodState, scene: &Scene<'_>) -> bool {
+    fn would_touch(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
         let Self { rhs, next, rows, factor, contacts, .. } = self;
         for k in 0..now.x.len() {
-            rhs[2 * k] = (next.x[k] - now.x[k]) / scene.h;
+            rhs[2 * k] = (next.x[k] - now.x[k]) / problem.h;
         }
         for k in 0..now.q.len() {
             rhs[2 * k + 1] = next.u[2 * k + 1];
         }
-        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        let solved =
+            Solved { matter: problem.matter, division: problem.division, rows, factor, h: problem.h, first: true };
         contacts.would_touch(&now.x, rhs, &solved)
     }
 }

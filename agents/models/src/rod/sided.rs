@@ -7,8 +7,7 @@ use super::company::Company;
 use super::discretization::Discretization;
 use crate::rod::banded_ldl::Factor;
 use glam::{DMat3, DVec3};
-use metachron_contact::laws::push_off_n;
-use metachron_contact::laws::{Drawn, End, Line};
+use metachron_contact::laws::{Approach, Line, LineEnd, LinkForces, push_off_n};
 use metachron_contact::{Law, Link, Mate};
 use metachron_contact::{Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, SimTime};
@@ -106,8 +105,8 @@ impl Sided {
         let (mut force, mut depth_m, mut places) = (DVec3::ZERO, 0.0_f64, 0);
         for touch in list.iter().filter(|touch| touch.gap_m < 0.0) {
             let velocity = self.mate.slots_of(touch).velocity(&self.velocities);
-            let law = (stiffness_n_m, damping_n_s_m);
-            let push = push_off_n((touch.gap_m, touch.normal, velocity), law, self.mate.friction());
+            let approach = Approach { gap_m: touch.gap_m, normal: touch.normal, velocity_m_s: velocity };
+            let push = push_off_n(approach, stiffness_n_m, damping_n_s_m, self.mate.friction());
             company.received().add_slots(&mine(touch), push * now.dt);
             force += push;
             depth_m = depth_m.max(-touch.gap_m);
@@ -170,8 +169,8 @@ impl Sided {
         let [x, y, z] = DVec3::AXES.map(|axis| self.answer_of(now, &slots, axis));
         let yields = DMat3::from_cols(x, y, z);
         let step = (around.time, now.dt);
-        let end = End { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
-        let Drawn { force, arriving, into_line } = self.line(neighbour.id, stiffness_n_m).draw(&end);
+        let end = LineEnd { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
+        let LinkForces { force, arriving, into_line } = self.line(neighbour.id, stiffness_n_m).forces(&end);
         company.received().add_slots(&slots, force * now.dt);
         self.answer(company, neighbour.id, Some((arriving, into_line)), now.dt);
         tell(company, neighbour.id, PairKind::Tlm, (force, 0.0, 1, now.dt));
@@ -182,7 +181,7 @@ impl Sided {
         let pair = neighbour.snapshot.pairs.iter().find(|pair| pair.with == around.me);
         let (at, wave): (SimTime, _) = (neighbour.snapshot.time, pair.and_then(|pair| pair.wave));
         let line = self.line(neighbour.id, stiffness);
-        line.hear(at, wave, (neighbour.owned, dt));
+        line.receive(at, wave, neighbour.owned, dt);
         line.arriving(around.time, dt)
     }
 

@@ -18,10 +18,8 @@ pub struct TubeSpec {
     /// Initial twist of the sections about the centre line, radians, evenly from 0 to this at the end;
     /// the tube springs back unless both ends are clamped; −1000 … 1000.
     pub twist_rad: f64,
-    /// The cross section and its stiffnesses.
+    /// The cross section: its stiffnesses and its inertia.
     pub section: Section,
-    /// Density × area in kg/m, > 0.
-    pub mass_per_length_kg_m: f64,
     /// Initial resolution of the simulation.
     pub resolution: Resolution,
     /// The resolutions that `set_resolution` may take.
@@ -56,7 +54,7 @@ pub struct TubeSpec {
     pub sleep: bool,
 }
 
-/// A tube's section: dimensions, and stiffnesses of stretch, shear, bend and twist.
+/// A tube's section: dimensions, stiffnesses of stretch, shear, bend and twist, and inertia.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
     /// Outer radius at rest, metres, > 0.
@@ -75,6 +73,8 @@ pub struct Section {
     pub ei_n_m2: f64,
     /// Twist stiffness G·J, N·m², > 0.
     pub gj_n_m2: f64,
+    /// Mass per length ρ·A, kg/m, > 0.
+    pub mass_per_length_kg_m: f64,
     /// Rotary inertia ρ·I about a diameter, per length, kg·m, > 0.
     pub rotary_kg_m: f64,
 }
@@ -119,10 +119,10 @@ pub struct Material {
 }
 
 impl TubeSpec {
-    /// A free tube along `path_m` of this section and mass per length, in `segments` equal parts: no supports, pulls, damping or
-    /// friction, no contact with itself or fixed solids, constant resolution, no sleep.
+    /// A free tube along `path_m` of this section, in `segments` equal parts: no supports, pulls, damping or friction, no contact with itself
+    /// or fixed solids, constant resolution, no sleep.
     #[must_use]
-    pub fn free(path_m: Vec<DVec3>, (section, mass_per_length_kg_m): (Section, f64), segments: usize) -> Self {
+    pub fn free(path_m: Vec<DVec3>, section: Section, segments: usize) -> Self {
         let length_m: f64 = path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
         let resolution = Resolution { eps_m: length_m / segments.max(1) as f64, n: 0 };
         Self {
@@ -130,7 +130,6 @@ impl TubeSpec {
             straight: false,
             twist_rad: 0.0,
             section,
-            mass_per_length_kg_m,
             resolution,
             range: ResolutionRange::fixed(resolution),
             segments: Some(segments),
@@ -152,15 +151,15 @@ impl TubeSpec {
 }
 
 impl Section {
-    /// The section of a round tube, and its mass per length in kg/m.
+    /// The section of a round tube.
     #[must_use]
-    pub fn hollow(radius_m: f64, wall_m: f64, material: Material) -> (Self, f64) {
+    pub fn hollow(radius_m: f64, wall_m: f64, material: Material) -> Self {
         let Material { young_pa, poisson, density_kg_m3, shear_factor } = material;
         let inner = (radius_m - wall_m).max(0.0);
         let area = std::f64::consts::PI * (radius_m * radius_m - inner * inner);
         let second_moment = std::f64::consts::FRAC_PI_4 * (radius_m.powi(4) - inner.powi(4));
         let shear_pa = young_pa / (2.0 * (1.0 + poisson));
-        let section = Self {
+        Self {
             radius_m,
             wall_m,
             young_pa,
@@ -169,9 +168,9 @@ impl Section {
             ga_n: shear_factor * shear_pa * area,
             ei_n_m2: young_pa * second_moment,
             gj_n_m2: shear_pa * 2.0 * second_moment,
+            mass_per_length_kg_m: density_kg_m3 * area,
             rotary_kg_m: density_kg_m3 * second_moment,
-        };
-        (section, density_kg_m3 * area)
+        }
     }
 }
 
@@ -183,12 +182,12 @@ mod tests {
     fn the_reference_tube_has_the_reference_stiffnesses() {
         // computed independently from the same radius, wall and modulus (tests/reference/cosserat_tube.json, case soft)
         let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-        let (section, mass) = Section::hollow(0.015, 0.002, material);
+        let section = Section::hollow(0.015, 0.002, material);
         let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} is not {b}");
         close(section.ea_n, 175.929_188_601_028_45);
         close(section.ga_n, 58.498_621_825_465_13);
         close(section.ei_n_m2, 0.017_329_025_077_201_295);
         close(section.gj_n_m2, 0.011_951_051_777_380_206);
-        close(mass, 0.184_725_648_031_079_88);
+        close(section.mass_per_length_kg_m, 0.184_725_648_031_079_88);
     }
 }

@@ -32,6 +32,15 @@ pub struct RodMaterial {
     pub held: [bool; 2],
 }
 
+/// A rod of a material, divided into segments.
+#[derive(Debug, Clone, Copy)]
+pub struct DividedRod<'a> {
+    /// The material.
+    pub matter: &'a RodMaterial,
+    /// The division.
+    pub division: &'a Discretization,
+}
+
 /// The share of the shear stiffness that tension may take from the Hessian, which keeps its form above (GA − b)|δu + u × φ|².
 const TENSION_SHARE: f64 = 0.9;
 

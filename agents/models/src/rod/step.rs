@@ -4,6 +4,7 @@
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
 use super::anchor_springs::{NodeSpring, Tie};
+use super::apply_impulses::{DisplacementLimit, FactoredSystem};
 use super::banded_ldl::InverseBlocks;
 use super::banded_ldl::{Factor, Row};
 use super::company::Company;
@@ -15,8 +16,9 @@ use super::history::History;
 use super::horizon::Horizon;
 use super::method::Integrator;
 use super::rotation::{exp, unit};
-use super::state::{RodMaterial, RodState};
-use super::system::{Iterate, Scene, assemble};
+use super::state::{DividedRod, RodMaterial, RodState};
+use super::substep::Substep;
+use super::system::{Iterate, SubstepProblem, assemble};
 use super::xpbd::Projector;
 use glam::{DMat3, DVec3};
 use metachron_contact::Presses;
@@ -55,7 +57,7 @@ pub struct Setting<'a> {
 
 /// The state stopped being finite: where it failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Lost {
+pub struct Divergence {
     /// The slot whose pivot failed; `None` where the state itself did.
     pub slot: Option<usize>,
 }
@@ -89,6 +91,25 @@ pub struct Stepper {
     pub(super) solves: u32,
 }
 
+/// What may end a trial substep without a next state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trial {
+    /// Whether no segment may turn further than [`TURN_MAX_RAD`].
+    pub bounds_turns: bool,
+    /// Whether a smaller substep may take its place.
+    pub may_divide: bool,
+}
+
+/// A tube's response to impulses, as it is published.
+pub struct PublishedResponse<'a> {
+    /// The factor of the predicted step, or else of the last one.
+    pub factor: &'a Factor,
+    /// The length of the last substep, seconds.
+    pub span_s: f64,
+    /// Its supports, and the factor that includes them.
+    pub supported: Lies<'a, Factor>,
+}
+
 /// The result of a trial substep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -102,34 +123,35 @@ impl Stepper {
     /// Advances `now`, whose strains are up to date, by the span; returns the number of substeps.
     ///
     /// # Errors
-    /// [`Lost`] where the next state is not finite; `now` is then the last state that was.
-    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
+    /// [`Divergence`] where the next state is not finite; `now` is then the last state that was.
+    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Divergence> {
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
-        let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
-        while gone < ticks {
-            let span = (tick * gone as f64, tick * size as f64);
-            self.company.aim(ties, &now.x, span);
-            let scene = Scene {
+        let (mut elapsed, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
+        while elapsed < ticks {
+            let substep = Substep { start_s: tick * elapsed as f64, span_s: tick * size as f64 };
+            self.company.aim(ties, &now.x, substep);
+            let problem = SubstepProblem {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
                 ties,
-                h: span.1,
-                until: tick * (gone + size) as f64,
+                h: substep.span_s,
+                until: tick * (elapsed + size) as f64,
                 integrator: setting.integrator,
             };
-            let stretched = span.1 * now.stretch > setting.longest_s && size > 1;
+            let stretched = substep.span_s * now.stretch > setting.longest_s && size > 1;
             let solves = self.solves;
-            if stretched || self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
+            let trial = Trial { bounds_turns: size > TURN_TICKS, may_divide: size > 1 };
+            if stretched || self.attempt(now, &problem, trial)? == Verdict::TooFar {
                 (self.solves, size) = (solves, size / 2);
                 continue;
             }
-            self.accept(now, ties, span);
-            self.remember(now, (setting.integrator, ties.is_empty()), span.1);
-            (gone, taken) = (gone + size, taken + 1);
+            self.accept(now, ties, substep);
+            self.remember(now, setting.integrator, ties.is_empty(), substep.span_s);
+            (elapsed, taken) = (elapsed + size, taken + 1);
             // double again, where that ends on the grid of the longer substep
-            if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
+            if size < 1 << HALVINGS && elapsed.is_multiple_of(2 * size) {
                 size *= 2;
             }
         }
@@ -140,13 +162,14 @@ impl Stepper {
     /// those of the step before.
     ///
     /// # Errors
-    /// [`Lost`] where the system cannot be factored; `now` is then untouched.
+    /// [`Divergence`] where the system cannot be factored; `now` is then untouched.
     pub fn receive(
         &mut self,
         now: &mut RodState,
         setting: &Setting<'_>,
-        (ties, way_m): (&mut [Tie], f64),
-    ) -> Result<(), Lost> {
+        ties: &mut [Tie],
+        way_m: f64,
+    ) -> Result<(), Divergence> {
         if self.company.received().is_empty() {
             return Ok(());
         }
@@ -154,32 +177,34 @@ impl Stepper {
         let Self { company, factor, footing, contacts, .. } = self;
         let push = company.received().push();
         let lies = Some(&*footing).filter(|footing| footing.stance.bears(push));
-        let answer = lies.and_then(Footing::factor).unwrap_or(factor);
+        let factor = lies.and_then(Footing::factor).unwrap_or(factor);
         let feet = lies.map_or(&[][..], |footing| footing.stance.on_others());
-        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
+        let system = FactoredSystem { factor, ties, feet };
+        let rod = DividedRod { matter: setting.matter, division: setting.division };
+        company.received().apply(now, system, rod, DisplacementLimit { walls: contacts, way_m });
         Ok(())
     }
 
     /// Factors the system of a substep about `now` where there is no factor of this division yet.
     ///
     /// # Errors
-    /// [`Lost`] where it cannot be factored.
-    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Lost> {
+    /// [`Divergence`] where it cannot be factored.
+    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Divergence> {
         if self.factor.slots() == now.u.len() {
             return Ok(());
         }
         let Setting { matter, division, springs, dt, substeps, integrator, .. } = *setting;
         let h = dt / f64::from(substeps);
-        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        let problem = SubstepProblem { matter, division, springs, ties: &[], h, until: h, integrator };
         match integrator {
             Integrator::SymplecticEuler | Integrator::Xpbd => {
-                self.assemble_light(now, &scene, integrator == Integrator::Xpbd);
+                self.assemble_light(now, &problem, integrator == Integrator::Xpbd);
             }
-            _ => assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
+            _ => assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
         }
         self.factor.factor(&self.rows).map_err(|slot| {
             self.factor.forget();
-            Lost { slot: Some(slot) }
+            Divergence { slot: Some(slot) }
         })
     }
 
@@ -203,29 +228,32 @@ impl Stepper {
         self.span_s
     }
 
-    /// Published data on the tube's response to impulses: the factor of the predicted step or else the last one, the length of the
-    /// last one, and the supports with the factor that includes them.
-    pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
+    /// The tube's response to impulses, as others are to expect it.
+    pub fn published_response(&self) -> PublishedResponse<'_> {
         let Self { footing, horizon, factor, span_s, .. } = self;
-        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
-        ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
+        let supported = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
+        PublishedResponse {
+            factor: horizon.factor().unwrap_or(factor),
+            span_s: *span_s,
+            supported: supported.filter(|(feet, _)| !feet.is_empty()),
+        }
     }
 
     /// Finds the supports of the tube after its last substep, where others need them (`watched`).
-    pub fn stand(&mut self, held: [bool; 2], watched: bool) {
+    pub fn find_supports(&mut self, held: [bool; 2], watched: bool) {
         let Self { footing, rows, contacts, company, .. } = self;
         if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
     }
 
     /// Computes the effective inverse mass of the strongest contact with each touched peer, by the factor of the last substep.
-    pub fn weigh(&mut self, held: [bool; 2]) {
+    pub fn update_inverse_masses(&mut self, held: [bool; 2]) {
         let Self { factor, company, .. } = self;
-        company.mates_mut().weigh(factor.slots(), |impulses| respond((factor, held), impulses));
+        company.mates_mut().weigh(factor.slots(), |impulses| respond(factor, held, impulses));
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, in the last
     /// substep (eq. 18); `None` where the segments have changed since, or no step was taken.
-    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &RodMaterial, slots: usize) -> Option<DMat3> {
+    pub fn inverse_mass(&self, segment: usize, w: f64, matter: &RodMaterial, slots: usize) -> Option<DMat3> {
         if self.factor.slots() != slots {
             return None;
         }
@@ -240,13 +268,13 @@ impl Stepper {
         Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
-    /// One trial substep, from `now` into `next`; of `smaller`, the first limits turns, the second allows a smaller substep.
-    fn attempt(&mut self, now: &RodState, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
-        match scene.integrator {
-            Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
-            Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
-            Integrator::ImplicitEuler => self.attempt_euler(now, scene, smaller),
-            Integrator::Bdf2 | Integrator::EnergyMomentum => self.glide(now, scene, smaller),
+    /// One trial substep, from `now` into `next`.
+    fn attempt(&mut self, now: &RodState, problem: &SubstepProblem<'_>, trial: Trial) -> Result<Verdict, Divergence> {
+        match problem.integrator {
+            Integrator::SymplecticEuler => self.step_symplectic_euler(now, problem).map(|()| Verdict::Good),
+            Integrator::Xpbd => self.step_xpbd(now, problem).map(|()| Verdict::Good),
+            Integrator::ImplicitEuler => self.attempt_euler(now, problem, trial),
+            Integrator::Bdf2 | Integrator::EnergyMomentum => self.attempt_second_order(now, problem, trial),
         }
     }
 
@@ -254,73 +282,73 @@ impl Stepper {
     pub(super) fn attempt_euler(
         &mut self,
         now: &RodState,
-        scene: &Scene<'_>,
-        (bound, divide): (bool, bool),
-    ) -> Result<Verdict, Lost> {
-        if let Err(lost) = self.solve(now, scene, true) {
-            return if divide { Ok(Verdict::TooFar) } else { Err(lost) };
+        problem: &SubstepProblem<'_>,
+        trial: Trial,
+    ) -> Result<Verdict, Divergence> {
+        if let Err(divergence) = self.solve(now, problem, true) {
+            return if trial.may_divide { Ok(Verdict::TooFar) } else { Err(divergence) };
         }
-        if bound && self.widest_turn() * scene.h > TURN_MAX_RAD {
+        if trial.bounds_turns && self.fastest_spin() * problem.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
-        self.advance(now, scene, true);
-        let mut rise = self.energy_rise(now, scene);
+        self.advance(now, problem, true);
+        let mut rise = self.energy_rise(now, problem);
         for _ in 0..ITERATIONS_MORE {
             // a state far out may have no next iterate: then the best so far is judged
-            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, scene, false).is_err() {
+            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, problem, false).is_err() {
                 break;
             }
-            self.advance(now, scene, false);
-            rise = self.energy_rise(now, scene);
+            self.advance(now, problem, false);
+            rise = self.energy_rise(now, problem);
         }
         let finite = self.next.is_finite();
-        if divide && (rise > 0.0 || !finite) {
+        if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
         }
         if rise > 0.0 {
-            energy_limiter::take(rise, &mut self.next, scene.matter, scene.division);
+            energy_limiter::remove(rise, &mut self.next, problem.matter, problem.division);
         }
-        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Lost { slot: None }) }
+        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
     /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
-    fn solve(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
+    fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
-        assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
-        self.answer()?;
-        self.touch(now, scene, first);
+        assemble(problem, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.factor_and_solve()?;
+        self.solve_contacts(now, problem, first);
         Ok(())
     }
 
     /// Factors and solves the assembled system, with the received impulses that act through the substep.
-    pub(super) fn answer(&mut self) -> Result<(), Lost> {
+    pub(super) fn factor_and_solve(&mut self) -> Result<(), Divergence> {
         self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
-        self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
+        self.factor.factor(&self.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
         Ok(())
     }
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    pub(super) fn touch(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
+    pub(super) fn solve_contacts(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
-        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        let solved = Solved { matter: problem.matter, division: problem.division, rows, factor, h: problem.h, first };
         // contact is a law of whole velocities, not of their change in an iteration
         let known = if first { &[][..] } else { &next.u[..] };
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
-        *pushed_j = contacts.act(&now.x, rhs, &solved, (company, first));
+        *pushed_j = contacts.act(&now.x, rhs, &solved, company);
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
     }
 
     /// The fastest spin in `rhs`, rad/s.
-    fn widest_turn(&self) -> f64 {
+    fn fastest_spin(&self) -> f64 {
         self.rhs.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt()
     }
 
     /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
-    pub(super) fn advance(&mut self, now: &RodState, scene: &Scene<'_>, first: bool) {
+    pub(super) fn advance(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) {
         let Self { next, rhs, .. } = self;
-        let (h, count) = (scene.h, now.q.len());
+        let (h, count) = (problem.h, now.q.len());
         next.resize(count);
         for k in 0..=count {
             let v = if first { rhs[2 * k] } else { next.u[2 * k] + rhs[2 * k] };
@@ -333,22 +361,22 @@ impl Stepper {
             next.u[2 * k + 1] = spin;
             next.q[k] = unit(exp(turn * h) * from);
         }
-        next.strain(scene.matter, scene.division);
+        next.strain(problem.matter, problem.division);
     }
 
     /// Energy of `next` beyond that of `now` and the work of pulls, contact and received impulses, less rounding, J (eq. 27).
-    pub(super) fn energy_rise(&self, now: &RodState, scene: &Scene<'_>) -> f64 {
-        let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
+    pub(super) fn energy_rise(&self, now: &RodState, problem: &SubstepProblem<'_>) -> f64 {
+        let (before, after) = (energy(now, problem.springs), energy(&self.next, problem.springs));
         // energy that friction removes must not be added elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
         let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
         work += fresh;
         effort += fresh.abs();
-        for tie in scene.ties {
+        for tie in problem.ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let x = tie.mix(self.next.x[a], self.next.x[b]);
             let v = tie.mix(self.next.u[2 * a], self.next.u[2 * b]);
-            let done = tie.force(x, v, scene.until).dot(x - tie.mix(now.x[a], now.x[b]));
+            let done = tie.force(x, v, problem.until).dot(x - tie.mix(now.x[a], now.x[b]));
             work += done;
             effort += done.abs();
         }
@@ -356,24 +384,25 @@ impl Stepper {
         let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted + effort;
         // the sums themselves round at their own size, and positions at theirs
         let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
-        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * scene.matter.ea * scene.division.total_m();
+        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * problem.matter.ea * problem.division.total_m();
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
     /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
-    fn remember(&mut self, now: &RodState, (integrator, untied): (Integrator, bool), h: f64) {
+    fn remember(&mut self, now: &RodState, integrator: Integrator, untied: bool, h: f64) {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;
         }
         if untied && self.company.is_empty() && !self.contacts.is_touching() {
-            self.past.learn(&self.next, now, h);
+            self.past.record(&self.next, now, h);
         } else {
             self.past.forget();
         }
     }
 
     /// Makes `next` the state and books the impulses of pulls and contacts.
-    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], (start, h): (f64, f64)) {
+    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], substep: Substep) {
+        let Substep { start_s: start, span_s: h } = substep;
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
         self.company.received().spend();
@@ -381,8 +410,8 @@ impl Stepper {
             let (a, b) = (tie.segment, tie.segment + 1);
             // constraints act after the tie: its impulse belongs to the velocity before them
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
-            let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
-            tie.book(point, (h, start + h));
+            let (x, v) = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
+            tie.record(x, v, substep);
         }
         if self.company.is_watched() {
             self.presses.note(self.contacts.impulses(), now.u.len(), h);

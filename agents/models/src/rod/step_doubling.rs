@@ -11,18 +11,18 @@ use super::method::Integrator;
 use super::state::RodState;
 use super::step::{Setting, Stepper};
 use metachron_core::AgentId;
-use metachron_core::step_doubling::{Watch, farthest};
+use metachron_core::step_doubling::{DoublingSchedule, farthest};
 
 /// The error in time of one tube.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Doubling {
-    watch: Watch,
-    again: Option<Box<Again>>,
+    schedule: DoublingSchedule,
+    again: Option<Box<FinerRun>>,
 }
 
 /// The tube in twice the substeps, and its working storage; only allocated for a tube that has moved.
 #[derive(Debug, Clone, Default)]
-struct Again {
+struct FinerRun {
     state: RodState,
     past: History,
     factor: Factor,
@@ -34,30 +34,34 @@ struct Again {
 impl Doubling {
     /// Error that steps accumulate in a tenth of a second, metres.
     pub fn error_m(&self) -> f64 {
-        self.watch.error_m()
+        self.schedule.error_m()
     }
 
     /// Whether the present step is to be repeated.
     pub fn is_on(&self) -> bool {
-        self.watch.is_on()
+        self.schedule.is_on()
     }
 
     /// Resets the estimate: the tube rests, and only the error in space remains.
     pub fn rest(&mut self) {
-        self.watch.rest();
+        self.schedule.rest();
     }
 
-    /// Prepares for step number `steps` of the tube `me` from `now`. A step with peers or received impulses is not repeated: impulses are
+    /// Whether step number `steps` of the tube `me` is the first of those to be repeated.
+    pub fn begins(&mut self, steps: u64, me: AgentId) -> bool {
+        self.schedule.begins(steps, me)
+    }
+
+    /// Prepares for a step from `now`, after [`Self::begins`]. A step with peers or received impulses is not repeated: impulses are
     /// given once only.
-    pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&RodState, &[Tie]), stepper: &Stepper) {
-        let begins = self.watch.begins(steps, me);
+    pub fn begin(&mut self, begins: bool, now: &RodState, ties: &[Tie], stepper: &Stepper) {
         if !stepper.company.is_empty()
             || !stepper.company.fresh().is_empty()
             || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now))
         {
-            self.watch.give_up();
+            self.schedule.cancel();
         }
-        if !self.watch.is_on() {
+        if !self.schedule.is_on() {
             return;
         }
         let again = self.again.get_or_insert_default();
@@ -77,15 +81,15 @@ impl Doubling {
         let touching = stepper.contacts.is_touching();
         let setting = Setting { substeps: 2 * setting.substeps, ..*setting };
         if !again.step(stepper, &setting) {
-            return self.watch.give_up();
+            return self.schedule.cancel();
         }
-        if self.watch.made_twice(setting.dt) {
-            self.watch.learn(farthest(&now.x, &again.state.x), order(setting.integrator, touching));
+        if self.schedule.finish_step(setting.dt) {
+            self.schedule.record(farthest(&now.x, &again.state.x), order(setting.integrator, touching));
         }
     }
 }
 
-impl Again {
+impl FinerRun {
     /// Whether the number of nodes equals that of `now`.
     fn fits(&self, now: &RodState) -> bool {
         self.state.x.len() == now.x.len()
@@ -94,15 +98,15 @@ impl Again {
     /// Advances by a step with the tube's stepper, its memory swapped for this one's; returns whether there is a next state.
     fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> bool {
         let Self { state, past, factor, company, ties } = self;
-        let mut lend = |stepper: &mut Stepper| {
+        let mut swap_memory = |stepper: &mut Stepper| {
             std::mem::swap(&mut stepper.factor, factor);
             std::mem::swap(&mut stepper.past, past);
             std::mem::swap(&mut stepper.company, company);
         };
         let span = stepper.span_s;
-        lend(stepper);
+        swap_memory(stepper);
         let taken = stepper.step(state, setting, ties);
-        lend(stepper);
+        swap_memory(stepper);
         stepper.span_s = span;
         taken.is_ok()
     }

@@ -13,7 +13,7 @@ use glam::{DMat3, DVec3};
 
 /// All inputs of a substep except the state.
 #[derive(Clone, Copy)]
-pub struct Scene<'a> {
+pub struct SubstepProblem<'a> {
     /// The material.
     pub matter: &'a RodMaterial,
     /// The division.
@@ -48,30 +48,30 @@ impl Iterate<'_> {
 }
 
 /// Fills `rows` and `rhs` (eq. 11–15, 19–24).
-pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
-    fill_matrix(scene, iterate.at, rows, rhs);
-    fill_right_side(scene, iterate, rhs);
-    add_springs(scene, iterate, rows, rhs);
-    add_ties(scene, iterate, rows, rhs);
-    hold_ends(scene.matter, rows, rhs);
+pub fn assemble(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+    fill_matrix(problem, iterate.at, rows, rhs);
+    fill_right_side(problem, iterate, rhs);
+    add_springs(problem, iterate, rows, rhs);
+    add_ties(problem, iterate, rows, rhs);
+    hold_ends(problem.matter, rows, rhs);
 }
 
 /// Fills `rows` with stiffness and mass about `at`, and sizes `rhs` (eq. 12–15).
-pub fn fill_matrix(scene: &Scene<'_>, at: &RodState, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+pub fn fill_matrix(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
     rows.resize(at.u.len(), Row::ZERO);
     rhs.resize(at.u.len(), DVec3::ZERO);
-    fill_segments(scene, at, rows);
-    fill_joints(scene, at, rows);
+    fill_segments(problem, at, rows);
+    fill_joints(problem, at, rows);
 }
 
 /// Mass, stretch and shear: D = (GA − b) I + (EA − GA) t tᵀ is the clamped stiffness (eq. 12, 13).
-fn fill_segments(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
-    let RodMaterial { ea, ga, mu, rotary, damping, .. } = *scene.matter;
-    let (h2, slow) = (scene.h * scene.h, 1.0 + scene.h * damping);
+fn fill_segments(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
+    let RodMaterial { ea, ga, mu, rotary, damping, .. } = *problem.matter;
+    let (h2, slow) = (problem.h * problem.h, 1.0 + problem.h * damping);
     let (sixth, turn) = (slow * mu / 6.0, slow * rotary);
     let count = at.q.len();
     let rows = &mut rows[..2 * count + 1];
-    let (length, t, e, b) = (&scene.division.length[..count], &at.t[..count], &at.e[..count], &at.b[..count]);
+    let (length, t, e, b) = (&problem.division.length[..count], &at.t[..count], &at.e[..count], &at.b[..count]);
     rows[0] = Row::ZERO;
     for k in 0..count {
         let (l, t, u) = (length[k], t[k], e[k]);
@@ -96,9 +96,9 @@ fn fill_segments(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
 }
 
 /// Bend and twist about the joint's mean director, without their geometric terms (eq. 14).
-fn fill_joints(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
-    let Scene { matter, division, .. } = *scene;
-    let (h2, count) = (scene.h * scene.h, at.q.len());
+fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
+    let SubstepProblem { matter, division, .. } = *problem;
+    let (h2, count) = (problem.h * problem.h, at.q.len());
     let stiffness = |k: usize, axis: DVec3| {
         let size = axis.length_squared();
         let scale = h2 * division.joint[k];
@@ -120,16 +120,16 @@ fn fill_joints(scene: &Scene<'_>, at: &RodState, rows: &mut [Row]) {
 }
 
 /// r = M (v_n − v_i) − h c M v_i + h f (eq. 11), the spin of v_n turned by its own gyroscopic torque (eq. 19).
-fn fill_right_side(scene: &Scene<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) {
-    let RodMaterial { mu, rotary, damping, .. } = *scene.matter;
-    let (h, slow) = (scene.h, 1.0 + scene.h * damping);
+fn fill_right_side(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) {
+    let RodMaterial { mu, rotary, damping, .. } = *problem.matter;
+    let (h, slow) = (problem.h, 1.0 + problem.h * damping);
     let (start, force) = (iterate.start, &iterate.at.force);
     let count = start.q.len();
     let want = |slot: usize| start.u[slot] - iterate.moved(slot) * slow;
     let mut a = want(0);
     rhs[0] = force[0] * h;
     for k in 0..count {
-        let l = scene.division.length[k];
+        let l = problem.division.length[k];
         let b = want(2 * k + 2);
         let m = mu * l / 6.0;
         rhs[2 * k] += (a * 2.0 + b) * m;
@@ -150,9 +150,9 @@ pub fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
 }
 
 /// Attachments, linearised at the predicted position so that a slack one acts within the step in which it tightens (eq. 21–23).
-pub fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
-    let h = scene.h;
-    for spring in scene.springs {
+pub fn add_springs(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+    let h = problem.h;
+    for spring in problem.springs {
         let slot = 2 * spring.node;
         let ahead = if iterate.first { iterate.start.u[slot] * h } else { DVec3::ZERO };
         let linear = spring.linear(iterate.at.x[spring.node] + ahead);
@@ -163,13 +163,13 @@ pub fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], r
 }
 
 /// Pulls, shared between the two nodes of their segment (eq. 24).
-pub fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
-    for tie in scene.ties {
+pub fn add_ties(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+    for tie in problem.ties {
         let (left, right) = (2 * tie.segment, 2 * tie.segment + 2);
         let point = tie.mix(iterate.at.x[tie.segment], iterate.at.x[tie.segment + 1]);
         let moved = tie.mix(iterate.moved(left), iterate.moved(right));
-        let impulse = tie.force(point, moved, scene.until) * scene.h;
-        let (implicit, w) = (tie.implicit(scene.h), tie.share);
+        let impulse = tie.force(point, moved, problem.until) * problem.h;
+        let (implicit, w) = (tie.implicit(problem.h), tie.share);
         rows[left].diag += implicit * ((1.0 - w) * (1.0 - w));
         rows[right].diag += implicit * (w * w);
         rows[right].far += implicit * (w * (1.0 - w));

@@ -12,11 +12,11 @@ use super::discretization;
 use super::discretization::Discretization;
 use super::horizon::owns_it;
 use super::publish::bounds;
-use super::remesh::Remesher;
-use super::rest::RestWatch;
+use super::remesh::{MeshedRod, Remesher};
+use super::rest::RestDetector;
 use super::rest_curve::RestCurve;
 use super::state::{RodMaterial, RodState};
-use super::step::{Lost, Setting, Stepper, energy};
+use super::step::{Divergence, Setting, Stepper, energy};
 use super::step_doubling::Doubling;
 use super::{Section, TubeSpec};
 use glam::{DMat3, DVec3};
@@ -47,7 +47,7 @@ pub struct Tube {
     pub(super) ties: Vec<Tie>,
     pub(super) ties_before: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
-    rest: RestWatch,
+    rest: RestDetector,
     pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
     /// Acceleration of the centre of mass in the last step, without what others gave at its start, m/s².
@@ -93,7 +93,7 @@ impl Tube {
         let mut now = RodState::at_rest(&division);
         now.strain(&matter, &division);
         let mut tube = Self {
-            resolution: held(resolution, &skeleton, count),
+            resolution: nearest_resolution(resolution, &skeleton, count),
             spec,
             skeleton,
             matter,
@@ -105,7 +105,7 @@ impl Tube {
             ties: vec![],
             ties_before: vec![],
             grips: vec![],
-            rest: RestWatch::default(),
+            rest: RestDetector::default(),
             doubling: Doubling::default(),
             at_rest: false,
             acceleration: DVec3::ZERO,
@@ -186,7 +186,7 @@ impl Tube {
             let RodMaterial { ea, ga, .. } = self.matter;
             let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
             list.push(format!(
-                "the tube is stretched {:.2} times (warned of above {STRETCH_WARN}): past {limit:.2} its sections tilt and the answer is no longer that of a tube; use a stiffer or lighter one",
+                "the tube is stretched to {:.2} times its length; the rod model is valid up to {limit:.2} (warning from {STRETCH_WARN}): use a stiffer or lighter tube",
                 self.now.stretch
             ));
         }
@@ -200,17 +200,18 @@ impl Tube {
     #[must_use]
     pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
         let stepped = (self.steps > 0).then_some(&self.stepper)?;
-        stepped.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
+        let (segment, share) = self.division.locate(arc_m);
+        stepped.inverse_mass(segment, share, &self.matter, self.now.u.len())
     }
 
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
     #[must_use]
     pub fn radius_at_m(&self, arc_m: f64) -> f64 {
-        self.radius_then_m(arc_m, self.time)
+        self.radius_at_time_m(arc_m, self.time)
     }
 
     /// The same at another time.
-    pub(super) fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
+    pub(super) fn radius_at_time_m(&self, arc_m: f64, time: SimTime) -> f64 {
         let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
         let Some(wave) = self.spec.peristalsis else { return radius };
         let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.wave_from_s)) / wave.wavelength_m;
@@ -226,13 +227,13 @@ impl Tube {
     /// Sets the contact radii to those at the end of the step.
     fn widen(&mut self, then: SimTime) {
         let mut contacts = std::mem::take(&mut self.stepper.contacts);
-        let met = !self.stepper.company.is_empty();
-        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, then)), met);
+        let has_peers = !self.stepper.company.is_empty();
+        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_at_time_m(s, then)), has_peers);
         self.stepper.contacts = contacts;
     }
 
     /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
-    fn double(&mut self, (dt, substeps): (f64, u32)) {
+    fn repeat_step(&mut self, dt: f64, substeps: u32) {
         if !self.doubling.is_on() {
             return;
         }
@@ -241,22 +242,22 @@ impl Tube {
         self.doubling = doubling;
     }
 
-    fn write_grips(&mut self, dt: f64) {
+    fn record_grips(&mut self, dt: f64) {
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
     }
 
-    pub(super) fn diverged(&self, lost: Lost, dt_s: f64) -> StepError {
-        let what = match lost.slot {
-            Some(slot) if slot % 2 == 0 => format!("the system's pivot at node {}", slot / 2),
-            Some(slot) => format!("the system's pivot at segment {}", slot / 2),
-            None => "positions or velocities".to_owned(),
+    pub(super) fn diverged(&self, divergence: Divergence, dt_s: f64) -> StepError {
+        let what = match divergence.slot {
+            Some(slot) if slot % 2 == 0 => format!("the system matrix is not positive definite at node {}", slot / 2),
+            Some(slot) => format!("the system matrix is not positive definite at segment {}", slot / 2),
+            None => "positions or velocities are not finite".to_owned(),
         };
         StepError::Diverged { model: self.model(), dt_s, what }
     }
 
-    /// Stores the motion before a step, for [`Self::end_watch`]; returns the momentum, if a peer needs it.
-    fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
+    /// Stores the motion before a step, for [`Self::measure_accelerations`]; returns the momentum, if a peer needs it.
+    fn record_velocities(&mut self, watched: bool) -> Option<DVec3> {
         self.accelerations.clear();
         self.standing_accelerations.clear();
         self.accelerations.extend(self.now.u.iter().filter(|_| watched));
@@ -264,16 +265,16 @@ impl Tube {
     }
 
     /// Computes the accelerations to publish after a step of `dt` seconds.
-    fn end_watch(&mut self, before: Option<DVec3>, around: &StepContext<'_>, dt: f64) {
+    fn measure_accelerations(&mut self, before: Option<DVec3>, context: &StepContext<'_>, dt: f64) {
         let Some(before) = before else { return };
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
-        if self.is_foretold(around, dt) {
+        if self.is_foretold(context, dt) {
             self.foretell(dt);
             return;
         }
         // own contact may have been an impact; otherwise the change is the motion to expect over its implicit step
-        let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
+        let lasts = !self.stepper.contacts.is_touching() && context.neighbours.iter().any(|n| owns_it(n, context));
         for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {
             let gained = (*u - *a) / dt;
             *a = match slot % 2 {
@@ -285,7 +286,7 @@ impl Tube {
     }
 
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
-    fn watch_rest(&mut self, dt: f64) -> bool {
+    fn update_rest(&mut self, dt: f64) -> bool {
         let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
         if !self.spec.sleep || wave || !self.ties.is_empty() || !self.stepper.company.is_calm() {
             self.rest.wake();
@@ -336,42 +337,43 @@ impl Agent for Tube {
     /// doubling the error in time, estimated now and then
     /// grips    the mean force of each pull
     /// rest     whether it may sleep
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         self.check_substep(dt_s)?;
-        self.meet(around, dt)?;
-        self.take_pulls(around);
-        self.widen(around.time + dt);
+        self.receive(context, dt)?;
+        self.take_pulls(context);
+        self.widen(context.time + dt);
         let watched = self.stepper.company.is_watched();
-        let before = self.begin_watch(watched);
+        let before = self.record_velocities(watched);
         self.stepper.solves = 0;
-        self.doubling.begin((self.steps, around.me), (&self.now, &self.ties), &self.stepper);
+        let begins = self.doubling.begins(self.steps, context.me);
+        self.doubling.begin(begins, &self.now, &self.ties, &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
-        let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
-        self.stepper.weigh(self.matter.held);
-        self.stepper.stand(self.matter.held, watched);
-        self.double((dt_s, substeps));
-        self.write_grips(dt_s);
-        self.stepper.company.close(around, dt_s);
-        self.end_watch(before, around, dt_s);
-        self.foresee(around, dt_s);
-        self.time = around.time + dt;
+        let substeps = taken.map_err(|divergence| self.diverged(divergence, dt_s))?;
+        self.stepper.update_inverse_masses(self.matter.held);
+        self.stepper.find_supports(self.matter.held, watched);
+        self.repeat_step(dt_s, substeps);
+        self.record_grips(dt_s);
+        self.stepper.company.close(context, dt_s);
+        self.measure_accelerations(before, context, dt_s);
+        self.foresee(context, dt_s);
+        self.time = context.time + dt;
         self.lately.pass(self.stepper.contacts.is_grounded(), dt_s);
         self.steps += 1;
-        self.at_rest = self.watch_rest(dt_s);
+        self.at_rest = self.update_rest(dt_s);
         let work = self.segments() as f64 * f64::from(self.stepper.solves);
         Ok(StepReport { work, substeps, at_rest: self.at_rest })
     }
 
-    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
-        self.foresee(around, dt.as_secs_f64());
+    fn observe(&mut self, dt: SimSpan, context: &StepContext<'_>) {
+        self.foresee(context, dt.as_secs_f64());
     }
 
-    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
         let bounds = || bounds(&self.now, self.widest_m());
-        let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
+        let dt = beside::longest_step(dt, context, bounds, |n| has_a_say(n, context));
         let Some(form) = self.stepper.company.form() else { return dt };
-        crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately, form))
+        crowd::crowded(dt, context, bounds, crowd::Member::bent(self.lately, form))
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -390,7 +392,7 @@ impl Agent for Tube {
             return; // a fixed spacing: the scene sets the division
         }
         let count = discretization::segments_for(&self.skeleton, wanted.eps_m);
-        self.resolution = held(wanted, &self.skeleton, count);
+        self.resolution = nearest_resolution(wanted, &self.skeleton, count);
         if count == self.segments() {
             return;
         }
@@ -398,7 +400,8 @@ impl Agent for Tube {
         let arcs = self.remesher.arcs(&self.now, &old, count);
         self.division.rebuild(&self.skeleton, arcs);
         let mut next = RodState::default();
-        self.remesher.carry(&self.matter, (&self.now, &old), (&mut next, &self.division));
+        let old = MeshedRod { state: &self.now, division: &old };
+        self.remesher.transfer(&self.matter, old, &mut next, &self.division);
         next.strain(&self.matter, &self.division);
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
@@ -435,7 +438,7 @@ fn matter_of(spec: &TubeSpec) -> RodMaterial {
         ga: s.ga_n,
         ei: s.ei_n_m2,
         gj: s.gj_n_m2,
-        mu: spec.mass_per_length_kg_m,
+        mu: s.mass_per_length_kg_m,
         rotary: s.rotary_kg_m,
         damping: spec.damping_per_s,
         gravity: spec.gravity,
@@ -445,7 +448,7 @@ fn matter_of(spec: &TubeSpec) -> RodMaterial {
 }
 
 /// The resolution of `count` segments: the request where it gave that count, else the mean spacing.
-fn held(wanted: Resolution, skeleton: &RestCurve, count: usize) -> Resolution {
+fn nearest_resolution(wanted: Resolution, skeleton: &RestCurve, count: usize) -> Resolution {
     let kept = discretization::segments_for(skeleton, wanted.eps_m) == count;
     let exact = libm::ceil(skeleton.length_m() / wanted.eps_m - 1e-9) == count as f64;
     if kept && exact { wanted } else { Resolution { eps_m: skeleton.length_m() / count as f64, n: wanted.n } }

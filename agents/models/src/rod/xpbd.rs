@@ -5,7 +5,7 @@
 
 use super::discretization::Discretization;
 use super::rotation::{bend_share, exp, log, unit};
-use super::state::{RodMaterial, RodState};
+use super::state::{DividedRod, RodMaterial, RodState};
 use super::sym3::Sym3;
 use glam::{DQuat, DVec3};
 
@@ -23,7 +23,7 @@ pub struct Projector {
 }
 
 /// Constants of a projection.
-struct Law<'a> {
+struct Constants<'a> {
     matter: &'a RodMaterial,
     division: &'a Discretization,
     /// 1/h².
@@ -32,18 +32,18 @@ struct Law<'a> {
 
 impl Projector {
     /// Projects the state that `velocities` reach from `now` in `h` seconds, and corrects them to reach the projected one.
-    pub fn project(&mut self, now: &RodState, velocities: &mut [DVec3], of: (&RodMaterial, &Discretization), h: f64) {
-        let law = Law { matter: of.0, division: of.1, rate2: 1.0 / (h * h) };
+    pub fn project(&mut self, now: &RodState, velocities: &mut [DVec3], rod: DividedRod<'_>, h: f64) {
+        let constants = Constants { matter: rod.matter, division: rod.division, rate2: 1.0 / (h * h) };
         let count = now.q.len();
         self.predict(now, velocities, h);
         for k in 0..count {
-            self.joint(k, &law);
-            self.segment(k, &law);
+            self.joint(k, &constants);
+            self.segment(k, &constants);
         }
-        self.joint(count, &law);
+        self.joint(count, &constants);
         for k in (0..count).rev() {
-            self.segment(k, &law);
-            self.joint(k, &law);
+            self.segment(k, &constants);
+            self.joint(k, &constants);
         }
         self.gain.iter_mut().step_by(2).for_each(|way| *way /= h);
         for k in 0..count {
@@ -78,19 +78,19 @@ impl Projector {
     }
 
     /// C = Rᵀ u − s₀ ẑ with compliance K⁻¹/l (eq. 41).
-    fn segment(&mut self, k: usize, law: &Law<'_>) {
-        let RodMaterial { ea, ga, rotary, .. } = *law.matter;
-        let (l, q) = (law.division.length[k], self.q[k]);
+    fn segment(&mut self, k: usize, constants: &Constants<'_>) {
+        let RodMaterial { ea, ga, rotary, .. } = *constants.matter;
+        let (l, q) = (constants.division.length[k], self.q[k]);
         let u = q.conjugate() * ((self.x[k + 1] - self.x[k]) / l);
-        let (wa, wb) = (law.lightness(k), law.lightness(k + 1));
-        let compliance = DVec3::new(1.0 / ga, 1.0 / ga, 1.0 / ea) * (law.rate2 / l);
+        let (wa, wb) = (constants.inverse_mass(k), constants.inverse_mass(k + 1));
+        let compliance = DVec3::new(1.0 / ga, 1.0 / ga, 1.0 / ea) * (constants.rate2 / l);
         let own = 1.0 / (rotary * l);
         let turned = Sym3::outer(DVec3::new(0.0, u.z, -u.y), own)
             + Sym3::outer(DVec3::new(-u.z, 0.0, u.x), own)
             + Sym3::outer(DVec3::new(u.y, -u.x, 0.0), 0.5 * own);
         let whole = turned + Sym3::identity((wa + wb) / (l * l)) + Sym3::diagonal(compliance);
         let Some(inverse) = whole.inverse() else { return };
-        let wrong = u - DVec3::Z * law.division.chord[k] + compliance * self.pull[k];
+        let wrong = u - DVec3::Z * constants.division.chord[k] + compliance * self.pull[k];
         let given = inverse * -wrong;
         self.pull[k] += given;
         let way = q * given / l;
@@ -101,17 +101,17 @@ impl Projector {
     }
 
     /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall clamps it (eq. 42).
-    fn joint(&mut self, k: usize, law: &Law<'_>) {
-        let RodMaterial { ei, gj, rotary, clamp, .. } = *law.matter;
+    fn joint(&mut self, k: usize, constants: &Constants<'_>) {
+        let RodMaterial { ei, gj, rotary, clamp, .. } = *constants.matter;
         let count = self.q.len();
         if (k == 0 && !clamp[0]) || (k == count && !clamp[1]) {
             return;
         }
-        let Discretization { wall, joint, bend, length, .. } = law.division;
+        let Discretization { wall, joint, bend, length, .. } = constants.division;
         let before = if k == 0 { wall[0] } else { self.q[k - 1] };
         let after = if k == count { wall[1] } else { self.q[k] };
         let theta = log(before.conjugate() * after);
-        let compliance = DVec3::new(1.0 / ei, 1.0 / ei, 1.0 / gj) * (law.rate2 / joint[k]);
+        let compliance = DVec3::new(1.0 / ei, 1.0 / ei, 1.0 / gj) * (constants.rate2 / joint[k]);
         let own = |segment: usize, moves: bool| if moves { 1.0 / (rotary * length[segment]) } else { 0.0 };
         let (wa, wb) = (own(k.saturating_sub(1), k > 0), own(k.min(count - 1), k < count));
         let shape = DVec3::new(1.0, 1.0, 0.5);
@@ -132,9 +132,9 @@ impl Projector {
     }
 }
 
-impl Law<'_> {
+impl Constants<'_> {
     /// Inverse mass of a node; zero where it is held.
-    fn lightness(&self, node: usize) -> f64 {
+    fn inverse_mass(&self, node: usize) -> f64 {
         let (length, held) = (&self.division.length, self.matter.held);
         if (node == 0 && held[0]) || (node == length.len() && held[1]) {
             return 0.0;

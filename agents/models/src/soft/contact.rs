@@ -99,7 +99,7 @@ impl Contacts {
         self.list.sort_unstable_by_key(|contact| contact.key);
         company.mates().scale(&mut self.mobilities);
         let Self { list, mobilities, solver, .. } = self;
-        let problem = Problem { contacts: &[], kin: &[], h_s: h, mobilities, settings };
+        let problem = Problem { contacts: &[], related_keys: &[], h_s: h, mobilities, settings };
         let respond = |impulses: &mut [DVec3]| system.respond(impulses);
         company.mates_mut().solve(solver, (list, problem), velocities, Owner { slots: own, respond, tips: true });
         company.mates_mut().watch(self.list.iter().zip(self.solver.impulses()), velocities);
@@ -134,7 +134,7 @@ impl Contacts {
                     let Touch { normal, gap_m, .. } = *place;
                     list.push(Contact {
                         key,
-                        slots,
+                        jacobian: slots,
                         normal,
                         gap_m,
                         friction,
@@ -159,7 +159,7 @@ impl Contacts {
     /// Feet on static solids in the last substep: the velocities that each place joins, and its normal.
     pub fn footholds(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
-        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.jacobian, c.normal))
     }
 
     /// Whether a static solid pressed in the last substep.

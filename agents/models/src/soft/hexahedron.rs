@@ -5,7 +5,7 @@
 
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::skyline_cholesky::SkylineCholesky;
+use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// Data common to all cells of one rest shape.
 #[derive(Debug, Clone)]
@@ -107,7 +107,7 @@ fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
     inner.shape(&[0, 0, 0]);
     for a in 0..3 {
         for b in 0..=a {
-            inner.add_block((a, b), whole[8 + a][8 + b].transpose().to_cols_array_2d());
+            inner.add_block(BlockIndex { row: a, column: b }, whole[8 + a][8 + b].transpose().to_cols_array_2d());
         }
     }
     let mut left: [[DMat3; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| whole[i][j]));

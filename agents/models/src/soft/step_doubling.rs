@@ -7,12 +7,12 @@ use super::anchor_springs::Tie;
 use super::body::SoftBody;
 use glam::DVec3;
 use metachron_core::AgentId;
-use metachron_core::step_doubling::{Watch, farthest};
+use metachron_core::step_doubling::{DoublingSchedule, farthest};
 
 /// The error in time of one soft body.
 #[derive(Debug, Default)]
 pub(super) struct Doubling {
-    pub watch: Watch,
+    pub watch: DoublingSchedule,
     /// Positions and velocities with twice the substeps.
     finer: [Vec<DVec3>; 2],
     /// The springs of the step.
@@ -33,7 +33,7 @@ impl SoftBody {
             doubling.finer[1].clone_from(velocities);
         }
         if !(self.company.mates().is_empty() && self.given.is_empty()) {
-            doubling.watch.give_up();
+            doubling.watch.cancel();
         }
         if !doubling.watch.is_on() {
             return 0;
@@ -46,7 +46,7 @@ impl SoftBody {
         self.swap();
         self.ties.clone_from(&self.doubling.ties);
         if !made {
-            self.doubling.watch.give_up();
+            self.doubling.watch.cancel();
         }
         parts
     }
@@ -79,10 +79,10 @@ impl SoftBody {
             return;
         }
         if doubling.parts != 2 * done {
-            return doubling.watch.give_up();
+            return doubling.watch.cancel();
         }
-        if doubling.watch.made_twice(dt) {
-            doubling.watch.learn(farthest(positions, &doubling.finer[0]), 1);
+        if doubling.watch.finish_step(dt) {
+            doubling.watch.record(farthest(positions, &doubling.finer[0]), 1);
         }
     }
 }

@@ -3,7 +3,7 @@
 //! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
-use metachron_core::skyline_cholesky::SkylineCholesky;
+use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
 #[derive(Debug, Clone, Default)]
@@ -75,7 +75,10 @@ impl System {
     fn add(&mut self, (i, j): (usize, usize), block: DMat3) {
         let Factor { matrix, rows } = &mut self.matrix;
         if let (Some(row), Some(column)) = (rows[i], rows[j]) {
-            matrix.add_block((row as usize, column as usize), block.transpose().to_cols_array_2d());
+            matrix.add_block(
+                BlockIndex { row: row as usize, column: column as usize },
+                block.transpose().to_cols_array_2d(),
+            );
         }
     }
 

@@ -12,6 +12,7 @@ use super::gripper::{Jaws, let_in, nearest};
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
+use crate::limits::PART_MAX_S;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Knock, beside};
@@ -66,8 +67,6 @@ const CATCH_SHARE: f64 = 0.5;
 const ARRIVED: f64 = 1e-7;
 /// A tool on which sleeping bodies rest keeps still below this speed, m/s.
 const LAIN_M_S: f64 = 2e-3;
-/// With agents near, steps are no longer than a rigid body's in that case, seconds.
-const PART_MAX_S: f64 = 1.0 / 240.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
@@ -83,7 +82,7 @@ impl Tool {
         let tip = tip + spec.starts_off_m;
         let spin = DVec3::ZERO;
         let tool =
-            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
+            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
         let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
         let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
@@ -262,22 +261,22 @@ impl Agent for Tool {
         let led = self.drive_on(led, around, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        let is_left = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
-        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
+        let is_idle = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
+        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_idle, ..led };
         self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.lets_in = self.let_in(around, dt_s);
+        self.tool.admits = self.let_in(around, dt_s);
         self.wake_others(around, dt_s);
         self.tool.force_n = self.felt.force_n();
         self.steps += 1;
-        self.at_rest = is_left && self.rests(&end);
+        self.at_rest = is_idle && self.rests(&end);
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
     /// Shortens the step near agents that it may push: neither the tool nor such an agent can predict the joint effect of drive and body,
     /// and an impulse received once in several steps of a peer would go on through all of the tool's steps.
     fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
-        let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
+        let spared = |n: &Neighbour| self.tool.admits == Some(n.id) || self.is_held_by(n, around);
         let bounds = || bounds(&self.tool, self.speed_m_s);
         let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
         // a body that it comes to grasp will be let in between the jaws
@@ -295,7 +294,7 @@ impl Agent for Tool {
     }
 
     /// Publishes the length of a step before the first one: peers predict the drive over that span.
-    fn look(&mut self, dt: SimSpan, around: &StepContext<'_>) {
+    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
         self.drive.look(self.longest_step(dt, around).as_secs_f64());
     }
 

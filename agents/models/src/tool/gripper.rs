@@ -89,7 +89,7 @@ impl Jaws {
         Some(Grasp {
             target: held.target,
             anchor: held.anchor,
-            clasp: held.rotation.map(|rotation| GraspOrientation { rotation, arm_m: spec.reach_m }),
+            orientation: held.rotation.map(|rotation| GraspOrientation { rotation, arm_m: spec.reach_m }),
             stiffness_n_m: share * spec.stiffness_n_m,
             damping_n_s_m: share * spec.damping_n_s_m,
         })

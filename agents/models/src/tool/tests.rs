@@ -45,7 +45,7 @@ fn tube() -> Neighbour {
         frames: vec![DQuat::IDENTITY; 2],
         radii_m: vec![0.01; 3],
     };
-    Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
+    Neighbour::observed(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
 }
 
 fn state(tool: &Tool) -> ToolState {

@@ -6,7 +6,7 @@
 
 use metachron_contact::audit::Member;
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_contact::{Law, Link, Standing, keep_step, owns};
+use metachron_contact::{Law, Link, OwnershipTraits, keep_step, owns};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
@@ -129,7 +129,7 @@ impl Stage {
             let actor = &mut self.actors[i];
             let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
             let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
-            actor.agent.look(dt, &StepContext { me, time, neighbours: &neighbours, hands, links });
+            actor.agent.observe(dt, &StepContext { me, time, neighbours: &neighbours, hands, links });
             actor.agent.write_snapshot(&mut actor.own);
             let shown = Arc::new(actor.own.clone());
             actor.shown = [Arc::clone(&shown), shown];
@@ -154,7 +154,7 @@ impl Stage {
         actor.agent.step(dt, &around)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);
-        (actor.own.time, actor.own.shorter) = (time + dt, (dt < wanted).then_some(dt));
+        (actor.own.time, actor.own.shortened_step) = (time + dt, (dt < wanted).then_some(dt));
         if !lost {
             actor.shown.swap(0, 1);
             actor.shown[0] = Arc::new(actor.own.clone());
@@ -171,7 +171,7 @@ impl Stage {
     fn sight(&self, me: usize, other: usize) -> Neighbour {
         let standing = |i: usize| {
             let actor = &self.actors[i];
-            Standing::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())
+            OwnershipTraits::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())
         };
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;

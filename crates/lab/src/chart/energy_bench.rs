@@ -6,7 +6,7 @@
 use super::bench::{Faults, Stage};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_contact::audit::{Audit, audit, on_their_way, settled};
+use metachron_contact::audit::{Audit, audit, in_flight, settled};
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
@@ -49,7 +49,7 @@ impl Play {
 
     /// Adds a tube; `None` where it cannot be built.
     pub(super) fn add_tube(&mut self, spec: TubeSpec, rate_hz: f64) -> Option<AgentId> {
-        let weight = [spec.mass_per_length_kg_m, spec.section.rotary_kg_m];
+        let weight = [spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m];
         let gravity = spec.gravity;
         let id = self.stage.add(Box::new(Tube::new(spec).ok()?), rate_hz, weight);
         self.solids.push(Solid { mass_kg: 0.0, gravity, springs: Vec::new() });
@@ -131,7 +131,7 @@ impl Play {
         let members = self.stage.members();
         let mut sum = DVec3::ZERO;
         if let Some(member) = members.get(id.0 as usize) {
-            on_their_way(member, &members, |_, _, dj, _| sum += dj.linear);
+            in_flight(member, &members, |_, _, dj, _| sum += dj.linear);
         }
         sum
     }

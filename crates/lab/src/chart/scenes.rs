@@ -161,5 +161,5 @@ fn oblique_blow(rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
 
 /// Weight of so much of the tube, newtons.
 fn weight_n(length_m: f64) -> f64 {
-    plain_tube(vec![DVec3::ZERO, DVec3::X], TUBE_RADIUS_M, 2).mass_per_length_kg_m * length_m * GRAVITY
+    plain_tube(vec![DVec3::ZERO, DVec3::X], TUBE_RADIUS_M, 2).section.mass_per_length_kg_m * length_m * GRAVITY
 }

@@ -35,7 +35,7 @@ pub fn still_life() -> (SceneView, Camera) {
     let grasp = Grasp {
         target: AgentId(TUBE),
         anchor: Anchor::Arc(grip_arc_m),
-        clasp: None,
+        orientation: None,
         stiffness_n_m: 200.0,
         damping_n_s_m: 1.0,
     };
@@ -49,9 +49,9 @@ pub fn still_life() -> (SceneView, Camera) {
             spin: still,
             jaw,
             grasp,
-            lets_in: None,
+            admits: None,
             force_n: 0.6,
-            is_left: false,
+            is_idle: false,
         })
     };
     let bodies = [

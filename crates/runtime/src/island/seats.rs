@@ -10,7 +10,7 @@ use super::super::agent_runner::AgentRunner;
 use super::super::fellows::Fellows;
 use super::super::handle::{AgentHandle, Shared};
 use crossbeam::atomic::AtomicCell;
-use metachron_contact::Companion;
+use metachron_contact::IslandMember;
 use metachron_core::{AgentId, SimTime};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -42,7 +42,7 @@ pub(in super::super) struct Company {
     /// What became of them, as the model says it.
     pub(super) apart: Vec<u32>,
     /// Storage, empty between turns.
-    pub(super) companions: Vec<Companion<'static>>,
+    pub(super) companions: Vec<IslandMember<'static>>,
 }
 
 /// One that is led.

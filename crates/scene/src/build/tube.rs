@@ -44,7 +44,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
     let place = given.place;
     let path_m = path(c, place, &file.path_m);
     let length_m = path_m.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>().max(SAME_POINT_M);
-    let (section, mass_per_length_kg_m) = section(c, place, file);
+    let section = section(c, place, file);
     let (resolution, range, picture) = resolutions(c, place, file, given.levels, length_m);
     let (clamp, pin) = ends(c, place, file);
     let spec = TubeSpec {
@@ -52,7 +52,6 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
         straight: file.straight.unwrap_or(false),
         twist_rad: c.number_or(place, "twist_deg", (file.twist_deg, 0.0), &TWIST).to_radians(),
         section,
-        mass_per_length_kg_m,
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
@@ -126,8 +125,8 @@ fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec
     path
 }
 
-/// The section and the mass per length, kg/m, from modulus, density and dimensions; numbers that the file gives override them.
-fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section, f64) {
+/// The section from modulus, density and dimensions; numbers that the file gives override them.
+fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
     let radius_m = c.number(place, "radius_m", file.radius_m, &RADIUS);
     let wall_m = file.wall_m.unwrap_or(radius_m);
     let sound_wall = wall_m > 0.0 && wall_m <= radius_m;
@@ -138,13 +137,13 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section,
     }
     let wall_m = if sound_wall { wall_m } else { radius_m };
     let unit = Material { young_pa: 1.0, poisson: 0.0, density_kg_m3: 1.0, shear_factor: 1.0 };
-    let (_, area_m2) = Section::hollow(radius_m, wall_m, unit);
+    let area_m2 = Section::hollow(radius_m, wall_m, unit).mass_per_length_kg_m;
     let young_pa = modulus(c, place, file, area_m2);
     let density_kg_m3 = density(c, place, file, area_m2);
     let poisson = c.number_or(place, "poisson", (file.poisson, 0.45), &POISSON);
     let shear_factor = c.number_or(place, "shear_factor", (file.shear_factor, 27.0 / 28.0), &allowed(1e-3..=2.0, ""));
     let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
-    let (mut section, mass) = Section::hollow(radius_m, wall_m, material);
+    let mut section = Section::hollow(radius_m, wall_m, material);
     for (key, given, into) in [
         ("ea_n", file.ea_n, &mut section.ea_n),
         ("ga_n", file.ga_n, &mut section.ga_n),
@@ -153,9 +152,9 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section,
     ] {
         *into = c.number_or(place, key, (given, *into), &STIFFNESS);
     }
-    let mass =
-        c.number_or(place, "mass_per_length_kg_m", (file.mass_per_length_kg_m, mass), &allowed(1e-9..=1e9, "kg/m"));
-    (section, mass)
+    let mass = (file.mass_per_length_kg_m, section.mass_per_length_kg_m);
+    section.mass_per_length_kg_m = c.number_or(place, "mass_per_length_kg_m", mass, &allowed(1e-9..=1e9, "kg/m"));
+    section
 }
 
 fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {

@@ -27,7 +27,7 @@ impl Mate {
         let pressed = contacts.filter(presses);
         room.clear();
         room.resize(self.end(), DVec3::ZERO);
-        pressed.clone().for_each(|(contact, impulse)| contact.slots.scatter(*impulse, room));
+        pressed.clone().for_each(|(contact, impulse)| contact.jacobian.scatter(*impulse, room));
         let given = &room[self.slots.0..];
         if given.iter().any(|given| *given != DVec3::ZERO) && self.other.stays_under(given) {
             self.respond(room);
@@ -37,7 +37,7 @@ impl Mate {
 
     /// The foot by a contact with this impulse, where that and all others of the owner together `move` it.
     fn foot(&self, contact: &Contact, (impulse, moved): (DVec3, &[DVec3]), own: usize) -> Foot {
-        let Contact { slots, normal, .. } = *contact;
+        let Contact { jacobian: slots, normal, .. } = *contact;
         let yields_m_s = normal.dot(slots.velocity_from(self.slots.0, moved));
         let stiffness = if yields_m_s > 0.0 { impulse.dot(normal) / yields_m_s } else { f64::INFINITY };
         Foot { slots: slots.own(own), normal, stiffness }

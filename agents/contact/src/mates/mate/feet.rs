@@ -27,9 +27,9 @@ impl Feet {
     /// Takes in a contact with a body around `centre` whose slots begin at `first`.
     pub fn add(&mut self, contact: &Contact, impulse: DVec3, (centre, first, fixed): (DVec3, usize, &[bool])) {
         let along = impulse.dot(contact.normal);
-        let Some(arm) = contact.slots.arm_from(first).filter(|_| along > 0.0) else { return };
+        let Some(arm) = contact.jacobian.arm_from(first).filter(|_| along > 0.0) else { return };
         self.all_n_s += along;
-        if !contact.slots.is_fixed(fixed) {
+        if !contact.jacobian.is_fixed(fixed) {
             return;
         }
         self.carried_n_s += along;

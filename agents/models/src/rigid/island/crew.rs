@@ -3,14 +3,14 @@
 //! In: the leader, its companions and what each of them sees. Out: access by seat. Never here: physics.
 
 use crate::rigid::RigidBody;
-use metachron_contact::{Companion, StepContext};
+use metachron_contact::{IslandMember, StepContext};
 use metachron_core::{AgentId, StepError};
 
 /// Everybody who shares the step: seat 0 leads, seat k is the k-th companion.
 pub(super) struct Crew<'a, 'c> {
     leader: &'a mut RigidBody,
     around: &'a StepContext<'a>,
-    others: &'a mut [Companion<'c>],
+    others: &'a mut [IslandMember<'c>],
 }
 
 impl<'a, 'c> Crew<'a, 'c> {
@@ -19,7 +19,7 @@ impl<'a, 'c> Crew<'a, 'c> {
     pub(super) fn new(
         leader: &'a mut RigidBody,
         around: &'a StepContext<'a>,
-        others: &'a mut [Companion<'c>],
+        others: &'a mut [IslandMember<'c>],
     ) -> Result<Self, StepError> {
         if others.iter_mut().all(|other| rigid(other).is_some()) {
             Ok(Self { leader, around, others })
@@ -44,13 +44,13 @@ impl<'a, 'c> Crew<'a, 'c> {
             return (self.leader, self.around);
         }
         let other = &mut self.others[seat - 1];
-        let around = &other.around;
+        let around = &other.context;
         let body = other.agent.island_body().and_then(|body| body.downcast_mut());
         (body.expect("every companion was found to be rigid"), around)
     }
 }
 
 /// The rigid body of a companion, if it is one.
-fn rigid<'a>(other: &'a mut Companion<'_>) -> Option<&'a mut RigidBody> {
+fn rigid<'a>(other: &'a mut IslandMember<'_>) -> Option<&'a mut RigidBody> {
     other.agent.island_body()?.downcast_mut()
 }

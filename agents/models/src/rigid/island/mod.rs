@@ -24,7 +24,7 @@ use direct::{Direct, Reach};
 use glam::DVec3;
 use member::{Ground, Member};
 use metachron_contact::beside::may_press;
-use metachron_contact::{Companion, StepContext};
+use metachron_contact::{IslandMember, StepContext};
 use metachron_core::Mat6;
 use metachron_core::{AgentId, SimSpan, StepError, StepReport, check_span};
 use pile::Pile;
@@ -91,7 +91,7 @@ pub(super) fn lead(
     leader: &mut RigidBody,
     dt: SimSpan,
     around: &StepContext<'_>,
-    others: &mut [Companion<'_>],
+    others: &mut [IslandMember<'_>],
     apart: &mut Vec<u32>,
 ) -> Result<StepReport, StepError> {
     let dt_s = check_span(dt)?;

@@ -55,7 +55,7 @@ impl Held {
         let mut owner = Snapshot { time: self.owner_time, ..Snapshot::default() };
         self.owner.write(&mut owner);
         let form = self.body.form();
-        let neighbours = [Neighbour { form, ..Neighbour::seen(OWNER, Arc::new(owner)) }];
+        let neighbours = [Neighbour { form, ..Neighbour::observed(OWNER, Arc::new(owner)) }];
         let around = StepContext { me: ME, time: self.time, neighbours: &neighbours, hands, links: &[] };
         let dt = SimSpan::from_secs_f64(h).unwrap();
         self.body.step(dt, &around).unwrap();
@@ -72,7 +72,7 @@ impl Held {
     /// Where its owner expects the body at its own time, and its velocity and spin.
     fn expected(&self) -> (DVec3, DVec3, DVec3) {
         let mut other = Other::default();
-        let seen = Neighbour::seen(ME, Arc::new(self.snapshot()));
+        let seen = Neighbour::observed(ME, Arc::new(self.snapshot()));
         assert!(other.meet(&seen, &StepContext::alone(OWNER, self.owner_time), &self.owner, None));
         let (place, _) = other.point(Anchor::Local(DVec3::ZERO)).unwrap();
         (place, other.velocities()[0], other.velocities()[1])

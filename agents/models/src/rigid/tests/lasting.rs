@@ -198,9 +198,9 @@ fn a_tool_pushes_a_body_at_its_own_speed_and_feels_what_it_gives() {
             spin: DVec3::ZERO,
             jaw: 0.0,
             grasp: None,
-            lets_in: None,
+            admits: None,
             force_n: 0.0,
-            is_left: false,
+            is_idle: false,
         };
         let tool = stage.add(Pusher { state, exchange: Exchange::wary(), taken: DVec3::ZERO }, tool_hz);
         let pushed = RigidSpec { gravity: DVec3::ZERO, mass_kg: 0.2, friction: 0.3, ..cube(0.03, DVec3::X * 0.07) };

@@ -28,7 +28,7 @@ impl Bores {
         while at <= axis.last() {
             let run = axis.run(at);
             if axis.is_parted(at..=run) {
-                parts.push(axis.mouths(at, run));
+                parts.push(axis.ends(at, run));
             }
             at = run + 1;
         }
@@ -41,7 +41,7 @@ impl Bores {
     }
 
     /// Whether any part between two arc lengths passes through.
-    pub fn meet(&self, from_m: f64, to_m: f64) -> bool {
+    pub fn overlap(&self, from_m: f64, to_m: f64) -> bool {
         self.parts.iter().any(|[low, high]| *low <= to_m && from_m <= *high)
     }
 
@@ -53,7 +53,7 @@ impl Bores {
             let mut still = (0..=axis.last()).filter(within);
             let Some(first) = still.next() else { return false };
             let last = still.next_back().unwrap_or(first);
-            let [low, high] = axis.mouths(first, last);
+            let [low, high] = axis.ends(first, last);
             *part = [part[0].max(low), part[1].min(high)];
             true
         });
@@ -83,7 +83,7 @@ impl Axis<'_> {
     }
 
     /// Where a run of inside points leaves the solid on both sides: the skin leaves one radius after the axis.
-    fn mouths(&self, first: usize, last: usize) -> [f64; 2] {
+    fn ends(&self, first: usize, last: usize) -> [f64; 2] {
         let radius_m = self.skin.widest_m();
         let (before, after) = (first.saturating_sub(1), (last + 1).min(self.last()));
         [self.arc_m(before) - radius_m, self.arc_m(after) + radius_m]

@@ -15,7 +15,7 @@ use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase;
 use metachron_geometry::signed_distance::Ball;
 use metachron_geometry::{Obstacle, ShapeError};
-use self_contact::{Meeting, PLACES, Pairs};
+use self_contact::{FacingPoints, PLACES, Pairs};
 pub(crate) use solve::{Solved, respond};
 use static_contact::{WallTouch, Walls};
 
@@ -30,14 +30,14 @@ const WALLS_END: u64 = 1 << (63 - WALL_SHIFT);
 /// Key increments of the second and the first segment of a pair.
 const KEY_STEPS: [u64; 2] = [PLACES as u64, 1 << 20];
 /// Key differences to a contact that passed to the next segment, within one tube and between a tube and another; for warm starting.
-const KIN: [i64; 8] = {
+const RELATED_KEYS: [i64; 8] = {
     let ([a, b], [c, d]) = (KEY_STEPS, narrow_phase::KEY_STEPS);
     let (a, b, c, d) = (a as i64, b as i64, c as i64, d as i64);
     [a, -a, b, -b, c, -c, d, -d]
 };
 
-/// Number of entries of [`KIN`] that matter without peers.
-const KIN_OWN: usize = 4;
+/// Number of entries of [`RELATED_KEYS`] that matter without peers.
+const RELATED_KEYS_WITHOUT_PEERS: usize = 4;
 
 /// A tube's skin at the start of a substep: balls on nodes, joined by tapered spans.
 #[derive(Debug, Clone, Copy)]
@@ -102,37 +102,37 @@ impl TubeContacts {
         contacts.clear();
         let slack_m = SLACK_RADII * skin.widest_m();
         if let Some(pairs) = pairs {
-            pairs.visit(skin, slack_m, |meeting| {
-                let contact = of_meeting(&meeting, *friction);
-                let closing = contact.slots.velocity_of_nodes(skin.slots).dot(contact.normal);
+            pairs.visit(skin, slack_m, |facing| {
+                let contact = contact_between_segments(&facing, *friction);
+                let closing = contact.jacobian.velocity_of_nodes(skin.slots).dot(contact.normal);
                 if contact.gap_m + closing * skin.h_s <= slack_m {
                     contacts.push(contact);
                 }
             });
         }
-        walls.visit(skin, slack_m, |touch| contacts.push(of_touch(&touch, *friction, skin.segments())));
+        walls.visit(skin, slack_m, |touch| contacts.push(contact_with_wall(&touch, *friction, skin.segments())));
         debug_assert!(contacts.is_sorted_by_key(|c| c.key), "pairs and walls are visited by rising keys");
         contacts.len()
     }
 
     /// Adds the contacts with peers, whose velocities follow the tube's own.
-    pub fn find_others(&mut self, skin: &Skin<'_>, company: &mut Company) {
+    pub fn find_peer_contacts(&mut self, skin: &Skin<'_>, company: &mut Company) {
         if !company.is_empty() {
             company.find(skin, SLACK_RADII * skin.widest_m(), &mut self.contacts);
         }
     }
 
-    /// Sets the outer radius at each node, metres; `met` if there are peers to touch.
-    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, met: bool) {
+    /// Sets the outer radius at each node, metres; `has_peers` if there are peers to touch.
+    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, has_peers: bool) {
         self.radii_m.clear();
-        if met || !self.is_idle() {
+        if has_peers || !self.is_idle() {
             self.radii_m.extend(radii_m);
         }
     }
 
     /// Undoes the part of the nodes' latest displacements `ways` that leads into fixed solids; `arc_m` are their rest arc lengths.
     pub fn hold_back(&self, positions: &mut [DVec3], ways: impl Iterator<Item = DVec3>, arc_m: &[f64]) {
-        self.walls.hold_back(positions, ways, (arc_m, &self.radii_m));
+        self.walls.hold_back(positions, ways, arc_m, &self.radii_m);
     }
 
     /// The contacts found last, and their impulses.
@@ -141,14 +141,14 @@ impl TubeContacts {
     }
 
     /// Contacts in which fixed solids pressed in the last solve: slots and normal of each.
-    pub fn footholds(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
+    pub fn supporting_contacts(&self) -> impl Iterator<Item = (ContactJacobian, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
-        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.jacobian, c.normal))
     }
 
     /// Whether any fixed solid pressed in the last solve.
     pub fn is_grounded(&self) -> bool {
-        self.footholds().next().is_some()
+        self.supporting_contacts().next().is_some()
     }
 
     /// Whether the last search found any contact with a moving body, the tube itself included.
@@ -221,23 +221,23 @@ fn is_fixed(contact: &Contact) -> bool {
 }
 
 /// Self-contact: facing points of two segments, and arms to the middle of the gap (eq. 20).
-fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
-    let mut slots = ContactJacobian::default();
+fn contact_between_segments(facing: &FacingPoints, friction: f64) -> Contact {
+    let mut jacobian = ContactJacobian::default();
     for (side, sign) in [(0, 1.0), (1, -1.0)] {
-        let (segment, share) = (meeting.segments[side] as usize, meeting.shares[side]);
-        slots.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
-        slots.add_linear(node_slot(segment + 1) as u32, sign * share);
+        let (segment, share) = (facing.segments[side] as usize, facing.shares[side]);
+        jacobian.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
+        jacobian.add_linear(node_slot(segment + 1) as u32, sign * share);
         // the arm points to the other side: against the normal for the first, along it for the second
-        let arm = meeting.normal * -sign * (meeting.radii_m[side] + 0.5 * meeting.gap_m);
-        slots.add_angular(segment_slot(segment) as u32, arm * sign);
+        let arm = facing.normal * -sign * (facing.radii_m[side] + 0.5 * facing.gap_m);
+        jacobian.add_angular(segment_slot(segment) as u32, arm * sign);
     }
-    let [first, second] = meeting.segments.map(u64::from);
-    let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(meeting.place);
+    let [first, second] = facing.segments.map(u64::from);
+    let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(facing.place);
     Contact {
         key,
-        slots,
-        normal: meeting.normal,
-        gap_m: meeting.gap_m,
+        jacobian,
+        normal: facing.normal,
+        gap_m: facing.gap_m,
         friction,
         rebound_m_s: 0.0,
         back_m_s: DVec3::ZERO,
@@ -246,21 +246,21 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
 }
 
 /// Contact with a wall, at a node or inside a segment (eq. 21).
-fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
-    let mut slots = ContactJacobian::default();
+fn contact_with_wall(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
+    let mut jacobian = ContactJacobian::default();
     let index = touch.index as usize;
     let arm = touch.normal * -touch.radius_m;
     if let Some(share) = touch.share {
-        slots.add_linear(node_slot(index) as u32, 1.0 - share);
-        slots.add_linear(node_slot(index + 1) as u32, share);
-        slots.add_angular(segment_slot(index) as u32, arm);
+        jacobian.add_linear(node_slot(index) as u32, 1.0 - share);
+        jacobian.add_linear(node_slot(index + 1) as u32, share);
+        jacobian.add_angular(segment_slot(index) as u32, arm);
     } else {
-        slots.add_linear(node_slot(index) as u32, 1.0);
+        jacobian.add_linear(node_slot(index) as u32, 1.0);
         // a node's skin turns with the mean of the adjacent segments
         let beside = [index.checked_sub(1), Some(index).filter(|&k| k < segments)];
         let count = beside.iter().flatten().count() as f64;
         for segment in beside.into_iter().flatten() {
-            slots.add_angular(segment_slot(segment) as u32, arm / count);
+            jacobian.add_angular(segment_slot(segment) as u32, arm / count);
         }
     }
     let inside = u64::from(touch.share.is_some());
@@ -268,7 +268,7 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
         (u64::from(touch.wall) + 1) << WALL_SHIFT | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
     Contact {
         key,
-        slots,
+        jacobian,
         normal: touch.normal,
         gap_m: touch.gap_m,
         friction: (friction * touch.friction).sqrt(),

@@ -47,7 +47,7 @@ struct Motion {
 
 /// A place where two segments face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Meeting {
+pub(super) struct FacingPoints {
     /// The segments; the first has the lower number.
     pub segments: [u32; 2],
     /// Index among the places of this pair, below [`PLACES`]; identifies the contact together with the segments.
@@ -89,7 +89,7 @@ impl Pairs {
     }
 
     /// Visits every pair whose surfaces may come within `slack_m` of each other during the step, in order of segment numbers (eq. 17).
-    pub fn visit(&mut self, skin: &Skin<'_>, slack_m: f64, mut visit: impl FnMut(Meeting)) {
+    pub fn visit(&mut self, skin: &Skin<'_>, slack_m: f64, mut visit: impl FnMut(FacingPoints)) {
         self.follow(skin);
         let most = |of: fn(&Motion) -> f64| self.motions.iter().map(of).fold(0.0, f64::max);
         if slack_m + 2.0 * most(|m| m.travel_m + m.ahead_m) > self.reach_m {
@@ -197,13 +197,18 @@ pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
 ///
 /// The nearest points alone are not enough: between parallel strands they jump from end to end at the slightest tilt,
 /// and the tube rocks for ever. Nodes and their projections stay in place.
-pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, visit: &mut impl FnMut(Meeting)) {
+pub(super) fn visit_places(
+    skin: &Skin<'_>,
+    nearest: FacingPoints,
+    margin_m: f64,
+    visit: &mut impl FnMut(FacingPoints),
+) {
     let [first, second] = nearest.segments;
     let [i, j] = [first as usize, second as usize];
     let mut try_at = |place: u32, shares: [f64; 2]| {
-        let meeting = at(skin, [first, second], place, shares);
-        if meeting.gap_m <= margin_m {
-            visit(meeting);
+        let facing = at(skin, [first, second], place, shares);
+        if facing.gap_m <= margin_m {
+            visit(facing);
         }
     };
     if let Some(t) = foot(skin.positions[i], skin.positions, j) {
@@ -226,15 +231,15 @@ pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, vis
 }
 
 /// Where two segments are nearest (eq. 18).
-pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
+pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> FacingPoints {
     let [a, b] = segments.map(|k| [skin.positions[k as usize], skin.positions[k as usize + 1]]);
     let (s, t) = near_segments(a, b);
     at(skin, segments, PLACES - 1, [s, t])
 }
 
 /// The meeting at two given points.
-fn at(skin: &Skin<'_>, segments: [u32; 2], place: u32, shares: [f64; 2]) -> Meeting {
+fn at(skin: &Skin<'_>, segments: [u32; 2], place: u32, shares: [f64; 2]) -> FacingPoints {
     let [a, b] = segments.map(|k| [skin.ball(k as usize), skin.ball(k as usize + 1)]);
     let (facing, radii_m) = facing(a, b, shares);
-    Meeting { segments, place, shares, normal: facing.normal, gap_m: facing.distance_m, radii_m }
+    FacingPoints { segments, place, shares, normal: facing.normal, gap_m: facing.distance_m, radii_m }
 }

@@ -3,7 +3,7 @@
 //! In: the state at the start of a substep, its free velocities and its factor. Out: velocities that keep the skin apart.
 //! Never here: contact detection ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
 
-use super::{KIN, KIN_OWN, Skin, TubeContacts, node_slot, segment_slot};
+use super::{RELATED_KEYS, RELATED_KEYS_WITHOUT_PEERS, Skin, TubeContacts, node_slot, segment_slot};
 use crate::rod::banded_ldl::{Factor, Row};
 use crate::rod::company::Company;
 use crate::rod::discretization::Discretization;
@@ -28,18 +28,18 @@ pub(crate) struct Solved<'a> {
     pub factor: &'a Factor,
     /// The substep, seconds.
     pub h: f64,
+    /// Whether contacts are searched: a further Newton iteration of the same substep reuses those of the first.
+    pub first: bool,
 }
 
 impl TubeContacts {
     /// Corrects the free `velocities` of a substep that starts at `positions`; returns the work that contact then does, J.
-    ///
-    /// With `first` the contacts are searched; a further Newton iteration of the same substep reuses them.
     pub fn act(
         &mut self,
         positions: &[DVec3],
         velocities: &mut Vec<DVec3>,
         solved: &Solved<'_>,
-        (company, first): (&mut Company, bool),
+        company: &mut Company,
     ) -> f64 {
         if self.is_idle() && company.is_empty() {
             self.contacts.clear(); // contacts with peers that have gone
@@ -51,7 +51,7 @@ impl TubeContacts {
         }
         let own = velocities.len();
         company.mates_mut().extend(velocities, solved.h);
-        if first {
+        if solved.first {
             let arc_m = &solved.division.arc_m;
             let radii_m = std::mem::take(&mut self.radii_m);
             let skin = Skin {
@@ -63,7 +63,7 @@ impl TubeContacts {
                 h_s: solved.h,
             };
             self.find(&skin);
-            self.find_others(&skin, company);
+            self.find_peer_contacts(&skin, company);
             self.radii_m = radii_m;
         }
         if self.contacts.is_empty() {
@@ -73,17 +73,17 @@ impl TubeContacts {
         }
         self.scale(solved);
         company.mates().scale(&mut self.mobilities);
-        let met = !company.is_empty();
+        let has_peers = !company.is_empty();
         let Self { contacts, mobilities, solver, .. } = self;
-        let kin = &KIN[..if met { KIN.len() } else { KIN_OWN }];
-        let problem = Problem { contacts: &[], kin, h_s: solved.h, mobilities, settings: SETTINGS };
-        let respond = |impulses: &mut [DVec3]| respond((solved.factor, solved.matter.held), impulses);
+        let related_keys = &RELATED_KEYS[..if has_peers { RELATED_KEYS.len() } else { RELATED_KEYS_WITHOUT_PEERS }];
+        let problem = Problem { contacts: &[], related_keys, h_s: solved.h, mobilities, settings: SETTINGS };
+        let respond = |impulses: &mut [DVec3]| respond(solved.factor, solved.matter.held, impulses);
         company.mates_mut().solve(solver, (contacts, problem), velocities, Owner { slots: own, respond, tips: false });
-        if met {
+        if has_peers {
             company.mates_mut().watch(self.impulses(), velocities);
         }
         velocities[own..].fill(DVec3::ZERO); // the peers' motion is not this tube's work
-        let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
+        let work = self.impulses().map(|(contact, impulse)| contact.jacobian.velocity(velocities).dot(*impulse)).sum();
         velocities.truncate(own);
         work
     }
@@ -135,7 +135,7 @@ impl TubeContacts {
 }
 
 /// Turns impulses, one per slot, into velocity changes by the factor of the substep; held ends do not move.
-pub(crate) fn respond((factor, held): (&Factor, [bool; 2]), impulses: &mut [DVec3]) {
+pub(crate) fn respond(factor: &Factor, held: [bool; 2], impulses: &mut [DVec3]) {
     let last = impulses.len().saturating_sub(1);
     for (_, slot) in [(held[0], 0), (held[1], last)].into_iter().filter(|(held, _)| *held) {
         impulses[slot] = DVec3::ZERO;

@@ -11,7 +11,7 @@ use metachron_geometry::signed_distance::{Ball, Field};
 use metachron_geometry::{Obstacle, ShapeError};
 
 /// How much farther than needed a mesh is searched, as a share of the radius: a node found far away can be skipped for longer.
-const LOOK_RADII: f64 = 1.0;
+const SEARCH_RADII: f64 = 1.0;
 
 /// All fixed solids around a tube.
 #[derive(Debug, Clone, Default)]
@@ -38,6 +38,15 @@ struct Wall {
     clear: (f64, f64),
     /// The parts of the tube that pass through.
     bores: Bores,
+}
+
+/// How far from the skin walls are searched.
+#[derive(Debug, Clone, Copy)]
+struct SearchRange {
+    /// The gap at the end of the step from which on a place counts as a contact, metres.
+    slack_m: f64,
+    /// The distance of the surfaces within which a wall is searched now, metres.
+    reach_m: f64,
 }
 
 /// A node or a place inside a segment that touches a wall.
@@ -115,7 +124,8 @@ impl Walls {
         &self,
         positions: &mut [DVec3],
         ways: impl Iterator<Item = DVec3>,
-        (arc_m, radii_m): (&[f64], &[f64]),
+        arc_m: &[f64],
+        radii_m: &[f64],
     ) {
         if self.last.len() != positions.len() || radii_m.len() != positions.len() {
             return;
@@ -125,7 +135,7 @@ impl Walls {
             for wall in &self.walls {
                 let (gap_m, at_m) = wall.nodes[node];
                 let is_near = gap_m - (self.travel_m - at_m) <= moved_m;
-                if is_near && !wall.bores.meet(arc_m[node], arc_m[node]) {
+                if is_near && !wall.bores.overlap(arc_m[node], arc_m[node]) {
                     wall.field.hold_back(&mut positions[node], way, radii_m[node]);
                 }
             }
@@ -163,7 +173,7 @@ impl Walls {
 impl Wall {
     /// Measures the nodes that may be near, then the spans that may be nearer than their nodes.
     fn measure(&mut self, skin: &Skin<'_>, slack_m: f64, travel_m: f64, visit: &mut impl FnMut(WallTouch)) {
-        let look_m = LOOK_RADII * skin.widest_m();
+        let search_m = SEARCH_RADII * skin.widest_m();
         if !self.bores.is_empty() {
             self.bores.leave(skin, &self.field);
         }
@@ -171,7 +181,7 @@ impl Wall {
             let margin_m = slack_m + skin.velocity(node).length() * skin.h_s;
             let (gap_m, at_m) = self.nodes[node];
             if gap_m - (travel_m - at_m) <= margin_m {
-                self.measure_node(skin, node, (slack_m, margin_m + look_m), visit);
+                self.measure_node(skin, node, SearchRange { slack_m, reach_m: margin_m + search_m }, visit);
                 self.nodes[node].1 = travel_m;
             }
         }
@@ -183,25 +193,20 @@ impl Wall {
             clear_m = clear_m.min(span_m).min(left).min(right);
             let margin_m = slack_m + skin.span_speed(segment) * skin.h_s;
             if span_m <= margin_m && self.field.feels_spans() {
-                self.measure_span(skin, segment, (slack_m, margin_m), visit);
+                self.measure_span(skin, segment, SearchRange { slack_m, reach_m: margin_m }, visit);
             }
         }
         self.clear = (clear_m, travel_m);
     }
 
-    fn measure_node(
-        &mut self,
-        skin: &Skin<'_>,
-        node: usize,
-        (slack_m, reach_m): (f64, f64),
-        visit: &mut impl FnMut(WallTouch),
-    ) {
+    fn measure_node(&mut self, skin: &Skin<'_>, node: usize, range: SearchRange, visit: &mut impl FnMut(WallTouch)) {
+        let SearchRange { slack_m, reach_m } = range;
         let ball = skin.ball(node);
         let touches = self.field.touches(ball.centre, ball.radius_m + reach_m);
         let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
         self.nodes[node].0 = touches.clear_m - ball.radius_m;
-        if skin.is_held(node) || self.bores.meet(skin.arc_m[node], skin.arc_m[node]) {
+        if skin.is_held(node) || self.bores.overlap(skin.arc_m[node], skin.arc_m[node]) {
             return;
         }
         for (place, touch) in (0_u32..).zip(touches.iter()) {
@@ -210,28 +215,23 @@ impl Wall {
             {
                 continue;
             }
-            visit(self.touch(node, None, touch, (place, ball.radius_m)));
+            visit(WallTouch { place, ..self.touch(node, None, touch, ball.radius_m) });
         }
     }
 
-    fn measure_span(
-        &self,
-        skin: &Skin<'_>,
-        segment: usize,
-        (slack_m, reach_m): (f64, f64),
-        visit: &mut impl FnMut(WallTouch),
-    ) {
+    fn measure_span(&self, skin: &Skin<'_>, segment: usize, range: SearchRange, visit: &mut impl FnMut(WallTouch)) {
+        let SearchRange { slack_m, reach_m } = range;
         let ends = [skin.ball(segment), skin.ball(segment + 1)];
-        if self.bores.meet(skin.arc_m[segment], skin.arc_m[segment + 1]) {
+        if self.bores.overlap(skin.arc_m[segment], skin.arc_m[segment + 1]) {
             return;
         }
         let Some((share, touch)) = self.field.touches_span(ends, reach_m) else { return };
         let ball = ends[0].toward(ends[1], share);
         let way = skin.velocity(segment).lerp(skin.velocity(segment + 1), share) * skin.h_s;
         let gap_m = touch.distance_m - ball.radius_m;
-        let told = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
-        if gap_m + way.dot(touch.normal) <= slack_m && !told {
-            visit(self.touch(segment, Some(share), touch, (0, ball.radius_m)));
+        let hidden = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
+        if gap_m + way.dot(touch.normal) <= slack_m && !hidden {
+            visit(self.touch(segment, Some(share), touch, ball.radius_m));
         }
     }
 
@@ -240,12 +240,13 @@ impl Wall {
         self.near[node].is_some_and(|near| near.hides(skin.ball(node), ball, touch))
     }
 
-    fn touch(&self, index: usize, share: Option<f64>, touch: Touch, (place, radius_m): (u32, f64)) -> WallTouch {
+    /// A touch of a wall that is still without its number, at the first place of its node or segment.
+    fn touch(&self, index: usize, share: Option<f64>, touch: Touch, radius_m: f64) -> WallTouch {
         WallTouch {
             wall: 0,
             index: index as u32,
             share,
-            place,
+            place: 0,
             normal: touch.normal,
             gap_m: touch.distance_m - radius_m,
             radius_m,

@@ -5,9 +5,9 @@ use glam::DQuat;
 use metachron_geometry::Solid;
 
 /// Deterministic numbers in −1 … 1.
-struct Noise(u64);
+struct Random(u64);
 
-impl Noise {
+impl Random {
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
@@ -30,14 +30,14 @@ const RADIUS: f64 = 0.015;
 const STEP: f64 = 0.004;
 
 impl Chain {
-    fn crumpled(segments: usize, noise: &mut Noise) -> Self {
+    fn crumpled(segments: usize, random: &mut Random) -> Self {
         let length = 0.015;
         let mut at = DVec3::ZERO;
         let mut positions = vec![at];
         let mut way = DVec3::X;
         for _ in 0..segments {
             // drawn back to the origin, so that the chain meets itself
-            way = (way + noise.vector() * 0.8 - at * 4.0).normalize();
+            way = (way + random.vector() * 0.8 - at * 4.0).normalize();
             at += way * length;
             positions.push(at);
         }
@@ -45,13 +45,13 @@ impl Chain {
         Self {
             positions,
             slots: vec![DVec3::ZERO; 2 * nodes - 1],
-            radii_m: (0..nodes).map(|_| RADIUS * (1.0 + 0.2 * noise.next())).collect(),
+            radii_m: (0..nodes).map(|_| RADIUS * (1.0 + 0.2 * random.next())).collect(),
             arc_m: (0..nodes).map(|i| i as f64 * length).collect(),
         }
     }
 
-    fn shake(&mut self, drift: DVec3, noise: &mut Noise) {
-        self.slots.iter_mut().for_each(|v| *v = drift + noise.vector());
+    fn shake(&mut self, drift: DVec3, random: &mut Random) {
+        self.slots.iter_mut().for_each(|v| *v = drift + random.vector());
     }
 
     fn go(&mut self) {
@@ -65,7 +65,7 @@ impl Chain {
 }
 
 /// Keys and gaps of the contacts that a search without any memory finds.
-fn found_afresh(skin: &Skin<'_>, obstacles: &[Obstacle], with_itself: bool) -> Vec<(u64, f64)> {
+fn found_by_full_search(skin: &Skin<'_>, obstacles: &[Obstacle], with_itself: bool) -> Vec<(u64, f64)> {
     let mut contacts = TubeContacts::new(obstacles, with_itself, 0.3).unwrap();
     contacts.find(skin);
     contacts.contacts.iter().map(|c| (c.key, c.gap_m)).collect()
@@ -78,10 +78,10 @@ fn found(contacts: &mut TubeContacts, skin: &Skin<'_>) -> Vec<(u64, f64)> {
 
 #[test]
 fn the_grid_finds_every_pair_that_trying_all_finds() {
-    let mut noise = Noise(1);
+    let mut random = Random(1);
     for _ in 0..10 {
-        let mut chain = Chain::crumpled(120, &mut noise);
-        chain.shake(DVec3::ZERO, &mut noise);
+        let mut chain = Chain::crumpled(120, &mut random);
+        chain.shake(DVec3::ZERO, &mut random);
         let skin = chain.skin();
         let mut met = Vec::new();
         Pairs::default().visit(&skin, 0.001, |m| met.push((m.segments, m.place, m.gap_m)));
@@ -107,15 +107,15 @@ fn the_grid_finds_every_pair_that_trying_all_finds() {
 
 #[test]
 fn lists_that_last_find_what_a_fresh_search_finds() {
-    let mut noise = Noise(2);
-    let mut chain = Chain::crumpled(120, &mut noise);
+    let mut random = Random(2);
+    let mut chain = Chain::crumpled(120, &mut random);
     let mut kept = TubeContacts::new(&[], true, 0.3).unwrap();
     let mut most = 0;
     for _ in 0..200 {
-        chain.shake(DVec3::new(3.0, 1.0, 0.0), &mut noise);
+        chain.shake(DVec3::new(3.0, 1.0, 0.0), &mut random);
         let now = found(&mut kept, &chain.skin());
         most = most.max(now.len());
-        assert_eq!(now, found_afresh(&chain.skin(), &[], true));
+        assert_eq!(now, found_by_full_search(&chain.skin(), &[], true));
         chain.go();
     }
     assert!(most > 20, "at most {most} contacts: nothing was tested");
@@ -145,18 +145,18 @@ fn solids() -> Vec<Obstacle> {
 }
 
 #[test]
-fn distances_that_are_remembered_hide_no_wall() {
-    let mut noise = Noise(3);
-    let mut chain = Chain::crumpled(60, &mut noise);
+fn cached_distances_hide_no_wall() {
+    let mut random = Random(3);
+    let mut chain = Chain::crumpled(60, &mut random);
     chain.positions.iter_mut().for_each(|x| x.z += 0.3);
     let obstacles = solids();
     let mut kept = TubeContacts::new(&obstacles, false, 0.3).unwrap();
     let mut most = 0;
     for _ in 0..150 {
-        chain.shake(DVec3::new(0.1, 0.0, -0.6), &mut noise);
+        chain.shake(DVec3::new(0.1, 0.0, -0.6), &mut random);
         let now = found(&mut kept, &chain.skin());
         most = most.max(now.len());
-        assert_eq!(now, found_afresh(&chain.skin(), &obstacles, false));
+        assert_eq!(now, found_by_full_search(&chain.skin(), &obstacles, false));
         chain.go();
     }
     assert!(most > 50, "at most {most} contacts: nothing was tested");
@@ -164,14 +164,14 @@ fn distances_that_are_remembered_hide_no_wall() {
 
 #[test]
 fn self_contact_gives_no_net_force_and_no_net_torque() {
-    let mut noise = Noise(4);
-    let chain = Chain::crumpled(120, &mut noise);
+    let mut random = Random(4);
+    let chain = Chain::crumpled(120, &mut random);
     let mut contacts = TubeContacts::new(&[], true, 0.3).unwrap();
     assert!(contacts.find(&chain.skin()) > 10);
     for contact in &contacts.contacts {
-        let impulse = noise.vector();
+        let impulse = random.vector();
         let mut slots = vec![DVec3::ZERO; 2 * chain.positions.len()];
-        contact.slots.scatter(impulse, &mut slots);
+        contact.jacobian.scatter(impulse, &mut slots);
         let force: DVec3 = (0..chain.positions.len()).map(|i| slots[node_slot(i)]).sum();
         let torque: DVec3 = (0..chain.positions.len())
             .map(|i| chain.positions[i].cross(slots[node_slot(i)]) + slots[segment_slot(i)])
@@ -183,8 +183,8 @@ fn self_contact_gives_no_net_force_and_no_net_torque() {
 
 #[test]
 fn keys_are_unique_and_rise() {
-    let mut noise = Noise(5);
-    let mut chain = Chain::crumpled(100, &mut noise);
+    let mut random = Random(5);
+    let mut chain = Chain::crumpled(100, &mut random);
     chain.positions.iter_mut().for_each(|x| x.z -= 0.08);
     let mut contacts = TubeContacts::new(&solids(), true, 0.3).unwrap();
     assert!(contacts.find(&chain.skin()) > 50);
@@ -201,7 +201,7 @@ fn a_straight_tube_has_no_contact_with_itself() {
             radii_m: vec![RADIUS; nodes],
             arc_m: (0..nodes).map(|i| i as f64 * length).collect(),
         };
-        assert_eq!(found_afresh(&chain.skin(), &[], true), []);
+        assert_eq!(found_by_full_search(&chain.skin(), &[], true), []);
     }
 }
 
@@ -222,7 +222,7 @@ fn a_ball_that_flies_past_a_ball_is_not_stopped() {
             radii_m: vec![0.01; 2],
             arc_m: vec![0.0, 0.01],
         };
-        found_afresh(&chain.skin(), std::slice::from_ref(&ball), false).len()
+        found_by_full_search(&chain.skin(), std::slice::from_ref(&ball), false).len()
     };
     assert_eq!(pass(0.08), 0); // clears the ball by 2 cm on its way of 40 cm
     assert!(pass(0.04) > 0); // hits it, though it ends far behind it
@@ -230,7 +230,7 @@ fn a_ball_that_flies_past_a_ball_is_not_stopped() {
 
 /// A chain through a wall, whose last part is then drawn out of it and laid against it.
 #[test]
-fn what_has_left_a_solid_that_it_started_through_touches_it() {
+fn a_tube_that_has_left_a_solid_it_started_in_touches_it_again() {
     let wall = Obstacle {
         name: String::new(),
         solid: Solid::Box { half_extents_m: DVec3::new(0.1, 1.0, 0.1) },

@@ -20,7 +20,11 @@ fn apart(a: &Tube, b: &Tube) -> f64 {
 
 /// What a tube says that its steps do wrong in a tenth of a second, `seconds` after it was let go, and how far it is from where
 /// another rule in fine steps takes the same state.
-fn said_and_true(integrator: Integrator, (segments, dt_ms): (usize, f64), (damping, seconds): (f64, f64)) -> [f64; 2] {
+fn estimated_and_true(
+    integrator: Integrator,
+    (segments, dt_ms): (usize, f64),
+    (damping, seconds): (f64, f64),
+) -> [f64; 2] {
     let mut tube = let_go(integrator, segments, damping);
     run(&mut tube, dt_ms, seconds);
     let mut exact = tube.clone();
@@ -34,7 +38,7 @@ fn said_and_true(integrator: Integrator, (segments, dt_ms): (usize, f64), (dampi
 }
 
 #[test]
-fn the_error_in_time_is_told_within_a_factor_of_five_and_mostly_of_two() {
+fn the_error_in_time_is_estimated_within_a_factor_of_five_and_mostly_of_two() {
     let mut ratios = vec![];
     for (integrator, spans) in [
         (Integrator::SymplecticEuler, &[0.4, 0.8][..]),
@@ -44,7 +48,7 @@ fn the_error_in_time_is_told_within_a_factor_of_five_and_mostly_of_two() {
     ] {
         for &dt_ms in spans {
             for motion in [(0.0, 0.1), (0.0, 0.2), (0.0, 0.4), (6.0, 0.1), (6.0, 0.3), (6.0, 0.6)] {
-                let [said, truth] = said_and_true(integrator, (16, dt_ms), motion);
+                let [said, truth] = estimated_and_true(integrator, (16, dt_ms), motion);
                 let name = integrator.name();
                 let ratio = said / truth;
                 // it is rather too great than too small: what two steps do wrong is partly taken back by others
@@ -74,7 +78,7 @@ fn the_error_of_a_fall_is_that_of_the_closed_form() {
 }
 
 #[test]
-fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
+fn a_twenty_fourth_of_many_steps_is_repeated_and_nothing_else_changes() {
     for integrator in Integrator::ALL {
         let dt_ms = if integrator == Integrator::SymplecticEuler { 0.8 } else { 2.0 };
         let mut tube = Tube::new(carried(let_go(integrator, 16, 0.0).spec.clone(), dt_ms)).unwrap();
@@ -82,8 +86,8 @@ fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
         for _ in 0..960 {
             unwatched.steps = 0; // none of the first is made twice
             for (tube, work) in [(&mut tube, &mut work), (&mut unwatched, &mut plain)] {
-                let around = StepContext::alone(AgentId(0), SimTime::ZERO);
-                *work += tube.step(millis(dt_ms), &around).unwrap().work;
+                let context = StepContext::alone(AgentId(0), SimTime::ZERO);
+                *work += tube.step(millis(dt_ms), &context).unwrap().work;
             }
         }
         let name = integrator.name();
@@ -92,25 +96,25 @@ fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
 }
 
 #[test]
-fn alike_tubes_do_not_make_their_dear_steps_at_once() {
+fn similar_tubes_do_not_repeat_their_steps_together() {
     let mut tubes = vec![let_go(Integrator::ImplicitEuler, 8, 0.0); 12];
-    let mut dear = [0; 240];
-    for dear in &mut dear {
+    let mut repeated = [0; 240];
+    for repeated in &mut repeated {
         // all move alike: a step of one that takes more than the least of all is made twice
         let step = |(tube, me): (&mut Tube, AgentId)| {
             tube.step(millis(2.0), &StepContext::alone(me, SimTime::ZERO)).unwrap().work
         };
         let work: Vec<f64> = tubes.iter_mut().zip((0..).map(AgentId)).map(step).collect();
         let least = work.iter().copied().fold(f64::INFINITY, f64::min);
-        *dear = work.iter().filter(|work| **work > least).count();
+        *repeated = work.iter().filter(|work| **work > least).count();
     }
-    assert!(dear[..FIRST as usize].iter().all(|count| *count == 0), "{dear:?}");
-    assert!(dear.iter().all(|count| *count <= 1), "{dear:?}");
-    assert!(dear.iter().sum::<usize>() >= 2 * 12, "{dear:?}");
+    assert!(repeated[..FIRST as usize].iter().all(|count| *count == 0), "{repeated:?}");
+    assert!(repeated.iter().all(|count| *count <= 1), "{repeated:?}");
+    assert!(repeated.iter().sum::<usize>() >= 2 * 12, "{repeated:?}");
 }
 
 #[test]
-fn a_step_that_is_made_twice_leaves_the_bits_of_one_that_is_not() {
+fn a_repeated_step_leaves_the_bits_of_a_plain_one() {
     for integrator in Integrator::ALL {
         let mut tubes = [FIRST, FIRST + 1].map(|first| {
             let mut tube = Tube::new(carried(let_go(integrator, 16, 0.0).spec.clone(), 2.0)).unwrap();

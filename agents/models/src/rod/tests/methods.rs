@@ -128,8 +128,8 @@ fn the_explicit_limit_lies_just_below_where_the_tube_blows_up() {
                 stepper.step(now, &Setting { longest_s: f64::INFINITY, ..*setting }, ties)
             };
             let steps = (0..3000).take_while(|_| {
-                let lost = tube.step_by(share * limit_s, whole).is_err();
-                !lost && tube.energy_j() < 1e6 * start
+                let divergence = tube.step_by(share * limit_s, whole).is_err();
+                !divergence && tube.energy_j() < 1e6 * start
             });
             (steps.count(), tube.energy_j() / start)
         };
@@ -145,12 +145,12 @@ fn a_step_that_is_too_long_is_refused_and_leaves_every_bit() {
     for integrator in [Integrator::SymplecticEuler, Integrator::Xpbd] {
         let mut tube = Tube::new(TubeSpec { integrator, ..reference_spec(1e6, 16) }).unwrap();
         let limit_s = tube.longest_substep_s().unwrap();
-        let (before, around) = (tube.state().x.clone(), StepContext::alone(AgentId(0), SimTime::ZERO));
-        let error = tube.step(millis(1.01e3 * limit_s), &around).unwrap_err();
+        let (before, context) = (tube.state().x.clone(), StepContext::alone(AgentId(0), SimTime::ZERO));
+        let error = tube.step(millis(1.01e3 * limit_s), &context).unwrap_err();
         assert!(matches!(error, metachron_core::StepError::Unstable { segments: 16, .. }), "{error}");
         assert!(error.to_string().contains(integrator.name()), "{error}");
         assert_eq!(tube.state().x, before);
-        tube.step(millis(0.99e3 * limit_s), &around).unwrap();
+        tube.step(millis(0.99e3 * limit_s), &context).unwrap();
     }
 }
 

@@ -12,7 +12,7 @@ fn snapshot(tube: &Tube) -> Snapshot {
 }
 
 #[test]
-fn a_free_tube_falls_as_the_rule_of_euler_says_and_stays_straight() {
+fn a_free_tube_falls_as_implicit_euler_predicts_and_stays_straight() {
     let mut spec = reference_spec(1e6, 20);
     spec.gravity = DVec3::NEG_Z * 9.81;
     let mut tube = Tube::new(spec).unwrap();
@@ -170,8 +170,8 @@ fn published_force_moves(integrator: Integrator) {
     let mut time = SimTime::ZERO;
     for _ in 0..100 {
         let before = tube.momentum().0;
-        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(millis(8.0), &around).unwrap();
+        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        tube.step(millis(8.0), &context).unwrap();
         let force: DVec3 = snapshot(&tube).grips.iter().map(|g| g.force_n).sum();
         let gained = (tube.momentum().0 - before) / 8e-3;
         // the balance of forces holds to the accuracy of the solve, of forces of about 10 N
@@ -181,7 +181,7 @@ fn published_force_moves(integrator: Integrator) {
 }
 
 #[test]
-fn a_tube_held_by_a_spring_hangs_where_its_weight_says() {
+fn a_tube_on_a_spring_hangs_where_its_weight_balances_the_spring() {
     let mut spec = reference_spec(1e6, 16);
     spec.gravity = DVec3::NEG_Z * 9.81;
     spec.damping_per_s = 8.0;
@@ -189,8 +189,8 @@ fn a_tube_held_by_a_spring_hangs_where_its_weight_says() {
     let hands = [pull(0.5, DVec3::new(0.5, 0.0, 0.0))];
     let mut time = SimTime::ZERO;
     for _ in 0..2000 {
-        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(millis(10.0), &around).unwrap();
+        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        tube.step(millis(10.0), &context).unwrap();
         time += millis(10.0);
     }
     let weight = tube.mass_kg() * 9.81;
@@ -207,7 +207,7 @@ fn attachments_hold_a_tube_at_its_weight_over_their_stiffness_beyond_their_slack
         spec.gravity = DVec3::NEG_Z * 9.81;
         spec.damping_per_s = 8.0;
         spec.attachments = vec![Attachment { from: 0.0, to: 1.0, stiffness_n_m2: 90.0, slack_m, damping_n_s_m2: 1.0 }];
-        let weight = spec.mass_per_length_kg_m * 9.81;
+        let weight = spec.section.mass_per_length_kg_m * 9.81;
         let mut tube = Tube::new(spec).unwrap();
         run(&mut tube, 10.0, 20.0);
         for x in &tube.state().x {
@@ -217,7 +217,7 @@ fn attachments_hold_a_tube_at_its_weight_over_their_stiffness_beyond_their_slack
 }
 
 #[test]
-fn a_tube_at_rest_says_so_and_wakes_when_pulled() {
+fn a_tube_at_rest_reports_it_and_wakes_when_pulled() {
     let mut spec = reference_spec(1e6, 16);
     spec.clamp = [true, false];
     spec.gravity = DVec3::NEG_Z * 9.81;
@@ -233,8 +233,8 @@ fn a_tube_at_rest_says_so_and_wakes_when_pulled() {
     }
     assert!(asleep);
     let hands = [pull(1.0, DVec3::new(1.0, 0.0, 0.0))];
-    let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-    assert!(!tube.step(millis(10.0), &around).unwrap().at_rest);
+    let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+    assert!(!tube.step(millis(10.0), &context).unwrap().at_rest);
 }
 
 #[test]
@@ -262,7 +262,7 @@ fn an_overstretched_tube_warns() {
 }
 
 #[test]
-fn the_inverse_mass_of_a_point_says_what_a_pull_does_to_it() {
+fn the_inverse_mass_of_a_point_predicts_the_effect_of_a_pull() {
     let mut spec = reference_spec(1e6, 16);
     spec.clamp = [true, false];
     let mut still = Tube::new(spec).unwrap();
@@ -271,8 +271,8 @@ fn the_inverse_mass_of_a_point_says_what_a_pull_does_to_it() {
     run(&mut still, 4.0, 0.004);
     // a spring so soft and far that it is a force of 1 mN along y
     let hands = [AnchorSpring { stiffness_n_m: 1e-9, damping_n_s_m: 0.0, ..pull(0.7, DVec3::new(0.7, 1e6, 0.0)) }];
-    let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-    pulled.step(millis(4.0), &around).unwrap();
+    let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+    pulled.step(millis(4.0), &context).unwrap();
     let moved = snapshot(&pulled).body.point(metachron_core::Anchor::Arc(0.7)).unwrap().1;
     let want = still.inverse_mass(0.7).unwrap() * DVec3::Y * 1e-3 * 4e-3;
     assert_eq!(still.inverse_mass(0.0), Some(glam::DMat3::ZERO));

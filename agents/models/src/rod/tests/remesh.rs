@@ -56,7 +56,7 @@ proptest! {
 }
 
 #[test]
-fn what_retune_changes_of_angular_momentum_falls_with_the_square_of_epsilon() {
+fn retune_changes_angular_momentum_by_the_square_of_epsilon() {
     let tube = moving(400, 11, [false; 2]);
     let spin = tube.momentum().1;
     let errors: Vec<f64> = [16, 32, 64, 128].map(|n| (retuned(&tube, n).momentum().1 - spin).length()).to_vec();
@@ -119,7 +119,7 @@ fn a_finer_tube_at_rest_has_a_smaller_residual() {
 }
 
 #[test]
-fn a_fixed_spacing_is_never_divided_anew_and_odd_wishes_get_the_nearest() {
+fn a_fixed_spacing_is_never_remeshed_and_odd_requests_get_the_nearest() {
     let mut spec = reference_spec(1e6, 10);
     spec.range = ResolutionRange { eps_m: (0.05, 0.05), n: (0, 5) };
     let mut fixed = Tube::new(spec).unwrap();

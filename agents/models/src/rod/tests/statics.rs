@@ -100,8 +100,8 @@ fn a_cantilever_with_a_load_at_its_tip_is_the_elastica() {
         };
         let mut tube = Tube::new(spec).unwrap();
         for _ in 0..1000 {
-            let around = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-            tube.step(millis(10.0), &around).unwrap();
+            let context = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+            tube.step(millis(10.0), &context).unwrap();
         }
         let error = (*tube.state().x.last().unwrap() - want).length();
         // second order: κ l²/24 along the arm is 1e-4 for α = 10 at 64 segments; the rod is inextensible to 1e-6

@@ -17,7 +17,7 @@ fn another(owned: bool, told_s: f64) -> Neighbour {
     let mut snapshot = Snapshot::default();
     snapshot.body.soft_mut();
     snapshot.inertia.response_mut::<SoftInertia>().span_s = told_s;
-    Neighbour { owned, step_s: 1.0 / 60.0, ..Neighbour::seen(AgentId(1), Arc::new(snapshot)) }
+    Neighbour { owned, step_s: 1.0 / 60.0, ..Neighbour::observed(AgentId(1), Arc::new(snapshot)) }
 }
 
 fn told(body: &SoftBody) -> SoftInertia {

@@ -117,10 +117,10 @@ fn a_held_cube_hangs_by_its_weight_as_deep_and_as_upright_as_the_hold_has_it() {
         pair.assert_sag(&format_args!("{rates:?}, {tip}"));
         // k a² θ = m g r about the point that is held, r the lever of the centre of mass across gravity
         let (state, grasp) = (pair.state(), pair.jaws().grasp.expect("it holds"));
-        let (Anchor::Local(local), Some(clasp)) = (grasp.anchor, grasp.clasp) else { panic!("{grasp:?}") };
+        let (Anchor::Local(local), Some(orientation)) = (grasp.anchor, grasp.orientation) else { panic!("{grasp:?}") };
         let lever_m = (state.rotation * local).truncate().length();
         let wanted = WEIGHT_N * lever_m / (STIFFNESS_N_M * REACH_M * REACH_M);
-        let tilt = (DOWN * clasp.rotation).angle_between(state.rotation);
+        let tilt = (DOWN * orientation.rotation).angle_between(state.rotation);
         println!("{rates:?} {tip}: {least} … {most} N, sag {}, tilt {tilt} for {wanted}", pair.stretch());
         assert!((tilt - wanted).abs() < 0.01 * wanted + 1e-6, "{rates:?}, {tip}: {tilt} rad, not {wanted}");
     }
@@ -266,6 +266,6 @@ fn a_rigid_body_out_of_reach_or_not_to_be_grasped_is_left_alone() {
         stage.law(body, tool, metachron_contact::Law::Off);
         stage.run(0.2, |_| {});
         let Body::Tool(state) = stage.newest(tool).body else { panic!("a tool") };
-        assert_eq!((state.grasp, state.lets_in), (None, None), "{tip}");
+        assert_eq!((state.grasp, state.admits), (None, None), "{tip}");
     }
 }

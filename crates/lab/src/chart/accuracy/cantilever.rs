@@ -63,7 +63,7 @@ impl Benchmark for Cantilever {
             ..reference_tube(young_pa, metre())
         };
         let Section { ea_n, ga_n, ei_n_m2, .. } = spec.section;
-        let weight_n_m = spec.mass_per_length_kg_m * GRAVITY;
+        let weight_n_m = spec.section.mass_per_length_kg_m * GRAVITY;
         let (side, down) = Hanging { length_m: 1.0, weight_n_m, ea_n, ga_n, ei_n_m2 }.tip_m();
         let mut play = Play::new(spec, case)?;
         let sound = play.run(SECONDS, &[]);

@@ -73,7 +73,7 @@ impl Mode {
 
     /// Its frequency in theory, Hz: β² √(EI/μ)/2π, β √(EA/μ)/2π, β √(GJ/2ρI)/2π.
     fn hz(&self, spec: &TubeSpec) -> f64 {
-        let (section, mu) = (&spec.section, spec.mass_per_length_kg_m);
+        let (section, mu) = (&spec.section, spec.section.mass_per_length_kg_m);
         let speed = match self.kind {
             Kind::Bending => self.beta * (section.ei_n_m2 / mu).sqrt(),
             Kind::Axial => (section.ea_n / mu).sqrt(),
@@ -95,7 +95,7 @@ impl Mode {
     /// Pulls at every node that excite the mode.
     fn hands(&self, spec: &TubeSpec, nodes: u32) -> Vec<AnchorSpring> {
         let axis = if self.kind == Kind::Axial { DVec3::X } else { DVec3::Z };
-        let force = PULLED_M * spec.mass_per_length_kg_m * (TAU * self.hz(spec)).powi(2) / f64::from(nodes);
+        let force = PULLED_M * spec.section.mass_per_length_kg_m * (TAU * self.hz(spec)).powi(2) / f64::from(nodes);
         let at = |k: u32| f64::from(k) / f64::from(nodes);
         (1..=nodes).map(|k| dead_load(at(k), axis * (force * self.shape(at(k))))).collect()
     }

@@ -34,9 +34,9 @@ impl Benchmark for Inflation {
 
     fn play(case: &Case) -> Option<(Play, f64)> {
         let (_, wall) = WALLS.into_iter().find(|(name, _)| *name == case.case)?;
-        let (section, mass_per_length_kg_m) = Section::hollow(RADIUS_M, wall * RADIUS_M, MATERIAL);
+        let section = Section::hollow(RADIUS_M, wall * RADIUS_M, MATERIAL);
         let pressure_pa = STRAIN * MATERIAL.young_pa * wall;
-        let free = TubeSpec::free(metre(), (section, mass_per_length_kg_m), 16);
+        let free = TubeSpec::free(metre(), section, 16);
         let mut play = Play::new(TubeSpec { pressure_pa, clamp: [true, false], ..free }, case)?;
         let sound = play.run(1.0, &[]);
         let widened = play.curve().radii_m.first()? - RADIUS_M;

@@ -11,7 +11,7 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::scenes::{Scene, scene};
 use super::super::table::Table;
 use glam::DVec3;
-use metachron_contact::audit::{Member, on_their_way, settled};
+use metachron_contact::audit::{Member, in_flight, settled};
 use metachron_core::Site;
 use metachron_core::{AgentId, Anchor, Body, SimTime};
 use serde::{Deserialize, Serialize};
@@ -223,7 +223,7 @@ fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
     let mut body = member.snapshot.body.clone();
     let (Body::Curve(state), Some(inertia)) = (&mut body, member.snapshot.inertia.response()) else { return body };
     let mut carried = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
-    on_their_way(member, members, |_, site, _, moved| {
+    in_flight(member, members, |_, site, _, moved| {
         let Site::Arc(arc_m) = site else { return };
         let Some((segment, share)) = state.locate(arc_m) else { return };
         carried[2 * segment] += moved.linear * (1.0 - share);

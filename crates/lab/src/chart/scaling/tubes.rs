@@ -84,13 +84,13 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
         velocity: DVec3::ZERO,
         spin: DVec3::ZERO,
         jaw: 0.0,
-        grasp: Some(Grasp { target: AgentId(0), anchor, clasp: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
-        lets_in: None,
+        grasp: Some(Grasp { target: AgentId(0), anchor, orientation: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
+        admits: None,
         force_n: 0.0,
-        is_left: false,
+        is_idle: false,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
-    Some(vec![Neighbour { owned: true, ..Neighbour::seen(AgentId(1), tool) }])
+    Some(vec![Neighbour { owned: true, ..Neighbour::observed(AgentId(1), tool) }])
 }
 
 /// One step among `neighbours`; `None` where it fails.

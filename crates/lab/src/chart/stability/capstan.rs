@@ -167,7 +167,7 @@ fn tube(case: &Case) -> Option<Tube> {
     // its rest shape follows the drum, so bending takes no force; with even less stiffness a taut tube chatters and creeps
     (spec.section.ea_n, spec.section.ga_n) = (2e3, 1e3);
     (spec.section.ei_n_m2, spec.section.gj_n_m2) = (1e-3, 1e-3);
-    spec.mass_per_length_kg_m = 0.05;
+    spec.section.mass_per_length_kg_m = 0.05;
     Tube::new(spec).ok()
 }
 

@@ -167,10 +167,9 @@ fn moduli(rows: &[Row]) -> Vec<f64> {
 /// The reference tube along +x.
 fn spec(young_pa: f64) -> TubeSpec {
     let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    let section = Section::hollow(0.015, 0.002, material);
     TubeSpec {
         section,
-        mass_per_length_kg_m,
         damping_per_s: DAMPING_PER_S,
         clamp: [true, false],
         gravity: DVec3::NEG_Z * GRAVITY,
@@ -182,7 +181,7 @@ fn spec(young_pa: f64) -> TubeSpec {
 fn rest_of(young_pa: f64) -> DVec3 {
     let spec = spec(young_pa);
     let Section { ea_n, ga_n, ei_n_m2, .. } = spec.section;
-    let weight_n_m = spec.mass_per_length_kg_m * GRAVITY;
+    let weight_n_m = spec.section.mass_per_length_kg_m * GRAVITY;
     let (side, down) = Hanging { length_m: LENGTH_M, weight_n_m, ea_n, ga_n, ei_n_m2 }.tip_m();
     DVec3::new(side, 0.0, -down)
 }
@@ -200,7 +199,7 @@ struct Fall {
 fn fall(case: &Case) -> Fall {
     let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.integrator).unwrap_or_default();
     let spec = TubeSpec { integrator, ..spec(case.young_pa) };
-    let given_j = spec.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
+    let given_j = spec.section.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
     let mut out = Fall { tip: None, energy_rise: 0.0, stretch: 1.0, substeps_per_step: 0.0, refused: false };
     let (Ok(mut tube), Some(dt)) = (Tube::new(spec), SimSpan::from_secs_f64(case.dt_ms * 1e-3)) else { return out };
     let start_j = tube.energy_j();

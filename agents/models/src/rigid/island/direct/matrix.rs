@@ -5,7 +5,7 @@
 use super::order::Order;
 use super::row::{Mass, NOBODY, Row};
 use glam::DVec3;
-use metachron_core::skyline_cholesky::SkylineCholesky;
+use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// A symmetric positive matrix over the velocities of all bodies; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
@@ -39,7 +39,7 @@ impl Matrix {
     pub(super) fn start(&mut self, masses: &[Mass]) {
         self.envelope.shape(&self.first);
         for (mass, &place) in masses.iter().zip(self.order.places()) {
-            let home = (place as usize, place as usize);
+            let home = BlockIndex::diagonal(place as usize);
             for k in 0..3 {
                 let unit = |at: usize| std::array::from_fn(|i| f64::from(u8::from(i == at)));
                 self.envelope.add(home, mass.mass_kg, unit(k), unit(k));
@@ -57,12 +57,12 @@ impl Matrix {
         };
         let place = |body: u32| self.order.places()[body as usize] as usize;
         let a = (place(row.a), six(1.0, row.turn_a));
-        self.envelope.add((a.0, a.0), weight, a.1, a.1);
+        self.envelope.add(BlockIndex::diagonal(a.0), weight, a.1, a.1);
         if row.b != NOBODY {
             let b = (place(row.b), six(-1.0, row.turn_b));
-            self.envelope.add((b.0, b.0), weight, b.1, b.1);
+            self.envelope.add(BlockIndex::diagonal(b.0), weight, b.1, b.1);
             let (low, high) = if a.0 > b.0 { (b, a) } else { (a, b) };
-            self.envelope.add((high.0, low.0), weight, high.1, low.1);
+            self.envelope.add(BlockIndex { row: high.0, column: low.0 }, weight, high.1, low.1);
         }
     }
 

@@ -114,7 +114,7 @@ impl Hanging {
             if self.time <= self.party.time {
                 let link = Snapshot { time: self.party.time, ..self.party.snapshot(0) };
                 let form = self.party.bodies[0].form();
-                let near = [Neighbour { form, ..Neighbour::seen(AgentId(0), Arc::new(link)) }];
+                let near = [Neighbour { form, ..Neighbour::observed(AgentId(0), Arc::new(link)) }];
                 let around = StepContext { neighbours: &near, ..StepContext::alone(TOOL, self.time) };
                 let dt = SimSpan::from_secs_f64(tool_s).unwrap();
                 self.tool.step(dt, &around).unwrap();
@@ -124,7 +124,7 @@ impl Hanging {
                 self.tool.write_snapshot(&mut seen);
                 seen.time = self.time;
                 let (form, owned) = (self.tool.form(), true);
-                self.party.near = vec![Neighbour { form, owned, ..Neighbour::seen(TOOL, Arc::new(seen)) }];
+                self.party.near = vec![Neighbour { form, owned, ..Neighbour::observed(TOOL, Arc::new(seen)) }];
                 self.party.step(chain_s);
                 self.party.time += SimSpan::from_secs_f64(chain_s).unwrap();
             }

@@ -86,9 +86,10 @@ fn a_companion_that_is_lost_leaves_everybody_as_before() {
     let before = bits(&party, 0);
     let (leader, others) = party.bodies.split_first_mut().unwrap();
     let id = AgentId(1);
-    let mut others = [Companion { id, agent: &mut others[0], around: StepContext::alone(id, SimTime::ZERO) }];
+    let mut others = [IslandMember { id, agent: &mut others[0], context: StepContext::alone(id, SimTime::ZERO) }];
     let dt = SimSpan::from_secs_f64(0.01).unwrap();
-    let error = leader.lead(dt, &StepContext::alone(AgentId(0), SimTime::ZERO), &mut others, &mut vec![]).unwrap_err();
+    let error =
+        leader.step_island(dt, &StepContext::alone(AgentId(0), SimTime::ZERO), &mut others, &mut vec![]).unwrap_err();
     assert!(matches!(error, metachron_core::StepError::Diverged { .. }), "{error}");
     assert_eq!(bits(&party, 0), before);
 }

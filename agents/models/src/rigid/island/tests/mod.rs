@@ -2,7 +2,7 @@
 
 use super::super::{Joint, JointKind, RigidBody, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, AnchorSpring, Companion, Neighbour, StepContext};
+use metachron_contact::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, RigidState, SimSpan, SimTime, Snapshot, StepReport};
 use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
@@ -73,17 +73,17 @@ impl Party {
     fn step(&mut self, dt: f64) -> StepReport {
         let dt = SimSpan::from_secs_f64(dt).unwrap();
         let (leader, others) = self.bodies.split_first_mut().unwrap();
-        let mut others: Vec<Companion<'_>> = others
+        let mut others: Vec<IslandMember<'_>> = others
             .iter_mut()
             .enumerate()
             .map(|(i, body)| {
                 let id = AgentId(i as u32 + 1);
-                Companion { id, agent: body, around: StepContext::alone(id, self.time) }
+                IslandMember { id, agent: body, context: StepContext::alone(id, self.time) }
             })
             .collect();
         let around =
             StepContext { hands: &self.hands, neighbours: &self.near, ..StepContext::alone(AgentId(0), self.time) };
-        leader.lead(dt, &around, &mut others, &mut self.apart).unwrap()
+        leader.step_island(dt, &around, &mut others, &mut self.apart).unwrap()
     }
 
     fn run(&mut self, dt: f64, seconds: f64) {

@@ -11,7 +11,7 @@ use metachron_core::ResolutionRange;
 /// A soft strand that swings between two points, this finely divided; a wish may change that.
 fn strand(path_m: Vec<DVec3>, eps_m: f64) -> TubeSpec {
     let material = Material { young_pa: 5e4, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.012, 0.003, material);
+    let section = Section::hollow(0.012, 0.003, material);
     TubeSpec {
         pin: [true; 2],
         segments: None,
@@ -21,7 +21,7 @@ fn strand(path_m: Vec<DVec3>, eps_m: f64) -> TubeSpec {
         resolution: Resolution { eps_m, n: 3 },
         range: ResolutionRange { eps_m: (8e-4, 0.08), n: (0, 5) },
         sleep: false,
-        ..TubeSpec::free(path_m, (section, mass_per_length_kg_m), 8)
+        ..TubeSpec::free(path_m, section, 8)
     }
 }
 

@@ -114,7 +114,7 @@ fn a_penalty_bears_a_tube_by_its_stiffness_times_its_depth() {
     let path_m = vec![DVec3::new(-0.1, 0.0, 0.04), DVec3::new(0.1, 0.0, 0.04)];
     let base = TubeSpec { friction: 0.0, damping_per_s: 10.0, ..reference_spec(1e8, 10) };
     // without friction: explicit as it is, it would chatter
-    let weight = 0.2 * base.mass_per_length_kg_m * 9.81;
+    let weight = 0.2 * base.section.mass_per_length_kg_m * 9.81;
     let tube = stage.add(Tube::new(TubeSpec { path_m, gravity: GRAVITY, ..base }).unwrap(), 500.0);
     let table = Solid::Box { half_extents_m: DVec3::new(0.3, 0.3, 0.02) };
     let table = stage.add(Prop::new(table, f64::INFINITY, DVec3::ZERO, 0.5), 100.0);
@@ -172,7 +172,7 @@ fn a_tube_knocks_at_a_sleeper_that_owns_the_pair() {
     sleeper.write_snapshot(&mut seen);
     for (at_rest, knocks) in [(true, true), (false, false)] {
         let snapshot = Arc::new(Snapshot { at_rest, ..seen.clone() });
-        let near = Neighbour { form: sleeper.form(), ..Neighbour::seen(AgentId(3), snapshot) };
+        let near = Neighbour { form: sleeper.form(), ..Neighbour::observed(AgentId(3), snapshot) };
         let neighbours = std::slice::from_ref(&near);
         let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
         tube.step(millis(10.0), &around).unwrap();

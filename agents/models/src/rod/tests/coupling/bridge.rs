@@ -74,7 +74,7 @@ fn common(stage: &Stage) -> Option<SimTime> {
 fn lie(rates: [f64; 3], mass_kg: f64) -> Lying {
     let mut stage = Stage::new(Faults::default());
     let specs = [-0.04, 0.04].map(tube);
-    let (mass_per_length_kg_m, rotary_kg_m) = (specs[0].mass_per_length_kg_m, specs[0].section.rotary_kg_m);
+    let (mass_per_length_kg_m, rotary_kg_m) = (specs[0].section.mass_per_length_kg_m, specs[0].section.rotary_kg_m);
     for (spec, hz) in specs.into_iter().zip(rates) {
         stage.add(Tube::new(spec).unwrap(), hz);
     }

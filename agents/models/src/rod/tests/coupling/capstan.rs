@@ -33,7 +33,7 @@ fn cord(angle: f64, segments: usize) -> Tube {
     path_m.extend([0.5, 1.0].map(|share| on(angle) + along(angle) * (share * ENDS_M)));
     let young_pa = 2e6;
     let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (mut section, mass_per_length_kg_m) = Section::hollow(CORD_M, CORD_M, material);
+    let mut section = Section::hollow(CORD_M, CORD_M, material);
     // limp: to bend onto the bar takes a thousandth of the tension
     (section.ei_n_m2, section.gj_n_m2) = (1e-7, 1e-7);
     let cylinder = Obstacle {
@@ -47,7 +47,6 @@ fn cord(angle: f64, segments: usize) -> Tube {
     let spec = TubeSpec {
         path_m,
         section,
-        mass_per_length_kg_m,
         friction: FRICTION,
         damping_per_s: 20.0,
         obstacles: vec![cylinder].into(),

@@ -35,7 +35,7 @@ fn ring(turn: usize) -> Ring {
     let at = |i: usize| DVec3::new(libm::cos(angle(i)), libm::sin(angle(i)), 0.1 * (i as f64 - 2.0)) * 0.3;
     let along = |i: usize| DVec3::new(-libm::sin(angle(i)), libm::cos(angle(i)), 0.2).normalize();
     let base = TubeSpec { friction: 0.3, ..reference_spec(1e6, 12) };
-    let weight = (base.mass_per_length_kg_m, base.section.rotary_kg_m);
+    let weight = (base.section.mass_per_length_kg_m, base.section.rotary_kg_m);
     let ids = [0, 1, 2, 3, 4].map(|i| {
         if i % 2 == 1 {
             let half = along(i) * (0.5 * TUBE_M);

@@ -24,9 +24,9 @@ struct Lying {
 /// A tube of this radius and wall, metres, and modulus, Pa, in 24 segments.
 fn tube(path_m: Vec<DVec3>, (radius_m, wall_m, young_pa): (f64, f64, f64)) -> TubeSpec {
     let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(radius_m, wall_m, material);
+    let section = Section::hollow(radius_m, wall_m, material);
     let base = TubeSpec { friction: 0.4, damping_per_s: 1.0, ..reference_spec(young_pa, 24) };
-    TubeSpec { path_m, section, mass_per_length_kg_m, gravity: GRAVITY, ..base }
+    TubeSpec { path_m, section, gravity: GRAVITY, ..base }
 }
 
 /// The lower one, held at both ends, along x.
@@ -49,8 +49,7 @@ fn cross(rates: (f64, f64), hose: TubeSpec, faults: Faults) -> Lying {
     let ids = [stage.add(rope, rates.0), stage.add(hose, rates.1)];
     let energy_j = |stage: &Stage| {
         let member = |id: AgentId| {
-            let TubeSpec { mass_per_length_kg_m, section, .. } = &specs[id.0 as usize];
-            let (mass_per_length_kg_m, rotary_kg_m) = (*mass_per_length_kg_m, section.rotary_kg_m);
+            let Section { mass_per_length_kg_m, rotary_kg_m, .. } = specs[id.0 as usize].section;
             Member { id, snapshot: stage.newest(id), mass_per_length_kg_m, rotary_kg_m }
         };
         audit(&ids.map(member), SimTime::ZERO, &mut |_, _| 0.0).energy_j
@@ -67,7 +66,7 @@ fn cross(rates: (f64, f64), hose: TubeSpec, faults: Faults) -> Lying {
         let pairs = ids.iter().flat_map(|id| &stage.newest(*id).pairs);
         depth_m = pairs.map(|pair| pair.penetration_m).fold(depth_m, f64::max);
     });
-    let borne = (given(&stage) - before) / 0.8 / (0.4 * specs[1].mass_per_length_kg_m * 9.81);
+    let borne = (given(&stage) - before) / 0.8 / (0.4 * specs[1].section.mass_per_length_kg_m * 9.81);
     let near = |id: AgentId| {
         let at = |x: &&DVec3| x.truncate().distance(DVec2::X * 0.02) < 0.03;
         nodes(stage.newest(id)).iter().filter(at).map(|x| x.z)

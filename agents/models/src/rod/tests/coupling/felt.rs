@@ -61,7 +61,7 @@ fn felt(x_m: f64, young_pa: f64) -> ([f64; 2], f64) {
     ball.state.velocity = DVec3::NEG_Z;
     let mut seen = Snapshot::default();
     ball.write_snapshot(&mut seen);
-    let near = Neighbour { form: ball.form(), owned: true, ..Neighbour::seen(AgentId(3), Arc::new(seen)) };
+    let near = Neighbour { form: ball.form(), owned: true, ..Neighbour::observed(AgentId(3), Arc::new(seen)) };
     let neighbours = std::slice::from_ref(&near);
     tube.step(millis(4.0), &StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) }).unwrap();
     let mut told = Snapshot::default();

@@ -111,7 +111,7 @@ impl Gripper {
             substeps: (60.0 / tube_hz).ceil().max(1.0) as u32,
             ..reference_spec(1e6, 20)
         };
-        let weight_n = spec.mass_per_length_kg_m * 0.2 * G;
+        let weight_n = spec.section.mass_per_length_kg_m * 0.2 * G;
         let tube = stage.add(Tube::new(spec).unwrap(), tube_hz);
         let sides = [-1.0, 1.0];
         let way_m = 0.005 + squeeze_n / (SPRINGS * SPRING_N_M);

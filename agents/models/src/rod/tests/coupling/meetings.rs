@@ -123,7 +123,7 @@ fn with_mail(stage: &Stage, tube: AgentId, owner: AgentId) -> f64 {
     let known = response.and_then(|response| Some((response, response.curve()?.spins())));
     let Some((inertia, spins)) = known else { return snapshot.energy_j };
     let mut impulses = vec![DVec3::ZERO; inertia.slots()];
-    let seen = Neighbour::seen(tube, Arc::new(snapshot.clone()));
+    let seen = Neighbour::observed(tube, Arc::new(snapshot.clone()));
     for ledger in stage.newest(owner).given.iter().filter(|ledger| ledger.with == tube) {
         ledger.since(acknowledged(&seen, owner), snapshot.time, |site, sum, _| {
             let Site::Arc(arc_m) = site else { panic!("a site of a tube") };

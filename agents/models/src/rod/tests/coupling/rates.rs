@@ -58,7 +58,7 @@ fn position(stage: &Stage) -> DVec3 {
 
 fn lie(mut stage: Stage, spec: &TubeSpec, mass_kg: f64) -> Lying {
     let energy_j = |stage: &Stage| {
-        let (mass_per_length_kg_m, rotary_kg_m) = (spec.mass_per_length_kg_m, spec.section.rotary_kg_m);
+        let (mass_per_length_kg_m, rotary_kg_m) = (spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m);
         let member = |id| Member { id, snapshot: stage.newest(id), mass_per_length_kg_m, rotary_kg_m };
         let at = stage.newest(TUBE).time.min(stage.newest(BODY).time);
         let weight = GRAVITY * mass_kg;
@@ -109,7 +109,7 @@ fn tube_on_block(integrator: Integrator, rates: (f64, f64)) {
     stage.add(Tube::new(spec.clone()).unwrap(), rates.0);
     stage.add(block(0.3, DVec3::Z * HALF_M, GRAVITY), rates.1);
     let Lying { depth_m, drift_m_s, force_n, span_m, rise_j, .. } = lie(stage, &spec, 0.3);
-    let weight_n = 0.2 * spec.mass_per_length_kg_m * 9.81;
+    let weight_n = 0.2 * spec.section.mass_per_length_kg_m * 9.81;
     let force = force_n / weight_n;
     println!(
         "{} {rates:?}: depth {depth_m:e} drift {drift_m_s:e} force {force} span {span_m:e} rise {rise_j:e}",

@@ -25,7 +25,7 @@ fn giver(tube: &Tube, seed: u64) -> (Neighbour, DVec3) {
         ledger.give(site, SimTime::ZERO, 0.0, impulse);
     }
     let snapshot = Snapshot { given: vec![ledger], ..Snapshot::default() };
-    (Neighbour::seen(GIVER, Arc::new(snapshot)), total)
+    (Neighbour::observed(GIVER, Arc::new(snapshot)), total)
 }
 
 fn step(tube: &mut Tube, time: SimTime, neighbours: &[Neighbour]) {
@@ -77,7 +77,7 @@ fn a_held_end_takes_nothing() {
     ledger.give(Site::Arc(0.0), SimTime::ZERO, 0.0, Impulse { linear: DVec3::Y, angular: DVec3::ZERO });
     let snapshot = Snapshot { given: vec![ledger], ..Snapshot::default() };
     let before = tube.state().x.clone();
-    step(&mut tube, SimTime::ZERO + millis(8.0), &[Neighbour::seen(GIVER, Arc::new(snapshot))]);
+    step(&mut tube, SimTime::ZERO + millis(8.0), &[Neighbour::observed(GIVER, Arc::new(snapshot))]);
     assert_eq!(tube.state().x[0], before[0]);
     let moved = tube.state().x.iter().zip(&before).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     assert!(moved < 1e-12, "{moved}"); // rounding of positions near 1 m
@@ -89,7 +89,7 @@ fn a_tube_takes_nothing_that_is_not_finite() {
     let mut ledger = Ledger::new(ME);
     ledger.give(Site::Arc(0.3), SimTime::ZERO, 0.0, Impulse { linear: DVec3::NAN, angular: DVec3::ZERO });
     let snapshot = Snapshot { given: vec![ledger], ..Snapshot::default() };
-    step(&mut tube, SimTime::ZERO, &[Neighbour::seen(GIVER, Arc::new(snapshot))]);
+    step(&mut tube, SimTime::ZERO, &[Neighbour::observed(GIVER, Arc::new(snapshot))]);
     assert!(tube.state().is_finite());
     assert!(tube.momentum().0.length() < 1e-15);
 }
@@ -99,7 +99,7 @@ fn the_published_inertia_is_the_inverse_mass_of_every_point() {
     let spec = TubeSpec { clamp: [true, false], gravity: DVec3::NEG_Z * 9.81, ..reference_spec(1e5, 24) };
     let mut tube = Tube::new(spec).unwrap();
     let form = tube.form();
-    let near = Neighbour { form, ..Neighbour::seen(GIVER, Arc::new(Snapshot::default())) };
+    let near = Neighbour { form, ..Neighbour::observed(GIVER, Arc::new(Snapshot::default())) };
     for k in 0..50 {
         step(&mut tube, SimTime::ZERO + millis(4.0 * f64::from(k)), std::slice::from_ref(&near));
     }

@@ -103,9 +103,9 @@ fn a_plate_slides_down_two_tubes_as_coulomb_says() {
 fn tube_across(hz: f64) -> (Stage, [AgentId; 2]) {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let made = |path_m: Vec<DVec3>, (radius_m, wall_m): (f64, f64), held: bool| {
-        let (section, mass_per_length_kg_m) = Section::hollow(radius_m, wall_m, material);
+        let section = Section::hollow(radius_m, wall_m, material);
         let base = TubeSpec { friction: 0.5, damping_per_s: 2.0, gravity: GRAVITY, ..reference_spec(1e6, 24) };
-        Tube::new(TubeSpec { path_m, section, mass_per_length_kg_m, clamp: [held; 2], ..base }).unwrap()
+        Tube::new(TubeSpec { path_m, section, clamp: [held; 2], ..base }).unwrap()
     };
     let mut stage = Stage::new(Faults::default());
     let lower = made(vec![DVec3::X * -0.2, DVec3::X * 0.2], (0.014, 0.003), true);

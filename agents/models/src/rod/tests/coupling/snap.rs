@@ -75,7 +75,7 @@ impl Snap {
 
     /// Energy at the earliest own time, joules.
     fn energy_j(stage: &Stage, springs: &[Vec<AnchorSpring>; 2], spec: &TubeSpec) -> f64 {
-        let (mass_per_length_kg_m, rotary_kg_m) = (spec.mass_per_length_kg_m, spec.section.rotary_kg_m);
+        let (mass_per_length_kg_m, rotary_kg_m) = (spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m);
         let ids = [TUBE, AgentId(1), AgentId(2)];
         let members = ids.map(|id| Member { id, snapshot: stage.newest(id), mass_per_length_kg_m, rotary_kg_m });
         let at = ids.map(|id| stage.newest(id).time).into_iter().min().unwrap();
