@@ -57,17 +57,26 @@ const DRAWINGS: usize = 5;
 const PICTURE: Duration = Duration::from_millis(60);
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
-/// A picture to draw: of this size without an object, or balls of (shading, triangles, pixels) each.
+/// Equal balls: shading, requested triangles and covered pixels of each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Balls {
+    shading: Shading,
+    triangles: u32,
+    pixels: f64,
+}
+
+/// A picture to draw: of this size without an object, or balls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Ask {
     Empty(Size),
-    Balls(Shading, u32, f64),
+    Balls(Balls),
 }
 
 /// All pictures in drawing order: balls whose triangles cover the least and the greatest area come first.
 fn asks(areas_px: &[f64]) -> Vec<Ask> {
     let of = |area_px| {
-        numbers(area_px).flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(shading, triangles, pixels)))
+        numbers(area_px)
+            .flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(Balls { shading, triangles, pixels })))
     };
     EMPTY.into_iter().map(Ask::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
 }
@@ -91,7 +100,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
     // shaders are compiled at their first use, which must not count as drawing time
     for shading in SHADINGS {
-        measure(&mut screen, &ball, (shading, TRIANGLES[0], SQUARES[0].1))?;
+        measure(&mut screen, &ball, Balls { shading, triangles: TRIANGLES[0], pixels: SQUARES[0].1 })?;
     }
     let (begun, mut drawn) = (Instant::now(), Vec::new());
     for ask in asks(areas_px).into_iter().skip(known) {
@@ -99,7 +108,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
             break;
         }
         drawn.push(match ask {
-            Ask::Balls(shading, triangles, pixels) => measure(&mut screen, &ball, (shading, triangles, pixels))?,
+            Ask::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
             Ask::Empty(size) => {
                 screen = screen.resized(size)?;
                 let found = empty(&mut screen)?;
@@ -130,11 +139,8 @@ fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
     covers.filter(|(_, pixels)| (LEAST_PX..=SQUARES[SQUARES.len() - 1].1).contains(pixels)).take(NUMBERS)
 }
 
-fn measure(
-    screen: &mut Offscreen,
-    ball: &Arc<ProgressiveMesh>,
-    (shading, triangles, pixels): (Shading, u32, f64),
-) -> Result<Drawn, GpuError> {
+fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -> Result<Drawn, GpuError> {
+    let Balls { shading, triangles, pixels } = wanted;
     let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
     let mut stage = balls(ball, side, shading == Shading::Textured);
     let cut = ball.cut(triangles).triangles;

@@ -72,7 +72,7 @@ impl SceneView {
         for &number in &scratch.shown {
             let (track, at) = (&mut self.tracks[number], level(levels, number));
             if at.triangles > 0 {
-                add_solid(track, at, &picture, (&mut scratch.solids, &mut allowance));
+                add_solid(track, at, &picture, &mut scratch.solids, &mut allowance);
             } else {
                 track.glide = None;
             }

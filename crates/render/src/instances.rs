@@ -66,30 +66,29 @@ pub(super) fn add_solid(
     track: &mut Track,
     at: Level,
     picture: &Picture,
-    (solids, allowance): (&mut Solids, &mut Allowance),
+    solids: &mut Solids,
+    allowance: &mut Allowance,
 ) {
-    let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
     if matches!(track.actor.form, Form::Scenery(..)) {
-        return add_scenery(track, at, (paint, picture.origin), (solids, allowance));
+        return add_scenery(track, at, picture, solids, allowance);
     }
+    let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
     match (&track.actor.form, &track.pose) {
         (Form::Solid(solid), Body::Rigid(rigid)) => {
             let Some((mesh, size)) = mesh_of(solid, track.body.given, at.resolution.n) else { return };
             let place = rigid.position - picture.origin;
             solids.push((kind(at.shading, mesh), instance(place, rigid.rotation, size, paint)));
         }
-        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at, paint, picture.origin), solids),
+        (Form::Tool(shape), Body::Tool(tool)) => {
+            solids.extend(tool_parts(shape, tool, at, paint, picture.origin));
+        }
         _ => {}
     }
 }
 
 /// Adds visible scenery with the triangles that its level gives.
-fn add_scenery(
-    track: &mut Track,
-    level: Level,
-    (mut paint, origin): (Paint, DVec3),
-    (solids, allowance): (&mut Solids, &mut Allowance),
-) {
+fn add_scenery(track: &mut Track, level: Level, picture: &Picture, solids: &mut Solids, allowance: &mut Allowance) {
+    let mut paint = Paint::of(track.actor.look, tint(picture.style, level, track.age_s));
     let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.given, track.seen) else {
         return;
     };
@@ -113,17 +112,23 @@ fn add_scenery(
         Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, mesh }, wrap),
         None => (kind(level.shading, mesh), 0.0),
     };
-    let still = instance(at.position - origin, at.rotation, size, paint);
+    let still = instance(at.position - picture.origin, at.rotation, size, paint);
     solids.push((kind, SolidInstance { glide: share, wrap: [wrap, 0.0], ..still }));
 }
 
-fn add_tool(shape: &ToolShape, tool: &ToolState, (level, paint, origin): (Level, Paint, DVec3), solids: &mut Solids) {
-    let n = level.resolution.n;
-    for part in shape.parts(tool.jaw) {
+/// The parts of a tool at a level, relative to `origin`.
+fn tool_parts(
+    shape: &ToolShape,
+    tool: &ToolState,
+    level: Level,
+    paint: Paint,
+    origin: DVec3,
+) -> impl Iterator<Item = (SolidKind, SolidInstance)> {
+    shape.parts(tool.jaw).into_iter().map(move |part| {
         let position = tool.tip + tool.rotation * part.position - origin;
-        let mesh = MeshKey::Primitive(part.primitive, n);
-        solids.push((kind(level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint)));
-    }
+        let mesh = MeshKey::Primitive(part.primitive, level.resolution.n);
+        (kind(level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint))
+    })
 }
 
 pub(super) fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Solids) {

@@ -42,7 +42,7 @@ impl SceneView {
         let frustum = camera.frustum(size);
         self.looked.clear();
         for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
-            let view = look(track, camera, (size, &frustum));
+            let view = seen_of(track, camera, size, &frustum);
             (track.seen, track.fresh) = (view.visible, false);
             if !track.seen {
                 track.glide = None;
@@ -78,7 +78,7 @@ impl SceneView {
     }
 }
 
-fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Seen {
+fn seen_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum) -> Seen {
     let bounds = track.bounds;
     let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
     let visible = !unseen && frustum.sees(bounds.centre, bounds.radius_m);
@@ -89,7 +89,7 @@ fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Se
         Body::Curve(curve) => {
             let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
             let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
-            (curve_pixels(curve, camera, (size, frustum)), speed, tube_measures(curve))
+            (curve_pixels(curve, camera, size, frustum), speed, tube_measures(curve))
         }
         Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
         Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
@@ -122,7 +122,7 @@ fn half_diagonal_px(size: Size) -> f64 {
 }
 
 /// Area of a tube on the screen: the sum over segments of projected length times projected width.
-fn curve_pixels(curve: &CurveState, camera: &Camera, (size, frustum): (Size, &Frustum)) -> f64 {
+fn curve_pixels(curve: &CurveState, camera: &Camera, size: Size, frustum: &Frustum) -> f64 {
     let (eye, forward, near_m) = (camera.eye(), camera.forward(), camera.near_m());
     // pixels per metre across the view at a depth of one metre
     let pixels_m = camera.pixels_per_metre(1.0, size);

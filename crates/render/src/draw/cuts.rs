@@ -29,6 +29,17 @@ pub struct Cuts {
     ends: Vec<MeshCorner>,
 }
 
+/// A cut of a model, morphing to the cut of `coarser` vertices if given.
+#[derive(Debug, Clone, Copy)]
+pub struct MorphedCut {
+    /// Number of the model.
+    pub model: u32,
+    /// Its cut.
+    pub cut: Cut,
+    /// Vertex count of the coarser cut.
+    pub coarser: Option<u32>,
+}
+
 /// A model and its cut.
 type CutKey = (u32, Cut);
 
@@ -117,14 +128,9 @@ impl Cuts {
         }
     }
 
-    /// Draws `count` instances of a cut as triangles or as edges, morphing to a cut of `coarser` vertices if given; returns the number of
-    /// draws.
-    pub fn draw(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        (model, cut, coarser): (u32, Cut, Option<u32>),
-        (edges, count): (bool, u32),
-    ) -> u32 {
+    /// Draws `count` instances of a cut as triangles or as edges; returns the number of draws.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, drawn: MorphedCut, edges: bool, count: u32) -> u32 {
+        let MorphedCut { model, cut, coarser } = drawn;
         let store = if edges { &self.edges } else { &self.triangles };
         let (Some(vertices), Some(indices), Some(slot)) =
             (self.vertices.get(&model), &store.buffer, store.slots.get(&(model, cut)))
