@@ -1,6 +1,6 @@
-//! Converts a scene into agents for the runtime and into what the compositor draws.
+//! Converts a scene into agents for the runtime and into what the renderer draws.
 //!
-//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
+//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the renderer, views for control, the declared machine.
 //! Never here: time passing.
 
 use super::cpu_budget::AgentBudget;
@@ -68,7 +68,7 @@ const SHARE_MAX: f64 = 0.6;
 fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
     let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
     if let Some(tolerance_m) = member.tolerance_m {
-        return error_governor(member, (tolerance_m, meshed), steered);
+        return error_governor(member, tolerance_m, meshed, steered);
     }
     let limits = RateLimits {
         dt_wanted_s: member.pace.dt.as_secs_f64(),
@@ -80,18 +80,14 @@ fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dy
     if !control.steers() {
         return None;
     }
-    let limits = (control.least_part(), control.share());
-    let tally = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, limits));
+    let (least, fair) = (control.least_part(), control.share());
+    let tally = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, least, fair));
     steered.tallies.push(Arc::clone(&tally));
     Some(Box::new(RateGovernor(control, tally)))
 }
 
 /// The governor of an agent with an error tolerance.
-fn error_governor(
-    member: &Member,
-    (tolerance_m, meshed): (f64, bool),
-    steered: &mut Steered,
-) -> Option<Box<dyn Governor>> {
+fn error_governor(member: &Member, tolerance_m: f64, meshed: bool, steered: &mut Steered) -> Option<Box<dyn Governor>> {
     let (least, greatest) = member.pace.dt_range;
     let dt_s = (least.as_secs_f64(), greatest.as_secs_f64());
     let limits = ErrorLimits { tolerance_m, dt_s, eps_m: meshed.then_some(member.simulation.eps_m) };
@@ -258,7 +254,7 @@ fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
 
 fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-    let view = view_of(seen, (kind, range), &it.look);
+    let view = view_of(seen, kind, range, &it.look);
     match (it.look.shading, &it.texture) {
         (ShadingKind::Any, Some(_)) => ObjectView { shading: (view.shading.0, control::Shading::Textured), ..view },
         _ => view,
@@ -282,10 +278,10 @@ fn view(seen: &Seen, member: &Member) -> ObjectView {
         Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
         None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
     };
-    view_of(seen, (kind, member.picture), &member.look)
+    view_of(seen, kind, member.picture, &member.look)
 }
 
-fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &metachron_world::Look) -> ObjectView {
+fn view_of(seen: &Seen, kind: Kind, range: ResolutionRange, look: &metachron_world::Look) -> ObjectView {
     ObjectView {
         id: seen.id,
         kind,
@@ -301,8 +297,8 @@ fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &metachron
     }
 }
 
-/// Converts control's demand to the compositor's type.
-pub fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
+/// Converts control's demand to the renderer's type.
+pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
     let shading = match demand.shading {
         control::Shading::Flat => metachron_render::Shading::Flat,
         control::Shading::Gouraud => metachron_render::Shading::Gouraud,

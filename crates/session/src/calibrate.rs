@@ -1,6 +1,6 @@
 //! Drawing costs on this adapter: measured once and stored in the user's cache.
 //!
-//! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the compositor has it).
+//! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the renderer has it).
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
 use metachron_lod::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};

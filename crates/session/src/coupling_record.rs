@@ -251,7 +251,7 @@ impl Couplings {
         if held_by_tool {
             coupling.inverse_mass_per_kg = state.inverse_mass_per_kg.map(|[mine, its]| [its, mine]);
         }
-        if let Some((apart_n_s, same_reading)) = difference_n_s((mine, owner), (theirs, other)) {
+        if let Some((apart_n_s, same_reading)) = difference_n_s(mine, owner, theirs, other) {
             coupling.compare(apart_n_s, same_reading);
         }
     }
@@ -286,7 +286,7 @@ fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Op
 }
 
 /// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
-fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<(f64, bool)> {
+fn difference_n_s(mine: &Snapshot, owner: AgentId, theirs: &Snapshot, other: AgentId) -> Option<(f64, bool)> {
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
     let mut apart = DVec3::ZERO;

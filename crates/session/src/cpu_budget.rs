@@ -32,7 +32,7 @@ pub(super) struct AgentBudget {
 
 impl AgentBudget {
     /// Nothing is reported yet.
-    pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
+    pub fn new(id: AgentId, rate_hz: f64, least: f64, fair: f64) -> Self {
         let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
         Self { id, rate_hz, least, fair, full, share, plain }
     }
@@ -71,6 +71,15 @@ impl AgentBudget {
     }
 }
 
+/// The processor time of one frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FramePeriod {
+    /// Cores that agents and the picture share.
+    pub cores: u32,
+    /// Time until the next frame is due, seconds.
+    pub period_s: f64,
+}
+
 /// The processor shared by agents and pictures.
 #[derive(Debug, Default)]
 pub(super) struct CpuBudget {
@@ -91,15 +100,16 @@ impl CpuBudget {
         Self { tallies, ..Self::default() }
     }
 
-    /// Shares the processor for the next frame of `period_s` on so many cores; returns the seconds that the picture may take, `None` if
-    /// there is enough for all. `weight` is the weight of an object in view in the picture's value, pixels.
+    /// Shares the processor for the next frame; returns the seconds that the picture may take, `None` if there is enough for all.
+    /// `weight` is the weight of an object in view in the picture's value, pixels.
     pub fn settle(
         &mut self,
-        (cores, period_s): (u32, f64),
+        frame: FramePeriod,
         drawing: Drawing,
         views: &[ObjectView],
         weight: impl Fn(usize) -> f64,
     ) -> Option<f64> {
+        let FramePeriod { cores, period_s } = frame;
         self.workers.clear();
         self.workers.extend(self.tallies.iter().map(|tally| {
             let at = tally.id.0 as usize;

@@ -7,7 +7,7 @@
 //! be separated from a drift of the scene.
 
 use super::error::SessionError;
-use super::headless::{Drawing, one_frame};
+use super::headless::{Drawing, PictureFormat, one_frame};
 use super::session::Session;
 use metachron_lod::control::{Law, PictureControl, Policy};
 use metachron_lod::tune::Observed;
@@ -60,7 +60,12 @@ pub fn experiment(
     while design.done() < 1.0 && !interrupted {
         session.wait_until(due);
         design.choose(session.control());
-        let record = one_frame(&mut session, (plan.size, Style::default()), &mut plan.drawing, true)?;
+        let record = one_frame(
+            &mut session,
+            PictureFormat { size: plan.size, style: Style::default() },
+            &mut plan.drawing,
+            true,
+        )?;
         design.note(&mut session, 1e-3 * record.frame_ms);
         interrupted = !go_on(design.done());
         due = (due + period).max(session.now());

@@ -229,7 +229,7 @@ impl Session {
     #[cfg(feature = "picture")]
     /// Applies the prices of the adapter that draws, if they are known or can be measured; declared costs stay as they are. `on_processor`:
     /// the adapter draws on the processor.
-    pub fn calibrate(&mut self, (adapter, on_processor): (&str, bool), open: impl FnOnce() -> Option<Gpu>) {
+    pub fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
         self.shares_processor |= on_processor;
         if self.control.policy().predicts() && !self.is_virtual() {
             let prices = calibrate::prices(adapter, open, self.tell);

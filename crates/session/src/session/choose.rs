@@ -3,6 +3,7 @@
 //! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, measuring a frame.
 
 use super::super::assemble;
+use super::super::cpu_budget::FramePeriod;
 use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
@@ -60,7 +61,7 @@ impl Session {
         }
         let plan = self.control.last_plan();
         self.levels.clear();
-        self.levels.extend(self.views.iter().zip(&plan.levels).map(assemble::level));
+        self.levels.extend(self.views.iter().zip(&plan.levels).map(|(view, demand)| assemble::level(view, demand)));
         self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
         self.chosen.objects_s = self.declared.objects_s(self.views.iter(), &plan.levels);
@@ -107,7 +108,7 @@ impl Session {
         let period_s = 1.0 / self.control.target_hz();
         let drawing = Drawing { wants, lambda };
         let (cores, control) = (self.cores(), &self.control);
-        let limit_s = self.purse.settle((cores, period_s), drawing, &self.views, |at| control.weight(at));
+        let limit_s = self.purse.settle(FramePeriod { cores, period_s }, drawing, &self.views, |at| control.weight(at));
         let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
         self.control.set_reserve(reserve_s);
     }
