@@ -420,7 +420,7 @@ impl Show for WindowShow<'_> {
     fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
         self.adapter = Some(adapter.to_owned());
         // the same adapter without a window: the benchmark needs a device of its own
-        self.session.calibrate((adapter, on_processor), || Gpu::headless().ok());
+        self.session.calibrate(adapter, on_processor, || Gpu::headless().ok());
     }
 
     fn ahead(&mut self, camera: Camera) -> Camera {

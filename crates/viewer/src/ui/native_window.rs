@@ -141,7 +141,7 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
         show.drawn_by(screen.adapter(), screen.is_software());
-        Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
+        Ok(Box::new(Shell::new(show, viewer, screen, told, options.screenshots.clone())))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
@@ -281,7 +281,8 @@ impl<'a> Shell<'a> {
         show: &'a mut dyn Show,
         viewer: &'a mut Viewer,
         screen: GpuScreen,
-        (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
+        fate: Rc<Cell<Fate>>,
+        screenshots: PathBuf,
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
         Self {

@@ -10,9 +10,10 @@ use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
 use metachron_lod::cost::benefit::Sliders;
+use std::ops::RangeInclusive;
 
 /// Range of target frame rates on the slider, per second.
-const TARGET_HZ: (f64, f64) = (5.0, 144.0);
+const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 
 /// Tooltip of the tuning button.
 const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
@@ -87,7 +88,7 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
         out.push(Action::Freeze(frozen));
     }
     if let Some(sliders) = status.sliders {
-        worth(ui, (sliders, status.damped), out);
+        benefit_weights(ui, sliders, status.damped, out);
     }
     if let Some(law) = status.law {
         feedback(ui, law, status, out);
@@ -95,13 +96,13 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
 }
 
 /// Sliders for the weights of a level's benefit; hysteresis only where the policy uses it.
-fn worth(ui: &mut Ui, (sliders, damped): (Sliders, bool), out: &mut Vec<Action>) {
+fn benefit_weights(ui: &mut Ui, sliders: Sliders, damped: bool, out: &mut Vec<Action>) {
     let mut wanted = sliders;
     let Sliders { size, accuracy, importance, focus, motion, hysteresis } = &mut wanted;
     let factors =
         [("Size", size), ("Accuracy", accuracy), ("Importance", importance), ("Focus", focus), ("Motion", motion)];
     for (name, value) in factors.into_iter().chain(damped.then_some(("Hysteresis", hysteresis))) {
-        slider(ui, name, value, (0.0, 1.0), |s| s.max_decimals(2));
+        slider(ui, name, value, 0.0..=1.0, |s| s.max_decimals(2));
     }
     if wanted != sliders {
         out.push(Action::Sliders(wanted));
@@ -160,16 +161,16 @@ fn choose_law(ui: &mut Ui, law: &mut Law, laws: &[Law]) {
 fn gains(ui: &mut Ui, law: &mut Law) {
     match law {
         Law::Printed { alpha, beta } => {
-            slider(ui, "Gain α", alpha, (1e-6, 1e-1), |s| {
+            slider(ui, "Gain α", alpha, 1e-6..=1e-1, |s| {
                 s.logarithmic(true).custom_formatter(|v, _| format!("{v:.1e}"))
             });
-            slider(ui, "Gain β", beta, (0.1, 50.0), |s| s.logarithmic(true).max_decimals(2));
+            slider(ui, "Gain β", beta, 0.1..=50.0, |s| s.logarithmic(true).max_decimals(2));
         }
         Law::Corrected { kappa, lead, margin } => {
-            slider(ui, "Gain κ", kappa, (0.01, 0.99), |s| s.max_decimals(2));
-            slider(ui, "Lead λ", lead, (0.0, 0.99), |s| s.max_decimals(2));
+            slider(ui, "Gain κ", kappa, 0.01..=0.99, |s| s.max_decimals(2));
+            slider(ui, "Lead λ", lead, 0.0..=0.99, |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
-            slider(ui, "Margin", &mut percent, (0.0, 50.0), |s| s.max_decimals(0).suffix(" %"));
+            slider(ui, "Margin", &mut percent, 0.0..=50.0, |s| s.max_decimals(0).suffix(" %"));
             // the conversion to percent and back must not count as a change
             if (percent - *margin * 100.0).abs() > 1e-9 {
                 *margin = percent / 100.0;
@@ -266,12 +267,12 @@ fn slider(
     ui: &mut Ui,
     name: &str,
     value: &mut f64,
-    (low, high): (f64, f64),
+    range: RangeInclusive<f64>,
     shape: impl FnOnce(Slider<'_>) -> Slider<'_>,
 ) {
     labelled(ui, name, |ui| {
         // a value outside the slider's range stays unchanged until the slider is moved
-        let free = Slider::new(value, low..=high).clamping(SliderClamping::Edits);
+        let free = Slider::new(value, range).clamping(SliderClamping::Edits);
         ui.add(shape(free)).accessible_name(name);
     });
 }

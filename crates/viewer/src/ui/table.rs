@@ -83,7 +83,7 @@ fn header(ui: &mut Ui, edges: &[f32], palette: &Palette) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 18.0), Sense::hover());
     for (index, (name, _, number)) in COLUMNS.iter().enumerate() {
         let at = Cell { row: rect, edges, index, number: *number };
-        cell(ui, &at, (name, FontId::proportional(11.5)), palette.weak);
+        cell(ui, &at, name, FontId::proportional(11.5), palette.weak);
     }
     ui.painter().hline(rect.x_range(), rect.bottom(), egui::Stroke::new(1.0, palette.line));
 }
@@ -95,7 +95,7 @@ struct Cell<'a> {
     number: bool,
 }
 
-fn cell(ui: &Ui, at: &Cell<'_>, (text, font): (&str, FontId), color: Color32) {
+fn cell(ui: &Ui, at: &Cell<'_>, text: &str, font: FontId, color: Color32) {
     let (left, right) = (at.row.left() + at.edges[at.index], at.row.left() + at.edges[at.index + 1]);
     let clip = Rect::from_x_y_ranges(left..=right - 4.0, at.row.y_range());
     let painter = ui.painter().with_clip_rect(clip.intersect(ui.clip_rect()));
@@ -123,7 +123,7 @@ fn agent(ui: &mut Ui, row: &AgentRow, edges: &[f32], selected: bool, palette: &P
         for (index, text) in texts.iter().enumerate() {
             let at = Cell { row: rect, edges, index, number: COLUMNS[index].2 };
             let font = if at.number { FontId::monospace(11.5) } else { FontId::proportional(12.5) };
-            cell(ui, &at, (text, font), cell_color(row, index, palette));
+            cell(ui, &at, text, font, cell_color(row, index, palette));
         }
     }
     if let AgentState::Parked(reason) = &row.state { response.on_hover_text(reason) } else { response }
