@@ -50,7 +50,7 @@ impl Subject for Rod {
         let total = cases.len() as f64;
         let told = cases.into_iter().enumerate();
         let wanted = told.take_while(|(at, case)| watch.goes_on(*at as f64 / total, format!("{} segments", case.0)));
-        wanted.map(|(_, case)| measure(case, span)).collect()
+        wanted.map(|(_, (segments, self_contact))| measure(segments, self_contact, span)).collect()
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -86,7 +86,7 @@ impl Subject for Rod {
     }
 }
 
-fn measure((segments, self_contact): (usize, bool), span: Duration) -> anyhow::Result<Row> {
+fn measure(segments: usize, self_contact: bool, span: Duration) -> anyhow::Result<Row> {
     let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
     // fills caches and sizes buffers
     (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn twice_the_segments_take_more_and_every_row_is_a_number() {
-        let [few, many] = [16, 512].map(|segments| measure((segments, false), Duration::from_millis(20)).unwrap());
+        let [few, many] = [16, 512].map(|segments| measure(segments, false, Duration::from_millis(20)).unwrap());
         assert!(many.us_per_step > few.us_per_step && few.steps_per_s > 0.0 && few.ns_per_segment > 0.0);
     }
 }

@@ -157,7 +157,7 @@ fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
 
 /// The impulse of contacts on a rigid body, step by step: the change of its momentum minus the parts of gravity and its springs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Given {
+pub(super) struct ContactImpulse {
     momentum: Option<DVec3>,
     /// The sum, N·s.
     pub(super) sum: DVec3,
@@ -165,9 +165,9 @@ pub(super) struct Given {
     pub(super) size: f64,
 }
 
-impl Given {
-    /// Takes in the state after a step of `dt_s` seconds of a body of this mass under `gravity`.
-    pub(super) fn look(&mut self, snapshot: &Snapshot, (mass_kg, gravity): (f64, DVec3), dt_s: f64) {
+impl ContactImpulse {
+    /// Adds the impulse up to the state after a step of `dt_s` seconds of a body of this mass under `gravity`.
+    pub(super) fn add(&mut self, snapshot: &Snapshot, mass_kg: f64, gravity: DVec3, dt_s: f64) {
         let Body::Rigid(state) = &snapshot.body else { return };
         let momentum = state.velocity * mass_kg;
         if let Some(before) = self.momentum.replace(momentum) {

@@ -219,9 +219,9 @@ pub(super) fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
 fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     let stem = format!("{}-{}", setting.subject, E::NAME);
     let cases = E::cases(setting.quick);
-    let file = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
+    let (file, kept) = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
     let bar = Bar::new(E::NAME, setting.quiet);
-    let swept = sweep::sweep::<E>(&cases, file, setting.stopped, &mut |done, all| {
+    let swept = sweep::sweep::<E>(&cases, file, kept, setting.stopped, &mut |done, all| {
         bar.tell(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
     })?;
     drop(bar);

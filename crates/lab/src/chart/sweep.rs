@@ -26,7 +26,8 @@ pub(super) struct Swept<R> {
 /// Errors of the file system; a case that panicked.
 pub(super) fn sweep<E: Experiment>(
     cases: &[E::Case],
-    (mut file, kept): (RowFile, Vec<E::Row>),
+    mut file: RowFile,
+    kept: Vec<E::Row>,
     stopped: &AtomicBool,
     told: &mut dyn FnMut(usize, usize),
 ) -> anyhow::Result<Swept<E::Row>> {

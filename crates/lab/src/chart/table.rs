@@ -84,8 +84,8 @@ impl From<String> for Cell {
 }
 
 impl From<(f64, usize)> for Cell {
-    fn from((value, digits): (f64, usize)) -> Self {
-        Self::Number(value, digits)
+    fn from(rounded: (f64, usize)) -> Self {
+        Self::Number(rounded.0, rounded.1)
     }
 }
 

@@ -10,7 +10,7 @@ use metachron_session::fit::{Converged, Setting};
 const FALLS: f64 = 0.8;
 
 /// One sentence on the best error reached and its limit, for a tolerance and the least error of all runs, metres.
-pub(super) fn told(task: &mut Task<'_>, answer: &Converged, (tolerance_m, best_m): (f64, f64)) -> String {
+pub(super) fn explain(task: &mut Task<'_>, answer: &Converged, tolerance_m: f64, best_m: f64) -> String {
     let said =
         format!("{} cannot be held: the best reached is {}", length(tolerance_m), length(best_m + answer.error_m));
     if answer.error_m > 0.5 * tolerance_m {

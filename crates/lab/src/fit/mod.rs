@@ -65,7 +65,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     let bar = Bar::new("fit", args.common.quiet || args.common.json);
-    let mut task = Task::new(args, scene, objects, (&stopped, bar))?;
+    let mut task = Task::new(args, scene, objects, &stopped, bar)?;
     let fitted = fit(&mut task, args)?;
     task.clear_bar();
     let fitted = match fitted {
@@ -134,7 +134,7 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
         return Ok(too_few(task, args));
     }
     let Some((settings, trial)) = start else {
-        return Ok(ended(task, |task| limits::told(task, &answer, (tolerance_m, best))));
+        return Ok(ended(task, |task| limits::explain(task, &answer, tolerance_m, best)));
     };
     let choices = task.choices();
     let trials_max = task.left() - AFTER_SEARCH;

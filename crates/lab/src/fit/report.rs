@@ -17,8 +17,8 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
     for object in 0..task.objects.len() {
         let name = task.objects[object].name.as_str();
         let [pays, needs] = models(task, object);
-        table.rows.push(row(task, fitted, (object, 0), [name, pays, "pays"]));
-        table.rows.push(row(task, fitted, (object, 1), ["", if needs == pays { "" } else { needs }, "needs"]));
+        table.rows.push(row(task, fitted, object, 0, [name, pays, "pays"]));
+        table.rows.push(row(task, fitted, object, 1, ["", if needs == pays { "" } else { needs }, "needs"]));
     }
     let Fitted { now, need, known_m, .. } = fitted;
     let held = if now.1.error_m + known_m <= args.tolerance { "holds" } else { "does not hold" };
@@ -45,7 +45,7 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
     out
 }
 
-fn row(task: &Task<'_>, fitted: &Fitted, (object, which): (usize, usize), head: [&str; 3]) -> Vec<Cell> {
+fn row(task: &Task<'_>, fitted: &Fitted, object: usize, which: usize, head: [&str; 3]) -> Vec<Cell> {
     let (setting, cost_s) = picked(fitted, object, which);
     let pieces: Cell = if setting.pieces > 0 { Cell::Number(f64::from(setting.pieces), 0) } else { "-".into() };
     let mut cells: Vec<Cell> = head.iter().map(|text| (*text).into()).collect();

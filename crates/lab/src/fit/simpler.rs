@@ -36,8 +36,8 @@ pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -
     let Some(played) = task.play(&need.settings) else { return Vec::new() };
     let plain = |object: usize| {
         own(task, object)
-            .or_else(|| resting(task, &played, (object, limits.room_m)))
-            .or_else(|| flying(task, &played, (object, limits.room_m)))
+            .or_else(|| resting(task, &played, object, limits.room_m))
+            .or_else(|| flying(task, &played, object, limits.room_m))
     };
     let mut simpler: Vec<_> = (0..task.objects.len()).map(plain).collect();
     for (object, told) in simpler.iter_mut().enumerate() {
@@ -64,7 +64,7 @@ fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
 }
 
 /// The note on an object that does not move.
-fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
+fn resting(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Option<Simpler> {
     let paths = paths(task, played, object);
     let still = !paths.is_empty() && paths.iter().all(|path| path.extent_m() <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
@@ -76,7 +76,7 @@ fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> 
 }
 
 /// The note on a body that nothing touches.
-fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
+fn flying(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Option<Simpler> {
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
     let agents = &task.objects[object].agents;
     let paired = played.pairs.iter().any(|(a, b)| agents.contains(a) || agents.contains(b));

@@ -56,7 +56,8 @@ impl<'a> Task<'a> {
         args: &FitArgs,
         scene: Scene,
         objects: Vec<Object>,
-        (stopped, bar): (&'a AtomicBool, Bar),
+        stopped: &'a AtomicBool,
+        bar: Bar,
     ) -> Result<Self, BadInput> {
         if objects.is_empty() {
             return Err(BadInput(format!("{}: nothing in it moves: there is nothing to fit", scene.name)));

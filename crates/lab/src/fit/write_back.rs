@@ -43,14 +43,14 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
         let member = &scene.agents[wanted.agents[0].0 as usize];
         let table = tables(&mut document).find(|table| name(table) == Some(&wanted.name));
         let table = table.ok_or_else(|| format!("`{}` has no table `[[object]]` of its own", wanted.name))?;
-        changes += put_dt(table, (now, need));
-        changes += if becomes_rope { to_rope::put(table, member) } else { put(table, member, (now, need)) };
+        changes += put_dt(table, now, need);
+        changes += if becomes_rope { to_rope::put(table, member) } else { put(table, member, now, need) };
     }
     Ok((document.to_string(), changes))
 }
 
 /// Puts a step into an object's table; returns the number of changed keys.
-fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
+fn put_dt(table: &mut Table, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.dt_s != now.dt_s {
         let dt_ms = tidy(need.dt_s * 1e3);
@@ -66,7 +66,7 @@ fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
 }
 
 /// Puts a division and a method into an object's table; returns the number of changed keys.
-fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
+fn put(table: &mut Table, member: &Member, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.pieces != now.pieces {
         changes += set(table, "segments", segments(member));

@@ -197,7 +197,7 @@ fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
     play.run(2.0 * case.seconds, |play, _| {
         let due = SimTime::from_nanos((trail.looks.len() as u64 + 1) * every_ns);
         if ids.iter().all(|id| play.stage.own(*id).time.secs_after(due).abs() < SAME_S) {
-            trail.looks.push(points.iter().map(|point| place(play, *point)).collect());
+            trail.looks.push(points.iter().map(|(id, anchor)| position_m(play, *id, *anchor)).collect());
             trail.momentum = play.common(due).momentum;
             let pairs = ids.iter().flat_map(|id| &play.stage.own(*id).pairs);
             trail.impulse_n_s = pairs.map(|pair| pair.impulse_n_s).sum();
@@ -208,7 +208,7 @@ fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
 }
 
 /// The position of a point, with every impulse on its way to its agent delivered.
-fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
+fn position_m(play: &Play, id: AgentId, anchor: Anchor) -> DVec3 {
     let members = play.stage.members();
     let Some(member) = members.get(id.0 as usize) else { return DVec3::NAN };
     let body = match settled(member, &members, member.snapshot.time) {

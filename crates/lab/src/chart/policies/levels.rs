@@ -61,12 +61,12 @@ fn text(levels: &str) -> String {
     text
 }
 
-fn setting((name, _): (&str, &str), times_over: f64) -> String {
+fn setting(name: &str, times_over: f64) -> String {
     format!("levels {name}, full detail / {times_over:.0}")
 }
 
 fn settings() -> impl Iterator<Item = (String, &'static str, f64)> {
-    TIMES_OVER.into_iter().flat_map(|over| LEVELS.map(|levels| (setting(levels, over), levels.1, over)))
+    TIMES_OVER.into_iter().flat_map(|over| LEVELS.map(|levels| (setting(levels.0, over), levels.1, over)))
 }
 
 impl Experiment for Levels {
@@ -95,7 +95,7 @@ impl Experiment for Levels {
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |over: f64| {
-            let here = LEVELS.map(|levels| setting(levels, over));
+            let here = LEVELS.map(|(name, _)| setting(name, over));
             curves(
                 &format!("full detail / {over:.0}"),
                 rows.iter().filter(|row| row.policy == "adaptive" && here.contains(&row.setting)),
@@ -110,7 +110,7 @@ impl Experiment for Levels {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |levels: usize, over: f64, what: fn(&Row) -> f64| {
-            number(rows, &setting(LEVELS[levels], over), "adaptive", what)
+            number(rows, &setting(LEVELS[levels].0, over), "adaptive", what)
         };
         let claims = TIMES_OVER.into_iter().flat_map(|over| {
             let claim = |words: &str| format!("adaptive, four levels, full detail / {over:.0}: {words}");

@@ -6,6 +6,7 @@ use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
 use super::tubes::{holding, step, straight};
 use metachron_core::SimSpan;
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 /// The experiment.
@@ -17,7 +18,7 @@ const HELD: &str = "held by a tool";
 /// Claims for the whole step at numbers of segments in the range [`CLAIMED`].
 const CLAIMED_NS: f64 = 160.0;
 const CLAIMED_POWER: f64 = 1.05;
-const CLAIMED: (f64, f64) = (100.0, 4000.0);
+const CLAIMED: RangeInclusive<f64> = 100.0..=4000.0;
 /// How long each case is measured.
 const SPAN: Duration = Duration::from_millis(200);
 /// Steps before the measurement, so that all tubes hang alike: they come to rest in the first half of these.
@@ -53,10 +54,9 @@ impl Growth for Segments {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let (least, most) = CLAIMED;
-        let inside = |row: &&Row| row.case == ALONE && (least..=most).contains(&f64::from(row.size));
+        let inside = |row: &&Row| row.case == ALONE && CLAIMED.contains(&f64::from(row.size));
         let slowest = pace(rows) * worst(rows.iter().filter(inside).map(Row::ns_each));
-        let range = format!("{least} … {most} segments");
+        let range = format!("{} … {} segments", CLAIMED.start(), CLAIMED.end());
         vec![
             Finding::at_most(format!("ns a segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
             Finding::at_most(format!("exponent, {range}, alone"), power(rows, ALONE, CLAIMED), CLAIMED_POWER),

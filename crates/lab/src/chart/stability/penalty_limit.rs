@@ -119,7 +119,8 @@ impl Experiment for PenaltyLimit {
 /// Whether the motion decays at this stiffness.
 fn dies_away(case: &Case, stiffness_n_m: f64) -> bool {
     let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
-    let set = pair("1d", law, case.rate_hz, (Faults { seed: 1, due: true, ..Faults::default() }, FALL_M));
+    let faults = Faults { seed: 1, due: true, ..Faults::default() };
+    let set = pair("1d", law, case.rate_hz, faults, FALL_M);
     let Some(Pair { play, zero_j, .. }) = set else { return false };
     let start_j = play.raw_j() - zero_j;
     // under the weight springs and contact sag below the zero of energy: energy above it is kinetic

@@ -9,7 +9,7 @@ use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::super::super::table::Table;
 use super::super::machine::Noise;
 use super::super::played::walk;
-use super::super::played::walk::Predicted;
+use super::super::played::walk::{PathPoint, Predicted};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -115,11 +115,11 @@ impl Experiment for Prediction {
     fn measure(case: &Case) -> Row {
         let mut noise = Noise::new(SEED);
         let (low, high) = TARGETS_S;
-        let mut places = || (noise.uniform(), low * libm::pow(high / low, noise.uniform()));
-        let asked: Vec<_> = (0..case.pictures).map(|_| places()).collect();
+        let mut point = || PathPoint { part: noise.uniform(), target_s: low * libm::pow(high / low, noise.uniform()) };
+        let asked: Vec<_> = (0..case.pictures).map(|_| point()).collect();
         let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
         let policy = PRICES.into_iter().find(|(name, _)| *name == case.prices).map(|(_, policy)| policy);
-        let told = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, (&asked, TIMES)).ok());
+        let told = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, &asked, TIMES).ok());
         let (adapter, pictures) = told.unwrap_or_default();
         Row::of(case, adapter, &pictures)
     }

@@ -78,7 +78,7 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     let measured = reference(shown, case.frames, times).and_then(|full| {
         let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
         let full_itself = case.policy == "full";
-        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(shown, case, (target_s, times))?) };
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(shown, case, target_s, times)?) };
         Ok((full, own, target_s))
     });
     let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
@@ -114,13 +114,13 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
     }
     let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
     // the target has no effect on full detail
-    let full = Arc::new(walked(shown, &case, (1.0, times))?);
+    let full = Arc::new(walked(shown, &case, 1.0, times)?);
     known.push((shown.name, frames, times, Arc::clone(&full)));
     Ok(full)
 }
 
-fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
-    let (adapter, mut walk) = opened((shown.name, shown.text), times)?;
+fn walked(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow::Result<Walked> {
+    let (adapter, mut walk) = opened(shown.name, shown.text, times)?;
     let control = walk.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
@@ -146,23 +146,30 @@ pub(in super::super) struct Predicted {
 /// Frames until a picture is final: meshes of levels drawn for the first time are built, and all transitions have ended.
 const SETTLED: usize = 8;
 
-/// Pictures at places of a scene's path under targets in seconds, predicted and chosen by `policy` and each drawn several times; and
-/// the adapter.
+/// A point of a scene's path, as a fraction 0 … 1 of it, and the target time of a frame there, seconds.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct PathPoint {
+    pub(in super::super) part: f64,
+    pub(in super::super) target_s: f64,
+}
+
+/// Pictures at points of a scene's path, predicted and chosen by `policy`, each drawn `drawings` times; and the adapter.
 ///
 /// # Errors
 /// Errors of the scene and of the adapter.
 pub(in super::super) fn predicted(
     paper: Paper,
     policy: Policy,
-    (asked, times): (&[(f64, f64)], usize),
+    asked: &[PathPoint],
+    drawings: usize,
 ) -> anyhow::Result<(String, Vec<Predicted>)> {
-    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
+    let (adapter, mut walk) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
     walk.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
         walk.step(0.0)?;
     }
     let mut pictures = Vec::with_capacity(asked.len());
-    for (part, target_s) in asked {
+    for PathPoint { part, target_s } in asked {
         walk.session().control().set_target_hz(1.0 / target_s);
         walk.step(*part)?;
         let told = walk.step(*part)?.predicted_ms;
@@ -170,7 +177,7 @@ pub(in super::super) fn predicted(
         for _ in 2..SETTLED {
             walk.step(*part)?;
         }
-        let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
+        let took: Result<Vec<_>, _> = (0..drawings).map(|_| walk.step(*part)).collect();
         walk.session().control().freeze(false);
         let took_ms = took?.iter().map(|record| record.frame_ms).collect();
         pictures.extend(told.map(|told_ms| Predicted { told_ms, took_ms }));
@@ -179,7 +186,7 @@ pub(in super::super) fn predicted(
 }
 
 /// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
-fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, Walk)> {
+fn opened(name: &str, text: &str, times: Times) -> anyhow::Result<(String, Walk)> {
     let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
     let scene = load(&Source::memory(name, text.as_bytes())?, overrides)?;
@@ -223,7 +230,7 @@ pub(in super::super) struct Stood {
 /// Errors of the scene and of the adapter.
 pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
     let Stood { part, target_s, frames } = stood;
-    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
+    let (adapter, mut walk) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
     let control = walk.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(policy).context("no such policy")?);
