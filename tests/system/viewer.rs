@@ -9,7 +9,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use fake::{BALL, Fake, World, asked, last_view, middle, press, window, window_of};
 use metachron_core::AgentId;
 use metachron_render::{Colouring, Hit};
-use metachron_viewer::ui::{Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Show, Weight, keys_text};
+use metachron_viewer::ui::{Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Severity, Show, keys_text};
 use std::time::Duration;
 
 #[test]
@@ -76,10 +76,10 @@ fn keys_ask_for_what_the_help_says() {
     harness.key_press_modifiers(Modifiers::COMMAND, Key::L);
     assert_eq!(asked(&mut harness), [Action::Reload]);
     press(&mut harness, Key::F12);
-    assert!(harness.state().wishes.screenshot);
+    assert!(harness.state().requests.screenshot);
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Q);
     asked(&mut harness);
-    assert!(harness.state().wishes.quit);
+    assert!(harness.state().requests.quit);
 }
 
 #[test]
@@ -287,7 +287,7 @@ fn an_overloaded_scene_leaves_the_interface_alive() {
     show.status.clamp = Some("rests on the coarsest resolution".to_owned());
     show.status
         .messages
-        .push(Message { weight: Weight::Warning, text: "the scene needs more than it gets".to_owned() });
+        .push(Message { severity: Severity::Warning, text: "the scene needs more than it gets".to_owned() });
     let mut harness = window_of(show);
     for frame in 0..100 {
         let times = FrameTimes {

@@ -13,9 +13,9 @@ use std::time::Duration;
 
 /// Whether and why a device was lost.
 #[derive(Debug, Clone, Default)]
-pub struct Lost(Arc<OnceLock<String>>);
+pub struct DeviceLoss(Arc<OnceLock<String>>);
 
-impl Lost {
+impl DeviceLoss {
     /// Watches a device from now on; replaces the watcher set before.
     #[must_use]
     pub fn watch(device: &wgpu::Device) -> Self {
@@ -290,7 +290,7 @@ impl Offscreen {
 }
 
 /// Waits until all submitted work is done.
-pub fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
+pub fn wait(device: &wgpu::Device, lost: &DeviceLoss) -> Result<(), GpuError> {
     let polled = device.poll(wgpu::PollType::wait_indefinitely());
     if let Some(reason) = lost.reason() {
         return Err(DrawError::DeviceLost { reason }.into());
@@ -299,7 +299,7 @@ pub fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
 }
 
 /// The pixels of a texture with four bytes per pixel, after all submitted work.
-pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<PictureFile, GpuError> {
+pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Result<PictureFile, GpuError> {
     let (width, height) = (texture.width(), texture.height());
     let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {

@@ -126,27 +126,27 @@ fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
     into.velocities.clear();
     into.frames.clear();
     into.radii_m.clear();
-    let mut walk = Walk { curve: a, left: 0 };
+    let mut reader = CurveReader { curve: a, left: 0 };
     for (i, &arc_m) in b.arc_m.iter().enumerate() {
-        let (position, velocity, radius) = walk.node(arc_m);
+        let (position, velocity, radius) = reader.node(arc_m);
         into.positions.push(position.lerp(b.positions[i], w));
         into.velocities.push(velocity.lerp(b.velocities[i], w));
         into.radii_m.push(radius + (b.radii_m[i] - radius) * w);
     }
-    walk.left = 0;
+    reader.left = 0;
     for (i, &frame) in b.frames.iter().enumerate() {
-        let was = walk.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
+        let was = reader.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
         into.frames.push(was.lerp(frame, w)); // normalised, along the shorter arc: frames of one step are close
     }
 }
 
 /// Reads a curve at rising arc lengths in one pass.
-struct Walk<'a> {
+struct CurveReader<'a> {
     curve: &'a CurveState,
     left: usize,
 }
 
-impl Walk<'_> {
+impl CurveReader<'_> {
     fn seek(&mut self, arc_m: f64) {
         let last = self.curve.arc_m.len().saturating_sub(2);
         while self.left < last && self.curve.arc_m[self.left + 1] <= arc_m {

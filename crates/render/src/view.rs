@@ -86,7 +86,7 @@ impl Camera {
     /// Extrapolates the motion from `before` to this camera by `times` that change, turning about its target as it did.
     /// A camera that jumped (by more than half its distance, or an eighth of a turn) is returned unchanged.
     #[must_use]
-    pub fn carried_on(&self, before: &Self, times: f64) -> Self {
+    pub fn extrapolated(&self, before: &Self, times: f64) -> Self {
         let way = self.target_m - before.target_m;
         let turned = libm::remainder(self.yaw_rad - before.yaw_rad, TAU);
         let tilted = self.pitch_rad - before.pitch_rad;
@@ -287,12 +287,12 @@ mod tests {
             ..camera()
         };
         for s in [0.5, 3.49, 3.51, 6.0] {
-            let seen = at(s).carried_on(&at(s - 0.02), 1.5);
+            let seen = at(s).extrapolated(&at(s - 0.02), 1.5);
             assert!((seen.eye() - at(s + 0.03).eye()).length() < 1e-9, "{s}");
         }
         let cut = Camera { yaw_rad: at(1.0).yaw_rad + 2.0, ..at(1.0) };
-        assert_eq!(cut.carried_on(&at(0.98), 1.5), cut);
-        assert_eq!(at(1.0).carried_on(&at(0.98), f64::NAN), at(1.0));
+        assert_eq!(cut.extrapolated(&at(0.98), 1.5), cut);
+        assert_eq!(at(1.0).extrapolated(&at(0.98), f64::NAN), at(1.0));
     }
 
     #[test]

@@ -7,8 +7,8 @@ use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 use metachron_render::{Camera, Hit, Picture, Ray, Size};
 use metachron_viewer::ui::{
-    Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, Screen, Show, Status, Tuning, ViewRequest, Viewer,
-    Wishes,
+    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Show, Status, Tuning, ViewRequest,
+    Viewer, WindowRequests,
 };
 
 /// A show of three agents around the origin that writes down what it is asked for.
@@ -62,7 +62,7 @@ impl Show for Fake {
             }
             Action::StopTuning => self.status.tuning = None,
             Action::DragStart(hit) => {
-                self.status.held = Some(Held { target: hit.point_m, force_n: 0.0 });
+                self.status.held = Some(HandStatus { target: hit.point_m, force_n: 0.0 });
             }
             Action::DragEnd => self.status.held = None,
             _ => {}
@@ -121,7 +121,7 @@ pub struct World {
     pub viewer: Viewer,
     pub show: Fake,
     pub screen: Blank,
-    pub wishes: Wishes,
+    pub requests: WindowRequests,
     /// What the harness gives the interface to draw on: its window without a margin.
     pub inner: Size,
 }
@@ -137,15 +137,15 @@ pub fn window_of(show: Fake) -> Harness<'static, World> {
         viewer: Viewer::default(),
         show,
         screen: Blank::default(),
-        wishes: Wishes::default(),
+        requests: WindowRequests::default(),
         inner: Size { width: 0, height: 0 },
     };
     let draw = |ui: &mut egui::Ui, world: &mut World| {
         let room = ui.max_rect().size();
         world.inner = Size { width: room.x.round() as u32, height: room.y.round() as u32 };
-        let (wishes, _) = world.viewer.ui(ui, &mut world.show, &mut world.screen);
-        world.wishes.screenshot |= wishes.screenshot;
-        world.wishes.quit |= wishes.quit;
+        let (requests, _) = world.viewer.ui(ui, &mut world.show, &mut world.screen);
+        world.requests.screenshot |= requests.screenshot;
+        world.requests.quit |= requests.quit;
     };
     let mut harness = Harness::builder()
         .with_size(egui::vec2(1280.0, 800.0))

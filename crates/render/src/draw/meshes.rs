@@ -71,7 +71,7 @@ fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
 pub struct Meshes {
     patches: [Option<Mesh>; N_MAX as usize + 1],
     solids: HashMap<MeshKey, Mesh>,
-    given: Option<Arc<[PrimitiveMesh]>>,
+    custom: Option<Arc<[PrimitiveMesh]>>,
     /// Foliage levels by model and level index, and whether they are strokes.
     parts: HashMap<(u32, u8), (Mesh, bool)>,
     models: Option<Arc<[Model]>>,
@@ -80,9 +80,9 @@ pub struct Meshes {
 impl Meshes {
     /// Makes the meshes that `picture` needs and that are missing.
     pub fn prepare(&mut self, device: &wgpu::Device, picture: &Picture) {
-        if self.given.as_ref().is_none_or(|given| !Arc::ptr_eq(given, &picture.meshes)) {
-            self.solids.retain(|key, _| !matches!(key, MeshKey::Given(_)));
-            self.given = Some(Arc::clone(&picture.meshes));
+        if self.custom.as_ref().is_none_or(|custom| !Arc::ptr_eq(custom, &picture.meshes)) {
+            self.solids.retain(|key, _| !matches!(key, MeshKey::Custom(_)));
+            self.custom = Some(Arc::clone(&picture.meshes));
         }
         for tube in &picture.tubes {
             for n in [tube.n, tube.n.min(super::passes::SHADOW_LEVEL)] {
@@ -97,7 +97,7 @@ impl Meshes {
         }
         for run in &picture.solids {
             match run.kind.mesh {
-                MeshKey::Cut(..) | MeshKey::Glide(..) => {}
+                MeshKey::Cut(..) | MeshKey::Geomorph(..) => {}
                 MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
                 key => {
                     self.solids.entry(key).or_insert_with(|| solid_mesh(device, key, &picture.meshes));
@@ -143,7 +143,7 @@ fn patch_mesh(device: &wgpu::Device, n: u8) -> Mesh {
     Mesh::new(device, bytemuck::cast_slice(&vertices), &triangles)
 }
 
-fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> Mesh {
+fn solid_mesh(device: &wgpu::Device, key: MeshKey, custom: &[PrimitiveMesh]) -> Mesh {
     let made;
     let mesh = match key {
         MeshKey::Primitive(primitive, n) => {
@@ -154,11 +154,11 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> M
             made = slab(cells);
             &made
         }
-        MeshKey::Given(number) => match given.get(number as usize) {
+        MeshKey::Custom(number) => match custom.get(number as usize) {
             Some(mesh) => mesh,
             None => &PrimitiveMesh::default(),
         },
-        MeshKey::Cut(..) | MeshKey::Glide(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
+        MeshKey::Cut(..) | MeshKey::Geomorph(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
     };
     primitive_mesh(device, mesh)
 }

@@ -151,7 +151,7 @@ impl Renderer {
             MeshKey::Cut(model, cut) => {
                 self.cuts.draw(pass, MorphedCut { model, cut, coarser: None }, edges, run.count)
             }
-            MeshKey::Glide(model, cut, to) => {
+            MeshKey::Geomorph(model, cut, to) => {
                 self.cuts.draw(pass, MorphedCut { model, cut, coarser: Some(to) }, edges, run.count)
             }
             MeshKey::Part(model, rung, triangles) => {
