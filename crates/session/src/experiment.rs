@@ -25,7 +25,7 @@ pub struct Experiment {
 }
 
 /// Result of an experiment.
-pub struct Experimented {
+pub struct ExperimentResult {
     /// Its frames, without those of the warm-up.
     pub observed: Vec<Observed>,
     /// The adapter that drew; `None` where costs were declared.
@@ -52,7 +52,7 @@ pub fn experiment(
     mut session: Session,
     mut plan: Experiment,
     go_on: &mut dyn FnMut(f64) -> bool,
-) -> Result<Experimented, SessionError> {
+) -> Result<ExperimentResult, SessionError> {
     session.begin();
     let period = session.period();
     let mut design = Design::begin(session.control(), plan.frames);
@@ -72,7 +72,7 @@ pub fn experiment(
     }
     let finished = design.done() >= 1.0;
     let adapter = plan.drawing.adapter();
-    Ok(Experimented { observed: design.observed, adapter, interrupted: interrupted && !finished })
+    Ok(ExperimentResult { observed: design.observed, adapter, interrupted: interrupted && !finished })
 }
 
 /// The experiment, frame by frame.

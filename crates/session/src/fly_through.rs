@@ -13,7 +13,7 @@ use metachron_runtime::Drive;
 use metachron_world::Scene;
 
 /// A walk through a scene.
-pub struct Walk {
+pub struct FlyThrough {
     session: Session,
     drawing: Drawing,
     size: Size,
@@ -22,7 +22,7 @@ pub struct Walk {
     camera: Camera,
 }
 
-impl Walk {
+impl FlyThrough {
     /// Opens `scene` for pictures of `size`, with the prices of the adapter that draws every frame.
     ///
     /// # Errors

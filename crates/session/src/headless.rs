@@ -132,7 +132,7 @@ pub(super) fn one_frame(
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
     let camera = session.scene_camera();
-    let camera = session.ahead(camera);
+    let camera = session.predict_camera(camera);
     frame_seen_by(session, &camera, format, drawing, skip)
 }
 
@@ -152,12 +152,12 @@ pub(super) fn frame_seen_by(
         Drawing::Every(screen) => {
             let composed = session.now();
             screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
-            session.choose_beside(camera, size);
+            session.choose_next_frame(camera, size);
             let gpu = screen.wait().map_err(SessionError::Draw)?;
             (session.now().saturating_sub(composed), gpu)
         }
         _ => {
-            session.choose_beside(camera, size);
+            session.choose_next_frame(camera, size);
             (session.spend_declared(size), None)
         }
     };

@@ -185,7 +185,7 @@ pub fn play_points(
     let looks = (seconds / LOOK_S).ceil().max(1.0);
     for look in 1..=looks as u32 {
         session.wait_until(Duration::from_secs_f64(seconds * f64::from(look) / looks));
-        session.look();
+        session.read_states();
         if !go_on() {
             return Ok(None);
         }

@@ -15,7 +15,7 @@ const TUBE_POINTS: u32 = 9;
 /// States of the agents in a run.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
-    pub(super) states: Vec<Traced>,
+    pub(super) states: Vec<TracedState>,
     last: Vec<Option<SimTime>>,
     /// Total impulses exchanged, with the time of the run and the index of the coupling, whenever one has grown.
     exchanged: Vec<(SimTime, usize, f64)>,
@@ -25,7 +25,7 @@ pub struct Trace {
 
 /// One state of one agent.
 #[derive(Debug, Clone)]
-pub(super) struct Traced {
+pub(super) struct TracedState {
     pub(super) agent: AgentId,
     /// Its moment in scene time: the agent's own time plus the time it was put off.
     pub(super) moment: SimTime,
@@ -47,7 +47,7 @@ impl Trace {
             *last = Some(moment);
             let points_m = points(&snapshot.body).map(|(at, _)| at).collect();
             let momentum = momentum(&member.spec, &snapshot.body);
-            self.states.push(Traced { agent: member.id, moment, points_m, momentum });
+            self.states.push(TracedState { agent: member.id, moment, points_m, momentum });
         }
     }
 

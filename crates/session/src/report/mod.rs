@@ -54,7 +54,7 @@ pub struct Report {
     pub moved: Vec<MovedReport>,
     /// The effect of different clocks, where requested.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub oracle: Option<OracleReport>,
+    pub oracle: Option<ReferenceReport>,
     /// How the frame budget was spent.
     pub budget: BudgetReport,
     /// The scene's probes.
@@ -198,7 +198,7 @@ impl MovedReport {
 
 /// The same scene under one very fine common clock, and the difference from its own clocks.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct OracleReport {
+pub struct ReferenceReport {
     /// Step of the common clock, milliseconds.
     pub dt_ms: f64,
     /// Simulated seconds that both runs have played: all of the run, unless Ctrl-C ended the second one.
@@ -263,7 +263,7 @@ impl Report {
         let frame = crate::FrameRecord { gpu_ms: Some(0.0), ..Default::default() };
         let summary = summarise(&[frame], 1.0);
         let name = String::new;
-        let oracle = OracleReport { couplings: vec![CouplingError::default()], ..OracleReport::default() };
+        let oracle = ReferenceReport { couplings: vec![CouplingError::default()], ..ReferenceReport::default() };
         Self {
             scene: name(),
             policy: name(),

@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, OracleReport, Report, Spread};
+use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, ReferenceReport, Report, Spread};
 use std::fmt::Write;
 
 impl Report {
@@ -27,7 +27,7 @@ impl Report {
         self.agents.iter().for_each(|agent| out_of_reach(&mut out, agent));
         coupling_table(&mut out, &self.couplings);
         if let Some(oracle) = &self.oracle {
-            oracle_table(&mut out, oracle);
+            reference_table(&mut out, oracle);
         }
         out
     }
@@ -133,8 +133,8 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
     more(out, couplings.len());
 }
 
-fn oracle_table(out: &mut String, oracle: &OracleReport) {
-    let OracleReport { dt_ms, sim_s, states, .. } = oracle;
+fn reference_table(out: &mut String, oracle: &ReferenceReport) {
+    let ReferenceReport { dt_ms, sim_s, states, .. } = oracle;
     let _ = writeln!(out, "\nagainst one common clock of {dt_ms:.4} ms over {sim_s:.2} s, {states} points compared");
     let _ = writeln!(
         out,
