@@ -26,8 +26,8 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Shares, Show, Skip, Status,
-    Tuning, ViewRequest, Weight,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, HandStatus, Law, Message, Severity, Shares, Show,
+    Skip, Status, Tuning, ViewRequest,
 };
 
 use egui::{Frame, Margin, Panel, Rect, Sense, Ui};
@@ -48,7 +48,7 @@ pub trait Screen {
 
 /// Requests to the window after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Wishes {
+pub struct WindowRequests {
     /// Write the picture to a file.
     pub screenshot: bool,
     /// Close the window.
@@ -59,7 +59,7 @@ pub struct Wishes {
 /// Drawing options of the picture, stored between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
-pub struct Looks {
+pub struct DrawingOptions {
     /// Colour objects by their resolution.
     pub colours: bool,
     /// Colour objects by the age of their state; not together with `colours`.
@@ -70,7 +70,7 @@ pub struct Looks {
     pub wireframe: bool,
 }
 
-impl Looks {
+impl DrawingOptions {
     fn style(self) -> Style {
         let colouring = match self {
             Self { colours: true, .. } => Colouring::Resolution,
@@ -87,7 +87,7 @@ impl Looks {
 #[serde(default)]
 pub struct Layout {
     /// Drawing options of the picture.
-    pub looks: Looks,
+    pub looks: DrawingOptions,
     /// Whether the panels are shown.
     pub panels: bool,
     /// Whether the run's numbers are shown over the picture.
@@ -100,7 +100,7 @@ pub struct Layout {
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { looks: Looks::default(), panels: true, info: false, costs: false, histories: false }
+        Self { looks: DrawingOptions::default(), panels: true, info: false, costs: false, histories: false }
     }
 }
 
@@ -148,7 +148,7 @@ impl Viewer {
     /// Draws one frame of the interface and applies the user's input.
     ///
     /// Returns the requests to the window, and the time that `screen` took.
-    pub fn ui(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> (Wishes, Duration) {
+    pub fn ui(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> (WindowRequests, Duration) {
         let now = ui.ctx().time();
         self.history.sample(now, show.status());
         self.notes.retain(|(until, _)| now < *until);
@@ -158,17 +158,17 @@ impl Viewer {
             self.panels(ui, show, &mut commands, &mut actions);
         }
         self.overlays(ui, show, &mut commands);
-        let mut wishes = Wishes::default();
+        let mut requests = WindowRequests::default();
         for command in commands {
-            self.execute(command, show, &mut actions, &mut wishes);
+            self.execute(command, show, &mut actions, &mut requests);
         }
-        if wishes.theme {
+        if requests.theme {
             let other = if ui.ctx().theme() == egui::Theme::Dark { egui::Theme::Light } else { egui::Theme::Dark };
             ui.ctx().set_theme(other);
         }
         actions.drain(..).for_each(|action| show.apply(action));
         let drawing = self.stage(ui, show, screen);
-        (wishes, drawing)
+        (requests, drawing)
     }
 
     /// Stores the times of a finished frame for the plots.
@@ -252,7 +252,7 @@ impl Viewer {
         let size = mouse::size_of(rect, ui.ctx().pixels_per_point());
         self.size = size;
         let camera = self.hand.camera(show);
-        let view = ViewRequest { size, camera: show.ahead(camera), style: self.layout.looks.style() };
+        let view = ViewRequest { size, camera: show.predict_camera(camera), style: self.layout.looks.style() };
         let start = Instant::now();
         let shape = screen.draw(show, &view, rect);
         let drawing = start.elapsed();
@@ -269,7 +269,7 @@ impl Viewer {
         drawing
     }
 
-    fn execute(&mut self, command: Command, show: &dyn Show, actions: &mut Vec<Action>, wishes: &mut Wishes) {
+    fn execute(&mut self, command: Command, show: &dyn Show, actions: &mut Vec<Action>, requests: &mut WindowRequests) {
         let status = show.status();
         let looks = &mut self.layout.looks;
         match command {
@@ -284,18 +284,20 @@ impl Viewer {
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
             Command::SceneCamera => self.hand.follow_scene(),
             Command::Free => self.leave(show, actions),
-            Command::Colours => *looks = Looks { colours: !looks.colours, ages: false, details: false, ..*looks },
+            Command::Colours => {
+                *looks = DrawingOptions { colours: !looks.colours, ages: false, details: false, ..*looks }
+            }
             Command::Wireframe => looks.wireframe = !looks.wireframe,
-            Command::Ages => *looks = Looks { ages: !looks.ages, colours: false, details: false, ..*looks },
+            Command::Ages => *looks = DrawingOptions { ages: !looks.ages, colours: false, details: false, ..*looks },
             Command::HideUi => self.layout.panels = !self.layout.panels,
-            Command::Theme => wishes.theme = true,
-            Command::Screenshot => wishes.screenshot = true,
+            Command::Theme => requests.theme = true,
+            Command::Screenshot => requests.screenshot = true,
             Command::Help => self.help = !self.help,
             Command::Info => self.layout.info = !self.layout.info,
             Command::Costs => self.layout.costs = !self.layout.costs,
             Command::Histories => self.layout.histories = !self.layout.histories,
             Command::Palette => self.finder = if self.finder.is_some() { None } else { Some(Finder::default()) },
-            Command::Quit => wishes.quit = true,
+            Command::Quit => requests.quit = true,
         }
     }
 

@@ -116,7 +116,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
             news.push(format!("{} is parked: {reason}", row.name));
         }
         row.picture = session.levels().get(at).map(|level| level.resolution);
-        row.age_s = session.stage().age_s(agent.id()).unwrap_or(0.0);
+        row.age_s = session.scene_view().age_s(agent.id()).unwrap_or(0.0);
         status.energy_j += stats.energy_j;
     }
     news

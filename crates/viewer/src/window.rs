@@ -8,8 +8,8 @@ use super::view_model;
 use super::view_model::Meter;
 use crate::ui;
 use crate::ui::{
-    Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
-    run_window,
+    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Show, Skip, Status, ViewRequest, WindowError,
+    WindowOptions, run_window,
 };
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
@@ -139,7 +139,7 @@ impl<'a> WindowShow<'a> {
     fn restart(&mut self, scene: Scene) {
         match Session::open(scene) {
             Ok(session) => self.replace(session),
-            Err(error) => self.say(Weight::Failure, error.to_string()),
+            Err(error) => self.show_message(Severity::Failure, error.to_string()),
         }
     }
 
@@ -192,7 +192,7 @@ impl<'a> WindowShow<'a> {
     fn reload(&mut self) {
         match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not reloaded: {}", first_problem(&error))),
+            Err(error) => self.show_message(Severity::Failure, format!("not reloaded: {}", first_problem(&error))),
         }
     }
 
@@ -200,7 +200,7 @@ impl<'a> WindowShow<'a> {
         self.plan.overrides.clear();
         match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not opened: {}", first_problem(&error))),
+            Err(error) => self.show_message(Severity::Failure, format!("not opened: {}", first_problem(&error))),
         }
     }
 
@@ -210,8 +210,8 @@ impl<'a> WindowShow<'a> {
         Ok(scene)
     }
 
-    fn say(&mut self, weight: Weight, text: String) {
-        let message = Message { weight, text };
+    fn show_message(&mut self, severity: Severity, text: String) {
+        let message = Message { severity, text };
         self.notices.retain(|(_, old)| *old != message);
         self.notices.push((Instant::now() + MESSAGE_STAYS, message));
     }
@@ -227,7 +227,7 @@ impl<'a> WindowShow<'a> {
 
     fn pull(&mut self, hand: Option<Hand>) {
         if let Some(left) = self.hand.filter(|old| hand.is_none_or(|new| new.object != old.object)) {
-            self.tell(left.object, None);
+            self.send_spring(left.object, None);
         }
         self.hand = hand;
         if let Some(hand) = hand {
@@ -240,13 +240,13 @@ impl<'a> WindowShow<'a> {
                 stiffness_n_m: mass_kg * HAND_RAD_S * HAND_RAD_S,
                 damping_n_s_m: 2.0 * HAND_DAMPING * mass_kg * HAND_RAD_S,
             };
-            self.tell(hand.object, Some(pull));
+            self.send_spring(hand.object, Some(pull));
         }
     }
 
-    fn tell(&mut self, to: AgentId, pull: Option<AnchorSpring>) {
+    fn send_spring(&mut self, to: AgentId, pull: Option<AnchorSpring>) {
         if let Err(error) = self.session.hand(to, pull) {
-            self.say(Weight::Warning, error.to_string());
+            self.show_message(Severity::Warning, error.to_string());
         }
     }
 
@@ -271,9 +271,9 @@ impl<'a> WindowShow<'a> {
                     self.session.control().set_policy(Policy::Feedback);
                     self.session.control().set_law(law);
                 }
-                self.say(Weight::Note, format!("tuned: {}", live_tuning::told(&verdict)));
+                self.show_message(Severity::Note, format!("tuned: {}", live_tuning::verdict_text(&verdict)));
             }
-            Tuned::Refused(why) => self.say(Weight::Warning, format!("not tuned: {why}")),
+            Tuned::Refused(why) => self.show_message(Severity::Warning, format!("not tuned: {why}")),
         }
     }
 
@@ -282,7 +282,7 @@ impl<'a> WindowShow<'a> {
         let Some(tuning) = &mut self.tuning else { return };
         if let Err(error) = tuning.note(&mut self.session, 1e-3 * self.last.frame_ms) {
             self.stop_tuning();
-            self.say(Weight::Failure, format!("not tuned: {error}"));
+            self.show_message(Severity::Failure, format!("not tuned: {error}"));
         }
     }
 
@@ -300,7 +300,7 @@ impl<'a> WindowShow<'a> {
             return;
         }
         let news = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
-        news.into_iter().for_each(|text| self.say(Weight::Failure, text));
+        news.into_iter().for_each(|text| self.show_message(Severity::Failure, text));
         self.refreshed = Some(now);
     }
 
@@ -376,7 +376,7 @@ impl Show for WindowShow<'_> {
         self.status.sim_time = self.session.sim_now();
         (self.status.running, self.status.speed) = (self.running, self.speed);
         self.status.held =
-            self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
+            self.hand.map(|hand| HandStatus { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
         self.status.tuning = self.tuning.as_ref().map(|tuning| {
             let (done, words) = tuning.progress();
             ui::Tuning { done, words }
@@ -386,7 +386,7 @@ impl Show for WindowShow<'_> {
         }
         self.session.compose(&view.camera, view.size, view.style, self.hand);
         if self.session.is_virtual() {
-            self.session.choose_beside(&view.camera, view.size);
+            self.session.choose_next_frame(&view.camera, view.size);
             self.declared_draw = self.session.spend_declared(view.size);
         }
         self.session.picture()
@@ -394,7 +394,7 @@ impl Show for WindowShow<'_> {
 
     fn while_drawn(&mut self, view: &ViewRequest) {
         if !self.session.is_virtual() {
-            self.session.choose_beside(&view.camera, view.size);
+            self.session.choose_next_frame(&view.camera, view.size);
         }
     }
 
@@ -423,8 +423,8 @@ impl Show for WindowShow<'_> {
         self.session.calibrate(adapter, on_processor, || Gpu::headless().ok());
     }
 
-    fn ahead(&mut self, camera: Camera) -> Camera {
-        self.session.ahead(camera)
+    fn predict_camera(&mut self, camera: Camera) -> Camera {
+        self.session.predict_camera(camera)
     }
 
     fn scene_camera(&self) -> Camera {
@@ -432,11 +432,11 @@ impl Show for WindowShow<'_> {
     }
 
     fn pick(&self, ray: Ray) -> Option<Hit> {
-        self.session.stage().pick(ray)
+        self.session.scene_view().pick(ray)
     }
 
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds> {
-        self.session.stage().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
+        self.session.scene_view().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
     }
 
     fn wants_close(&mut self) -> bool {

@@ -38,7 +38,8 @@ pub fn show(ui: &mut Ui, shares: &Shares) {
         ui.spacing_mut().item_spacing.x = 6.0;
         let parts = [simulation, cull, select, draw, rest];
         for (((name, means), part), colour) in NAMES.into_iter().zip(parts).zip(COLOURS) {
-            ui.label(RichText::new(format!("{name} {}", told(part))).small().color(colour)).on_hover_text(means);
+            ui.label(RichText::new(format!("{name} {}", percent_text(part))).small().color(colour))
+                .on_hover_text(means);
         }
     });
 }
@@ -53,7 +54,7 @@ const NAMES: [(&str, &str); 5] = [
 ];
 
 /// A fraction in percent, or as a multiple of the whole.
-fn told(part: f64) -> String {
+fn percent_text(part: f64) -> String {
     if part < 2.0 { format!("{:.0} %", 100.0 * part) } else { format!("{part:.1}×") }
 }
 
@@ -75,6 +76,6 @@ mod tests {
 
     #[test]
     fn what_takes_many_frames_is_told_in_frames() {
-        assert_eq!([0.016, 1.2, 15.63].map(told), ["2 %", "120 %", "15.6×"]);
+        assert_eq!([0.016, 1.2, 15.63].map(percent_text), ["2 %", "120 %", "15.6×"]);
     }
 }

@@ -32,13 +32,13 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
             ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
             ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
             let force = ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
-            if let Some(felt) = row.inverse_mass_per_kg {
-                force.on_hover_text(weighed(row, felt));
+            if let Some(inverse_masses) = row.inverse_mass_per_kg {
+                force.on_hover_text(effective_mass_text(row, inverse_masses));
             }
             let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
             let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
             let color = if low { palette.warn } else { palette.weak };
-            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(spoken(row));
+            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(accessible_text(row));
             ui.end_row();
         }
     });
@@ -47,7 +47,7 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
     }
 }
 
-fn spoken(row: &CouplingRow) -> String {
+fn accessible_text(row: &CouplingRow) -> String {
     format!(
         "{} contacts, {} deep; what the energy tank may still give before the coupling fades",
         row.contacts,
@@ -56,15 +56,15 @@ fn spoken(row: &CouplingRow) -> String {
 }
 
 /// Tooltip: the effective mass of both at the contact with the largest force.
-fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
-    let felt = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
+fn effective_mass_text(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
+    let inverse_masses = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
     format!(
         "The contact that bears most feels as heavy as {}: there {} gives way like {}, {} like {}",
-        felt(a + b),
+        inverse_masses(a + b),
         row.a,
-        felt(a),
+        inverse_masses(a),
         row.b,
-        felt(b)
+        inverse_masses(b)
     )
 }
 
@@ -106,12 +106,12 @@ mod tests {
             inverse_mass_per_kg: None,
             tank_j: None,
         };
-        let told = |pair| weighed(&row, pair);
+        let tooltip = |pair| effective_mass_text(&row, pair);
         assert_eq!(
-            told([60.0, 20.0]),
+            tooltip([60.0, 20.0]),
             "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
         );
         // a driven body has no inverse mass: it does not give way at all
-        assert!(told([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
+        assert!(tooltip([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
     }
 }

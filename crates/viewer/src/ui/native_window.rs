@@ -5,11 +5,11 @@
 //! from wgpu, closes the window and opens it again on a new device. The show keeps running.
 
 use super::present_time::Presenting;
-use super::protocol::{FrameTimes, Message, Show, Skip, Weight};
+use super::protocol::{FrameTimes, Message, Severity, Show, Skip};
 use super::screen::GpuScreen;
-use super::{Layout, Screen, Viewer, Wishes};
+use super::{Layout, Screen, Viewer, WindowRequests};
 use eframe::{CreationContext, NativeOptions, egui_wgpu};
-use metachron_render::Lost;
+use metachron_render::DeviceLoss;
 use std::cell::{Cell, OnceCell};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
@@ -91,9 +91,9 @@ pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<Window
     loop {
         let opened = Instant::now();
         match open(show, &mut viewer, &options, first)? {
-            Fate::Open | Fate::Closed => return Ok(WindowEnd::Closed),
-            Fate::Finished => return Ok(WindowEnd::Finished),
-            Fate::DeviceLost => {}
+            WindowState::Open | WindowState::Closed => return Ok(WindowEnd::Closed),
+            WindowState::Finished => return Ok(WindowEnd::Finished),
+            WindowState::DeviceLost => {}
         }
         losses = if opened.elapsed() < YOUNG { losses + 1 } else { 0 };
         if losses >= LOSSES_MAX {
@@ -101,7 +101,7 @@ pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<Window
         }
         (options.lose_device_after, first) = (None, false);
         let text = "The graphics device was lost and made anew.".to_owned();
-        viewer.note(0.0, Message { weight: Weight::Warning, text });
+        viewer.note(0.0, Message { severity: Severity::Warning, text });
     }
 }
 
@@ -120,7 +120,7 @@ fn find_display() -> Result<(), WindowError> {
 
 /// State of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum WindowState {
     Open,
     Closed,
     Finished,
@@ -128,9 +128,14 @@ enum Fate {
 }
 
 /// One window on one device, until either ends.
-fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
-    let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
-    let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
+fn open(
+    show: &mut dyn Show,
+    viewer: &mut Viewer,
+    options: &WindowOptions,
+    first: bool,
+) -> Result<WindowState, WindowError> {
+    let (window_state, device) = (Rc::new(Cell::new(WindowState::Open)), Rc::new(OnceCell::<DeviceLoss>::new()));
+    let (shell_state, watched) = (Rc::clone(&window_state), Rc::clone(&device));
     let native = native_options(&show.status().scene, options.size);
     let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
         Viewer::install(&cc.egui_ctx);
@@ -141,39 +146,39 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
         show.drawn_by(screen.adapter(), screen.is_software());
-        Ok(Box::new(Shell::new(show, viewer, screen, told, options.screenshots.clone())))
+        Ok(Box::new(Shell::new(show, viewer, screen, shell_state, options.screenshots.clone())))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
     let opened = || device.get().is_some();
     // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
     // modified at that point
-    match hearing_winit(|| panic::catch_unwind(AssertUnwindSafe(run))) {
+    match catch_winit_panic(|| panic::catch_unwind(AssertUnwindSafe(run))) {
         (_, true) => return Err(no_answer(opened())),
         (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
-        (Err(_), _) if lost() => return Ok(Fate::DeviceLost),
+        (Err(_), _) if lost() => return Ok(WindowState::DeviceLost),
         (Err(bug), _) => panic::resume_unwind(bug),
     }
-    Ok(fate.get())
+    Ok(window_state.get())
 }
 
 /// Returns the result of `run`, and whether winit panicked meanwhile, as it does where the display does not answer; that panic is not
 /// printed.
-fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
-    let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
-    let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
+fn catch_winit_panic<T>(run: impl FnOnce() -> T) -> (T, bool) {
+    let (before, panicked) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
+    let (previous_hook, panic_flag) = (Arc::clone(&before), Arc::clone(&panicked));
     panic::set_hook(Box::new(move |panic| match panic.location() {
         Some(place) if place.file().split(['/', '\\']).any(|part| part.starts_with("winit-")) => {
-            hears.store(true, Ordering::Relaxed)
+            panic_flag.store(true, Ordering::Relaxed)
         }
-        _ => others(panic),
+        _ => previous_hook(panic),
     }));
     let given = run();
     drop(panic::take_hook());
     if let Ok(before) = Arc::try_unwrap(before) {
         panic::set_hook(before);
     }
-    (given, heard.load(Ordering::Relaxed))
+    (given, panicked.load(Ordering::Relaxed))
 }
 
 const LAYOUT: &str = "metachron layout";
@@ -237,7 +242,7 @@ struct Shell<'a> {
     show: &'a mut dyn Show,
     viewer: &'a mut Viewer,
     screen: GpuScreen,
-    fate: Rc<Cell<Fate>>,
+    window_state: Rc<Cell<WindowState>>,
     screenshots: PathBuf,
     pace: Pace,
     presenting: Presenting,
@@ -281,7 +286,7 @@ impl<'a> Shell<'a> {
         show: &'a mut dyn Show,
         viewer: &'a mut Viewer,
         screen: GpuScreen,
-        fate: Rc<Cell<Fate>>,
+        window_state: Rc<Cell<WindowState>>,
         screenshots: PathBuf,
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
@@ -289,7 +294,7 @@ impl<'a> Shell<'a> {
             show,
             viewer,
             screen,
-            fate,
+            window_state,
             screenshots,
             pace,
             presenting: Presenting::default(),
@@ -311,8 +316,8 @@ impl<'a> Shell<'a> {
         now_s - self.touched_s > CALM
     }
 
-    fn close(&self, ctx: &egui::Context, fate: Fate) {
-        self.fate.set(fate);
+    fn close(&self, ctx: &egui::Context, window_state: WindowState) {
+        self.window_state.set(window_state);
         ctx.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
@@ -347,15 +352,17 @@ impl<'a> Shell<'a> {
         self.viewer.measured(&times);
     }
 
-    fn fulfil(&mut self, ctx: &egui::Context, wishes: Wishes) {
-        if wishes.quit {
-            self.close(ctx, Fate::Closed);
+    fn fulfil(&mut self, ctx: &egui::Context, requests: WindowRequests) {
+        if requests.quit {
+            self.close(ctx, WindowState::Closed);
         }
-        if wishes.screenshot {
+        if requests.screenshot {
             let scene = self.show.status().scene.clone();
             let message = match self.screen.save(&self.screenshots, &scene) {
-                Ok(path) => Message { weight: Weight::Note, text: format!("Picture written to {}", path.display()) },
-                Err(text) => Message { weight: Weight::Failure, text },
+                Ok(path) => {
+                    Message { severity: Severity::Note, text: format!("Picture written to {}", path.display()) }
+                }
+                Err(text) => Message { severity: Severity::Failure, text },
             };
             self.viewer.note(ctx.time(), message);
         }
@@ -364,13 +371,13 @@ impl<'a> Shell<'a> {
 
 impl eframe::App for Shell<'_> {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        if self.fate.get() != Fate::Open {
+        if self.window_state.get() != WindowState::Open {
             return;
         }
         if self.screen.lost().reason().is_some() {
-            self.close(ctx, Fate::DeviceLost);
+            self.close(ctx, WindowState::DeviceLost);
         } else if self.show.wants_close() {
-            self.close(ctx, Fate::Finished);
+            self.close(ctx, WindowState::Finished);
         }
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             self.hidden = true;
@@ -379,7 +386,7 @@ impl eframe::App for Shell<'_> {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        if self.fate.get() != Fate::Open {
+        if self.window_state.get() != WindowState::Open {
             return;
         }
         let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
@@ -394,14 +401,14 @@ impl eframe::App for Shell<'_> {
             self.presenting.started(interval, late);
         }
         self.screen.set_due(due);
-        let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
+        let (requests, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
         self.drawing = if first_pass { drawing } else { self.drawing + drawing };
         self.account(interval, panels);
         if let Some(error) = self.screen.take_failure() {
             let text = format!("The picture could not be drawn: {error}");
-            self.viewer.note(ui.ctx().time(), Message { weight: Weight::Failure, text });
+            self.viewer.note(ui.ctx().time(), Message { severity: Severity::Failure, text });
         }
-        self.fulfil(ui.ctx(), wishes);
+        self.fulfil(ui.ctx(), requests);
         if self.screen.lost().reason().is_some() {
             // egui must not draw on a lost device: its vertex buffer would be missing, and it would panic
             ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
@@ -424,8 +431,8 @@ mod tests {
 
     #[test]
     fn a_display_that_does_not_answer_is_named() {
-        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
-        assert_eq!(told, "`:77`, which DISPLAY names, does not answer");
+        let shell_state = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
+        assert_eq!(shell_state, "`:77`, which DISPLAY names, does not answer");
         assert_eq!(unanswered(|_| None, "does not answer"), "the system gives no window");
     }
 

@@ -4,13 +4,13 @@
 //! The thread waits for the picture, so that its measured work is complete; egui draws after it on the same queue.
 
 use super::Screen;
-use super::blit::{Blit, Shown};
+use super::blit::{Blit, BlitShape};
 use super::protocol::{Show, ViewRequest};
 use egui::{Rect, Shape};
 use egui_wgpu::{RenderState, wgpu};
 use metachron_render::Gpu;
 use metachron_render::offscreen;
-use metachron_render::{DrawError, Lost, Renderer, RendererOptions, Size, Target};
+use metachron_render::{DeviceLoss, DrawError, Renderer, RendererOptions, Size, Target};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -32,7 +32,7 @@ pub struct DrawnTimes {
 struct Canvas {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    shown: Arc<Shown>,
+    shown: Arc<BlitShape>,
 }
 
 /// The window's device as a [`Screen`].
@@ -76,7 +76,7 @@ impl GpuScreen {
     }
 
     /// Whether the device was lost: nothing can be drawn until it is replaced.
-    pub fn lost(&self) -> &Lost {
+    pub fn lost(&self) -> &DeviceLoss {
         self.renderer.lost()
     }
 

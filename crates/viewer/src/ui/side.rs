@@ -1,8 +1,8 @@
 //! The side panel: frame time against the target, the controller and its gains, drawing options of the picture.
 //!
-//! In: the [`Status`] and the recent frames. Out: [`Action`]s, and changed [`Looks`]. Never here: the law itself.
+//! In: the [`Status`] and the recent frames. Out: [`Action`]s, and changed [`DrawingOptions`]. Never here: the law itself.
 
-use super::Looks;
+use super::DrawingOptions;
 use super::history::{FrameSummary, History};
 use super::plots;
 use super::protocol::{Action, AgentRow, AgentState, Law, Status, Tuning};
@@ -19,7 +19,7 @@ const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
 
 /// Draws the panel.
-pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut Looks) -> Vec<Action> {
+pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut DrawingOptions) -> Vec<Action> {
     let mut actions = Vec::new();
     egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
@@ -189,7 +189,7 @@ fn as_toml(status: &Status, law: &Law) -> String {
     format!("[target]\nframe_hz = {:?}\npolicy = \"{}\"\n{gains}", status.target_hz, status.policy)
 }
 
-fn picture(ui: &mut Ui, looks: &mut Looks, status: &Status) {
+fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
     egui::Grid::new("looks").num_columns(2).spacing(egui::vec2(18.0, 4.0)).show(ui, |ui| {
         if ui.checkbox(&mut looks.colours, "Colour by resolution").changed() && looks.colours {
             (looks.ages, looks.details) = (false, false);

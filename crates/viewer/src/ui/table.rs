@@ -111,7 +111,7 @@ fn cell(ui: &Ui, at: &Cell<'_>, text: &str, font: FontId, color: Color32) {
 fn agent(ui: &mut Ui, row: &AgentRow, edges: &[f32], selected: bool, palette: &Palette) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let texts = cells(row);
-    response.widget_info(|| WidgetInfo::selected(Role::Row, true, selected, spoken(row, &texts)));
+    response.widget_info(|| WidgetInfo::selected(Role::Row, true, selected, accessible_text(row, &texts)));
     if ui.is_rect_visible(rect) {
         if selected {
             ui.painter().rect_filled(rect, 4.0, palette.accent.gamma_multiply(0.22));
@@ -159,7 +159,7 @@ fn state_text(row: &AgentRow) -> String {
     }
 }
 
-fn spoken(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
+fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
     format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[9])
 }
 

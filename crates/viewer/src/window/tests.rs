@@ -96,7 +96,7 @@ fn a_scene_that_cannot_be_opened_is_a_message_and_the_run_goes_on() {
         show.apply(Action::OpenScene(Path::new("/nowhere/at all.toml").to_owned()));
         frame(show, None);
         let [message] = &show.status().messages[..] else { panic!("one message: {:?}", show.status().messages) };
-        assert_eq!(message.weight, Weight::Failure);
+        assert_eq!(message.severity, Severity::Failure);
         assert!(message.text.contains("at all.toml"), "{}", message.text);
         assert!(show.session.sim_now() > before);
         show.apply(Action::Reload);
@@ -123,7 +123,7 @@ fn tuning_draws_its_experiment_searches_beside_the_show_and_takes_what_it_finds(
         assert_eq!(show.status().tuning, None);
         assert_ne!(show.session.control().law(), before);
         let [message] = &show.status().messages[..] else { panic!("one message: {:?}", show.status().messages) };
-        assert!(message.weight == Weight::Note && message.text.starts_with("tuned: κ"), "{}", message.text);
+        assert!(message.severity == Severity::Note && message.text.starts_with("tuned: κ"), "{}", message.text);
     });
 }
 
@@ -157,7 +157,7 @@ fn a_scene_that_leaves_nothing_to_tune_says_why() {
             std::thread::sleep(Duration::from_millis(5));
         }
         let [message] = &show.status().messages[..] else { panic!("one message: {:?}", show.status().messages) };
-        assert!(message.weight == Weight::Warning && message.text.contains("coarsest"), "{}", message.text);
+        assert!(message.severity == Severity::Warning && message.text.contains("coarsest"), "{}", message.text);
     });
 }
 
