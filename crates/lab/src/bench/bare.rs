@@ -95,8 +95,8 @@ fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> 
 
 /// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let around = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
-    agent.step(dt, &around)?;
+    let context = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    agent.step(dt, &context)?;
     Ok(())
 }
 

@@ -10,7 +10,7 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
 use super::machine::{others_cpu, own_cpu};
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use anyhow::{Context, bail};
 use glam::{DQuat, DVec3};
 use metachron_geometry::Solid;
@@ -63,7 +63,7 @@ impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
         let mut spent = Spent::new();
@@ -75,8 +75,9 @@ impl Subject for Pile {
             ("agents in virtual time", &mut || agents(&scene, ExecutorKind::Lockstep, sim_s)),
             ("agents in a pool", &mut || agents(&scene, ExecutorKind::Pool, sim_s)),
         ];
-        let told = cases.into_iter().zip(0_u32..);
-        let wanted = told.take_while(|((words, _), at)| watch.goes_on(0.2 * f64::from(*at), (*words).to_owned()));
+        let cases_in_order = cases.into_iter().zip(0_u32..);
+        let wanted =
+            cases_in_order.take_while(|((words, _), at)| progress.continues(0.2 * f64::from(*at), (*words).to_owned()));
         let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
         let Some(plain) = rows.first().cloned() else { return Ok(rows) };
         let others = OTHERS.map(|(who, steps)| Row {

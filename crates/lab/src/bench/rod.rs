@@ -9,7 +9,7 @@ use super::super::chart::table::Table;
 use super::bare::step;
 use super::cast::{ROD_SEGMENTS, rod};
 use super::machine::own_cpu;
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use glam::DVec3;
 use metachron_core::SimSpan;
 use serde::{Deserialize, Serialize};
@@ -43,13 +43,14 @@ impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));
         let cases = [false, true].into_iter().flat_map(|contact| SEGMENTS.map(|segments| (segments, contact)));
         let cases: Vec<_> = cases.collect();
         let total = cases.len() as f64;
-        let told = cases.into_iter().enumerate();
-        let wanted = told.take_while(|(at, case)| watch.goes_on(*at as f64 / total, format!("{} segments", case.0)));
+        let cases_in_order = cases.into_iter().enumerate();
+        let wanted = cases_in_order
+            .take_while(|(at, case)| progress.continues(*at as f64 / total, format!("{} segments", case.0)));
         wanted.map(|(_, (segments, self_contact))| measure(segments, self_contact, span)).collect()
     }
 

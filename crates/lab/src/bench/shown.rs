@@ -8,7 +8,7 @@ use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::cast::Model;
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;
 use std::time::Duration;
@@ -23,7 +23,7 @@ impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
@@ -37,7 +37,7 @@ impl Subject for Agents {
         let mut rows = Vec::with_capacity(chosen.len());
         for (at, case) in chosen.iter().enumerate() {
             let words = format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
-            if !watch.goes_on(at as f64 / chosen.len() as f64, words) {
+            if !progress.continues(at as f64 / chosen.len() as f64, words) {
                 break;
             }
             rows.push(measure(case, span)?);

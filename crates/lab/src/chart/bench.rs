@@ -122,7 +122,7 @@ impl Stage {
     }
 
     /// Lets every agent look around before the first step.
-    pub(super) fn look(&mut self) {
+    pub(super) fn start(&mut self) {
         for i in 0..self.actors.len() {
             let me = AgentId(i as u32);
             let neighbours = self.sights(i);
@@ -148,10 +148,10 @@ impl Stage {
         let actor = &mut self.actors[i];
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let around = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        let context = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
         let wanted = dt;
-        let dt = actor.agent.longest_step(wanted, &around);
-        actor.agent.step(dt, &around)?;
+        let dt = actor.agent.longest_step(wanted, &context);
+        actor.agent.step(dt, &context)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);
         (actor.own.time, actor.own.shorter) = (time + dt, (dt < wanted).then_some(dt));

@@ -62,11 +62,11 @@ impl Play {
         self.links.push((of, link));
     }
 
-    /// Plays up to `seconds` and calls `look` with the agent after every step; `false` ends the run, and so does a failed step.
-    pub(super) fn run(mut self, seconds: f64, mut look: impl FnMut(&Self, AgentId) -> bool) -> Self {
-        self.stage.look();
-        while let Some(who) = self.stage.next(seconds) {
-            if self.stage.step(who).is_err() || !look(&self, who) {
+    /// Plays up to `seconds` and calls `go_on` with the agent after every step; `false` ends the run, and so does a failed step.
+    pub(super) fn run(mut self, seconds: f64, mut go_on: impl FnMut(&Self, AgentId) -> bool) -> Self {
+        self.stage.start();
+        while let Some(id) = self.stage.next(seconds) {
+            if self.stage.step(id).is_err() || !go_on(&self, id) {
                 break;
             }
         }

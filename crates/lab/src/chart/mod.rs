@@ -160,7 +160,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     for entry in chosen {
         let one = (entry.run)(&setting)?;
         if !quiet {
-            data(&told(&one))?;
+            data(&summary(&one))?;
         }
         done.push(one);
         if stopped.load(Ordering::Relaxed) {
@@ -271,7 +271,7 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
 }
 
 /// An experiment's table, findings and files as text.
-fn told(done: &Done) -> String {
+fn summary(done: &Done) -> String {
     let mut findings = Table::new(&["", "claim", "measured", "limit"]);
     let (so_far, state) = if done.complete { ("", "") } else { (" so far", " (unfinished)") };
     for Finding { claim, measured, limit, holds } in &done.findings {

@@ -19,7 +19,7 @@ pub(super) struct Swept<R> {
     pub(super) complete: bool,
 }
 
-/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `told` is called for every
+/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `progress` is called for every
 /// row with the number of rows done and of all rows.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub(super) fn sweep<E: Experiment>(
     mut file: RowFile,
     kept: Vec<E::Row>,
     stopped: &AtomicBool,
-    told: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize),
 ) -> anyhow::Result<Swept<E::Row>> {
     let mut rows: Vec<Option<E::Row>> = cases.iter().map(|_| None).collect();
     for row in kept {
@@ -40,7 +40,7 @@ pub(super) fn sweep<E: Experiment>(
     }
     let open: Vec<usize> = (0..cases.len()).filter(|&k| rows[k].is_none()).collect();
     let mut done = cases.len() - open.len();
-    told(done, cases.len());
+    progress(done, cases.len());
     let next = AtomicUsize::new(0);
     let work = |out: mpsc::Sender<(usize, Option<E::Row>)>| {
         while !stopped.load(Ordering::Relaxed) {
@@ -65,7 +65,7 @@ pub(super) fn sweep<E: Experiment>(
             file.add::<E>(&row)?;
             rows[k] = Some(row);
             done += 1;
-            told(done, cases.len());
+            progress(done, cases.len());
         }
         Ok(())
     })?;

@@ -150,8 +150,8 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The outcome without an answer: the reason, unless the user interrupted.
-fn ended<'a>(task: &mut Task<'a>, told: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
-    if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(told(task)) }
+fn ended<'a>(task: &mut Task<'a>, explain: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
+    if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(explain(task)) }
 }
 
 /// The outcome where the runs were used up before anything was found.

@@ -55,7 +55,7 @@ fn row(task: &Task<'_>, fitted: &Fitted, object: usize, which: usize, head: [&st
         pieces,
         Cell::Number(cost_s * 1e3, 4),
         Cell::Number(fitted.cpu_s[which][object] * 1e3, 3),
-        simpler(fitted, object).filter(|_| which == 1).map_or("", |told| told.word).into(),
+        simpler(fitted, object).filter(|_| which == 1).map_or("", |note| note.word).into(),
     ]);
     cells
 }
@@ -70,7 +70,7 @@ fn simpler(fitted: &Fitted, object: usize) -> Option<&Simpler> {
 }
 
 fn notes(fitted: &Fitted) -> impl Iterator<Item = &str> {
-    fitted.simpler.iter().flatten().map(|told| told.note.as_str())
+    fitted.simpler.iter().flatten().map(|found| found.note.as_str())
 }
 
 /// The cost of a solve by every integrator.
@@ -108,12 +108,12 @@ pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bo
     };
     let object = |at: usize| {
         let (name, [model, _]) = (&task.objects[at].name, models(task, at));
-        let simpler = simpler(fitted, at).map(|told| told.word);
+        let simpler = simpler(fitted, at).map(|note| note.word);
         json!({ "name": name, "model": model, "pays": side(at, 0), "needs": side(at, 1), "simpler": simpler })
     };
     let price = |(integrator, price): (Integrator, &f64)| (integrator.name().to_owned(), json!(finite(*price)));
     let solves: serde_json::Map<_, _> = Integrator::ALL.into_iter().zip(&task.prices).map(price).collect();
-    let told = json!({
+    let report = json!({
         "scene": args.scene,
         "tolerance_m": args.tolerance,
         "seconds": args.seconds,
@@ -128,7 +128,7 @@ pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bo
         "complete": !fitted.need.cut_short,
         "written": written,
     });
-    Ok(format!("{}\n", serde_json::to_string_pretty(&told)?))
+    Ok(format!("{}\n", serde_json::to_string_pretty(&report)?))
 }
 
 fn finite(number: f64) -> Option<f64> {

@@ -40,9 +40,9 @@ pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -
             .or_else(|| flying(task, &played, object, limits.room_m))
     };
     let mut simpler: Vec<_> = (0..task.objects.len()).map(plain).collect();
-    for (object, told) in simpler.iter_mut().enumerate() {
-        if told.is_none() {
-            *told = slack(task, object, need, limits);
+    for (object, note_of) in simpler.iter_mut().enumerate() {
+        if note_of.is_none() {
+            *note_of = slack(task, object, need, limits);
         }
     }
     simpler

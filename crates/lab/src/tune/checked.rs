@@ -28,13 +28,13 @@ pub(super) struct Checked {
 
 impl Checked {
     /// A line of text.
-    pub fn told(&self) -> String {
-        let told = |settle: Option<f64>| settle.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
+    pub fn text(&self) -> String {
+        let text = |settle: Option<f64>| settle.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
         format!(
             "on its own frames it settles from {} of the rate in {}; predicted was {}\n",
             self.rate,
-            told(self.measured_s),
-            told(self.predicted_s)
+            text(self.measured_s),
+            text(self.predicted_s)
         )
     }
 

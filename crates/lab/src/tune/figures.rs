@@ -105,7 +105,7 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
         _ => None,
     });
     let found: Vec<_> = found.collect();
-    let (alphas, betas) = (around(ALPHA, found.iter().map(|at| at.0)), around(BETA, found.iter().map(|at| at.1)));
+    let (alphas, betas) = (widened(ALPHA, found.iter().map(|at| at.0)), widened(BETA, found.iter().map(|at| at.1)));
     let corners = (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)));
     let cells: Vec<[f64; 4]> = corners
         .map(|(column, row)| {
@@ -135,7 +135,7 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
 }
 
 /// A range extended to contain these values, with half a decade of room around each.
-fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
+fn widened(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
     const ROOM: f64 = 3.2;
     values.fold(range, |(low, high), value| (low.min(value / ROOM), high.max(value * ROOM)))
 }
@@ -182,9 +182,9 @@ mod tests {
 
     #[test]
     fn what_was_found_stands_inside_the_map() {
-        assert_eq!(around(BETA, [1.0].into_iter()), BETA);
-        let (low, high) = around(BETA, [50.0, 0.01].into_iter());
+        assert_eq!(widened(BETA, [1.0].into_iter()), BETA);
+        let (low, high) = widened(BETA, [50.0, 0.01].into_iter());
         assert!(low < 0.004 && high > 150.0, "{low} {high}");
-        assert_eq!(around(ALPHA, std::iter::empty()), ALPHA);
+        assert_eq!(widened(ALPHA, std::iter::empty()), ALPHA);
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
         elsewhere(tuned),
         table.text(),
         gains::told(tuned.best.into()),
-        checked.iter().map(Checked::told).collect::<String>(),
+        checked.iter().map(Checked::text).collect::<String>(),
         files.join(", ")
     )
 }

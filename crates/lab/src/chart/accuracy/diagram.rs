@@ -157,11 +157,11 @@ impl<B: Benchmark> Experiment for Diagram<B> {
                 table.rows.push(vec![
                     case.into(),
                     method.into(),
-                    told(dt_order(&here), 2),
-                    told(segment_order(&here), 2),
+                    optional(dt_order(&here), 2),
+                    optional(segment_order(&here), 2),
                     (best, 6).into(),
-                    told(cheapest(here.iter().copied(), 1e-3), 3),
-                    told(cheapest(here.iter().copied(), 1e-4), 3),
+                    optional(cheapest(here.iter().copied(), 1e-3), 3),
+                    optional(cheapest(here.iter().copied(), 1e-4), 3),
                 ]);
             }
         }
@@ -184,7 +184,7 @@ fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
 }
 
 /// A number in a cell, or a dash where there is none.
-fn told(value: Option<f64>, digits: usize) -> Cell {
+fn optional(value: Option<f64>, digits: usize) -> Cell {
     value.map_or_else(|| "–".into(), |value| (value, digits).into())
 }
 

@@ -83,8 +83,9 @@ impl Experiment for CouplingError {
 
     fn measure(case: &Case) -> Row {
         let Case { scene, ratio, first_is_fast, seconds } = case.clone();
-        let Apart { looks, position_rms_m, position_max_m, momentum, impulse } = apart(case).unwrap_or_default();
-        Row { scene, ratio, first_is_fast, seconds, looks, position_rms_m, position_max_m, momentum, impulse }
+        let RunDifference { samples, position_rms_m, position_max_m, momentum, impulse } =
+            apart(case).unwrap_or_default();
+        Row { scene, ratio, first_is_fast, seconds, looks: samples, position_rms_m, position_max_m, momentum, impulse }
     }
 
     fn case_of(row: &Row) -> Case {
@@ -148,39 +149,39 @@ fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -
 }
 
 /// The difference of two runs.
-struct Apart {
-    looks: usize,
+struct RunDifference {
+    samples: usize,
     position_rms_m: f64,
     position_max_m: f64,
     momentum: f64,
     impulse: f64,
 }
 
-impl Default for Apart {
+impl Default for RunDifference {
     fn default() -> Self {
         let none = f64::NAN;
-        Self { looks: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
+        Self { samples: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
     }
 }
 
 /// The record of one run: positions at every comparison, momentum and impulse at the last one.
 #[derive(Default)]
 struct Trail {
-    looks: Vec<Vec<DVec3>>,
+    samples: Vec<Vec<DVec3>>,
     momentum: DVec3,
     impulse_n_s: f64,
 }
 
-fn apart(case: &Case) -> Option<Apart> {
+fn apart(case: &Case) -> Option<RunDifference> {
     let slow_ns = FAST_NS * u64::from(case.ratio);
     let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
     let coupled = trail(case, slow_ns, steps_ns)?;
     let oracle = trail(case, slow_ns, [ORACLE_NS; 2])?;
-    let pairs = coupled.looks.iter().flatten().zip(oracle.looks.iter().flatten());
+    let pairs = coupled.samples.iter().flatten().zip(oracle.samples.iter().flatten());
     let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    Some(Apart {
-        looks: coupled.looks.len(),
+    Some(RunDifference {
+        samples: coupled.samples.len(),
         position_rms_m: mean.sqrt(),
         position_max_m: worst(squares).sqrt(),
         momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,
@@ -191,20 +192,20 @@ fn apart(case: &Case) -> Option<Apart> {
 /// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
 fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
     let Scene { play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64), Faults::default())?;
-    let looks = libm::round(case.seconds * 1e9) as u64 / every_ns;
+    let samples = libm::round(case.seconds * 1e9) as u64 / every_ns;
     let ids: Vec<AgentId> = (0..play.stage.members().len() as u32).map(AgentId).collect();
     let mut trail = Trail::default();
     play.run(2.0 * case.seconds, |play, _| {
-        let due = SimTime::from_nanos((trail.looks.len() as u64 + 1) * every_ns);
+        let due = SimTime::from_nanos((trail.samples.len() as u64 + 1) * every_ns);
         if ids.iter().all(|id| play.stage.own(*id).time.secs_after(due).abs() < SAME_S) {
-            trail.looks.push(points.iter().map(|(id, anchor)| position_m(play, *id, *anchor)).collect());
+            trail.samples.push(points.iter().map(|(id, anchor)| position_m(play, *id, *anchor)).collect());
             trail.momentum = play.common(due).momentum;
             let pairs = ids.iter().flat_map(|id| &play.stage.own(*id).pairs);
             trail.impulse_n_s = pairs.map(|pair| pair.impulse_n_s).sum();
         }
-        (trail.looks.len() as u64) < looks
+        (trail.samples.len() as u64) < samples
     });
-    (trail.looks.len() as u64 == looks).then_some(trail)
+    (trail.samples.len() as u64 == samples).then_some(trail)
 }
 
 /// The position of a point, with every impulse on its way to its agent delivered.

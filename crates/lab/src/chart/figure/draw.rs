@@ -217,11 +217,11 @@ fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> 
     for (x, y) in finite(points) {
         let way = [panel.x.beyond(x), panel.y.beyond(y)];
         // a point beyond both borders is marked at the one above or below
-        let told = if way[1] != 0 { [0, way[1]] } else { way };
-        if told != [0, 0] && told != before {
-            all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), told));
+        let side = if way[1] != 0 { [0, way[1]] } else { way };
+        if side != [0, 0] && side != before {
+            all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), side));
         }
-        before = told;
+        before = side;
     }
     all
 }

@@ -4,7 +4,7 @@ use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{at_least, figure};
-use super::machine::Noise;
+use super::machine::RandomSource;
 use super::metrics::mean;
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
@@ -138,7 +138,7 @@ impl Experiment for Bound {
 /// Objects of five levels, polygons log-normal over two decades, accuracy as of flat shading; the budget is a third of the full cost.
 fn random(objects: usize, seed: usize) -> Problem {
     const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
-    let mut noise = Noise::new(1 + seed as u64);
+    let mut noise = RandomSource::new(1 + seed as u64);
     let of = |_| {
         let polygons = 300.0 * libm::exp(noise.normal());
         let pixels = 1000.0 * libm::exp(noise.normal());

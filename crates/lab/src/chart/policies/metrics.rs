@@ -80,8 +80,8 @@ impl Row {
         let times = |keep: fn(&&Frame) -> bool| frames.iter().filter(keep).map(|f| f.time).collect::<Vec<_>>();
         let (all, binding) = (times(|_| true), times(|f| f.full > BINDING));
         let part = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { f64::NAN };
-        let things = frames.iter().map(|f| f.things).sum();
-        let each = |of: fn(&Frame) -> usize| part(frames.iter().map(of).sum(), things);
+        let objects = frames.iter().map(|f| f.objects).sum();
+        let each = |of: fn(&Frame) -> usize| part(frames.iter().map(of).sum(), objects);
         let known = |of: fn(&Frame) -> f64| frames.iter().map(of).filter(|x| x.is_finite()).collect::<Vec<_>>();
         let gaps = known(|f| f.gap);
         let errors = known(|f| (f.predicted - f.time).abs() / f.time);
@@ -183,14 +183,14 @@ mod tests {
 
     fn frame(time: f64, full: f64) -> Frame {
         let none = f64::NAN;
-        let (things, polygons) = (4, 10.0);
+        let (objects, polygons) = (4, 10.0);
         Frame {
             time,
             full,
             predicted: 1.1 * time,
             gap: none,
             quality: none,
-            things,
+            objects,
             holes: 1,
             changes: 2,
             reversals: 0,

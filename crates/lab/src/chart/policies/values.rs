@@ -6,7 +6,7 @@ use super::super::table::Table;
 use super::chooser::Policy;
 use super::common::{at_least, figure};
 use super::forest;
-use super::forest::{Forms, Way};
+use super::forest::{CameraPath, Forms};
 use super::machine::Fault;
 use super::metrics::mean;
 use metachron_lod::cost::value::Value;
@@ -43,7 +43,7 @@ pub(in super::super) struct Row {
 
 /// Depth in metres and drawn part of everything in view, and the time of the frame as a part of T.
 fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
-    let mut show = forest::show(600, Way::Linear, TARGET, Forms::Whole, FRAMES);
+    let mut show = forest::show(600, CameraPath::Linear, TARGET, Forms::Whole, FRAMES);
     show.fault = Fault { wander: 0.0, tremble: 0.0, ..Fault::NONE };
     let mut parts = Vec::new();
     let frames = show.watch(Policy::RobinHood(value), 1, &mut |frame, seen, choice| {

@@ -95,6 +95,6 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
 
 /// One step among `neighbours`; `None` where it fails.
 pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
-    let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-    tube.step(dt, &around).ok().map(drop)
+    let context = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+    tube.step(dt, &context).ok().map(drop)
 }

@@ -188,8 +188,8 @@ fn slips_at(case: &Case) -> Option<f64> {
         }
         let on = (t / (0.5 * SETTLE_S)).min(1.0);
         let hands = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
-        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(dt, &around).ok()?;
+        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        tube.step(dt, &context).ok()?;
         time += dt;
         tube.write_snapshot(&mut snapshot);
         let (start, _) = snapshot.body.probe(0.0)?;

@@ -95,11 +95,11 @@ impl Experiment for Closed {
     }
 
     fn measure(case: &Case) -> Row {
-        let (sums, whole) = play(case).unwrap_or_default();
+        let (extremes, whole) = play(case).unwrap_or_default();
         let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
-            if whole { sums.numbers() } else { [f64::NAN; 8] };
+            if whole { extremes.numbers() } else { [f64::NAN; 8] };
         let Case { system, turn, seed, seconds } = case.clone();
-        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| sums.of_second(k));
+        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
         Row {
             system,
             turn,
@@ -113,9 +113,9 @@ impl Experiment for Closed {
             raw_drift,
             in_flight,
             beyond,
-            looks: sums.looks,
-            blows: sums.blows,
-            pause_s: sums.pause_s.max(seconds - sums.last_blow_s),
+            looks: extremes.looks,
+            blows: extremes.blows,
+            pause_s: extremes.pause_s.max(seconds - extremes.last_blow_s),
             energy_of_second,
             told_of_second,
             in_flight_of_second,
@@ -234,10 +234,10 @@ fn read(numbers: &str) -> Vec<(f64, f64)> {
 
 /// Extremes and counts over a run; momenta are shares of those at the start.
 #[derive(Debug, Clone, Default)]
-struct Sums {
+struct Extremes {
     energy: [f64; 3],
     drift: [f64; 2],
-    told: [f64; 3],
+    published: [f64; 3],
     looks: u32,
     blows: u32,
     last_blow_s: f64,
@@ -247,10 +247,11 @@ struct Sums {
     seconds: Vec<[f64; 3]>,
 }
 
-impl Sums {
+impl Extremes {
     fn numbers(&self) -> [f64; 8] {
-        let ([peak, end, raw], [drift, angular], [told, flying, beyond]) = (self.energy, self.drift, self.told);
-        [peak, end, raw, drift, angular, told, flying, beyond]
+        let ([peak, end, raw], [drift, angular], [published, flying, beyond]) =
+            (self.energy, self.drift, self.published);
+        [peak, end, raw, drift, angular, published, flying, beyond]
     }
 
     fn of_second(&self, which: usize) -> String {
@@ -259,14 +260,14 @@ impl Sums {
     }
 
     /// Takes in a sample at `at_s`: energies, changes of momenta, impulse in flight.
-    fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [told, flying]: [f64; 2]) {
+    fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [published, flying]: [f64; 2]) {
         self.energy = [worst([self.energy[0], energy]), energy, worst([self.energy[2], raw])];
         self.drift = [0, 1].map(|k| worst([self.drift[k], drift[k]]));
-        let told = [told, flying, told - flying];
-        self.told = [0, 1, 2].map(|k| worst([self.told[k], told[k]]));
+        let published = [published, flying, published - flying];
+        self.published = [0, 1, 2].map(|k| worst([self.published[k], published[k]]));
         self.seconds.resize((at_s as usize + 1).max(self.seconds.len()), [0.0; 3]);
         if let Some(second) = self.seconds.last_mut() {
-            let now = [energy, told[0], told[1]];
+            let now = [energy, published[0], published[1]];
             *second = [0, 1, 2].map(|k| worst([second[k], now[k]]));
         }
         self.looks += 1;
@@ -289,12 +290,12 @@ impl Sums {
 }
 
 /// Plays the case; returns its results and whether it reached its end.
-fn play(case: &Case) -> Option<(Sums, bool)> {
+fn play(case: &Case) -> Option<(Extremes, bool)> {
     let (play, ids) = system(&case.system, case.turn, case.seed)?;
     let start = play.common(SimTime::ZERO);
     let size: f64 = momenta(&play, ids);
-    let (raw_start, told_start) = (play.raw_j(), told(&play));
-    let mut sums = Sums::default();
+    let (raw_start, published_start) = (play.raw_j(), published_momentum(&play));
+    let mut extremes = Extremes::default();
     let ended = play.run(case.seconds, |play, _| {
         let times = ids.map(|id| play.stage.own(id).time);
         let (first, last) = (times.iter().min().copied(), times.iter().max().copied());
@@ -305,15 +306,15 @@ fn play(case: &Case) -> Option<(Sums, bool)> {
         let (now, at_s) = (play.common(first), first.as_secs_f64());
         let energy = [now.energy_j / start.energy_j, play.raw_j() / raw_start];
         let drift = [
-            (told(play) + on_its_way(play, ids) - told_start).length(),
+            (published_momentum(play) + on_its_way(play, ids) - published_start).length(),
             (now.angular - start.angular).length() / ROOM_M,
         ];
-        let told = [(told(play) - told_start).length(), now.in_flight_n_s];
-        sums.add(at_s, energy, drift.map(|d| d / size), told.map(|t| t / size));
-        sums.strike(at_s, play, ids);
+        let published = [(published_momentum(play) - published_start).length(), now.in_flight_n_s];
+        extremes.add(at_s, energy, drift.map(|d| d / size), published.map(|t| t / size));
+        extremes.strike(at_s, play, ids);
         energy[0] < 1e3
     });
-    Some((sums, ended.time().as_secs_f64() >= case.seconds - 1e-3))
+    Some((extremes, ended.time().as_secs_f64() >= case.seconds - 1e-3))
 }
 
 /// Sum of the magnitudes of all momenta, kg·m/s.
@@ -329,7 +330,7 @@ fn on_its_way(play: &Play, ids: [AgentId; 5]) -> DVec3 {
 }
 
 /// Momentum as the agents publish it, nothing delivered, kg·m/s.
-fn told(play: &Play) -> DVec3 {
+fn published_momentum(play: &Play) -> DVec3 {
     let members = play.stage.members();
     let one = |k: usize| audit(&members[k..=k], members[k].snapshot.time, &mut |_, _| 0.0).momentum;
     (0..members.len()).map(one).sum()

@@ -39,11 +39,11 @@ const SPRING_REST_M: f64 = 0.05;
 
 /// The system with a name; the rates are shifted cyclically by `turn` places.
 pub(super) fn system(name: &str, turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
-    if name == SYSTEMS[0] { company(turn, seed) } else { ring(turn, seed) }
+    if name == SYSTEMS[0] { colliding_row(turn, seed) } else { ring(turn, seed) }
 }
 
 /// Plate, tube, ball, tube, plate along x; the ball flies, the plates approach, the tubes are hit.
-fn company(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
+fn colliding_row(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let mut play = Play::new(Law::Ledger, Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
     let sway = |k: u64| libm::sin((31 * seed + 7 * k) as f64) * SWAY_M_S;

@@ -286,16 +286,16 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
     let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, faults, FALL_M)?;
     let start_j = play.raw_j() - zero_j;
     let mut out = Fall { raw: 1.0, common: 1.0, momentum_error: 0.0, depth_m: 0.0 };
-    let mut given = [ContactImpulse::default(); 2];
+    let mut contact = [ContactImpulse::default(); 2];
     let (mut room, mut pages) = (NarrowPhaseScratch::default(), 0_u32);
     let gravity = DVec3::NEG_Z * GRAVITY;
-    let ended = play.run(SECONDS, |play, who| {
+    let ended = play.run(SECONDS, |play, id| {
         let at = play.time();
         out.raw = worst([out.raw, (play.raw_j() - zero_j) / start_j]);
         out.common = worst([out.common, (play.common(at).energy_j - zero_j) / start_j]);
-        let side = usize::from(who == falling);
+        let side = usize::from(id == falling);
         let mass = [MOUNTED_KG, FALLING_KG][side];
-        given[side].add(play.stage.own(who), mass, gravity, play.stage.last_s(who));
+        contact[side].add(play.stage.own(id), mass, gravity, play.stage.last_s(id));
         pages += 1;
         if at.as_secs_f64() > REST_S && pages.is_multiple_of(8) {
             out.depth_m = out.depth_m.max(play.depth_m([mounted, falling], at, &mut room));
@@ -303,8 +303,8 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
         out.raw < BLOWN_UP
     });
     let flying: DVec3 = [mounted, falling].iter().map(|id| ended.in_flight(*id)).sum();
-    let exchanged = given[1].size + ended.in_flight(falling).length();
-    out.momentum_error = (given[0].sum + given[1].sum + flying).length() / exchanged.max(f64::MIN_POSITIVE);
+    let exchanged = contact[1].size + ended.in_flight(falling).length();
+    out.momentum_error = (contact[0].sum + contact[1].sum + flying).length() / exchanged.max(f64::MIN_POSITIVE);
     Some(out)
 }
 

@@ -238,7 +238,7 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
     };
     let (young, dt) = (edges(|r| r.young_pa), edges(|r| r.dt_ms));
     let cell = |r: &Row| {
-        let ([a, b], [c, d]) = (around(&young, r.young_pa), around(&dt, r.dt_ms));
+        let ([a, b], [c, d]) = (cell_bounds(&young, r.young_pa), cell_bounds(&dt, r.dt_ms));
         [a, b, c, d]
     };
     let squares = |label: &str, colour, verdict| Layer {
@@ -256,14 +256,15 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
     ];
     let axis = |label, values: &[f64]| {
         let ends = |v: Option<&f64>| v.copied().unwrap_or(1.0);
-        let ([low, _], [_, high]) = (around(values, ends(values.first())), around(values, ends(values.last())));
+        let ([low, _], [_, high]) =
+            (cell_bounds(values, ends(values.first())), cell_bounds(values, ends(values.last())));
         Axis::log(label, low, high)
     };
     Panel { title: integrator.to_owned(), x: axis("Young's modulus, Pa", &young), y: axis("dt, ms", &dt), layers }
 }
 
 /// The range of a value's square: half way to its neighbours, in ratios.
-fn around(values: &[f64], value: f64) -> [f64; 2] {
+fn cell_bounds(values: &[f64], value: f64) -> [f64; 2] {
     let k = values.iter().position(|v| *v == value).unwrap_or(0);
     let up = values.get(k + 1).map(|next| (next / value).sqrt());
     let down = k.checked_sub(1).and_then(|k| values.get(k)).map(|last| (value / last).sqrt());

@@ -7,7 +7,7 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use super::super::machine::Noise;
+use super::super::machine::RandomSource;
 use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
 use metachron_lod::control::Policy;
@@ -58,9 +58,11 @@ pub(in super::super::super) struct Row {
 
 impl Row {
     fn of(case: &Case, adapter: String, pictures: &[Predicted]) -> Self {
-        let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.told_ms, *p.took_ms.first()?))).collect();
-        let factor = quantile(pairs.iter().map(|(told, took)| took / told).collect(), 0.5);
-        let errors = |by: f64| pairs.iter().map(|(told, took)| (by * told / took - 1.0).abs()).collect::<Vec<_>>();
+        let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.predicted_ms, *p.measured_ms.first()?))).collect();
+        let factor = quantile(pairs.iter().map(|(predicted, measured)| measured / predicted).collect(), 0.5);
+        let errors = |by: f64| {
+            pairs.iter().map(|(predicted, measured)| (by * predicted / measured - 1.0).abs()).collect::<Vec<_>>()
+        };
         let plain = errors(1.0);
         Self {
             scene: case.scene.clone(),
@@ -72,7 +74,11 @@ impl Row {
             scaled_error95: quantile(errors(factor), 0.95),
             factor,
             scatter95: scatter95(pictures),
-            pairs: pairs.iter().map(|(told, took)| format!("{told:.3}:{took:.3}")).collect::<Vec<_>>().join(" "),
+            pairs: pairs
+                .iter()
+                .map(|(predicted, measured)| format!("{predicted:.3}:{measured:.3}"))
+                .collect::<Vec<_>>()
+                .join(" "),
         }
     }
 
@@ -85,8 +91,8 @@ impl Row {
 /// Deviation from their median that 19 of 20 times of the same picture keep.
 fn scatter95(pictures: &[Predicted]) -> f64 {
     let about = |picture: &Predicted| {
-        let middle = quantile(picture.took_ms.clone(), 0.5);
-        picture.took_ms.iter().map(|took| (took / middle - 1.0).abs()).collect::<Vec<_>>()
+        let middle = quantile(picture.measured_ms.clone(), 0.5);
+        picture.measured_ms.iter().map(|measured| (measured / middle - 1.0).abs()).collect::<Vec<_>>()
     };
     quantile(pictures.iter().flat_map(about).collect(), 0.95)
 }
@@ -113,14 +119,14 @@ impl Experiment for Prediction {
     }
 
     fn measure(case: &Case) -> Row {
-        let mut noise = Noise::new(SEED);
+        let mut noise = RandomSource::new(SEED);
         let (low, high) = TARGETS_S;
         let mut point = || PathPoint { part: noise.uniform(), target_s: low * libm::pow(high / low, noise.uniform()) };
         let asked: Vec<_> = (0..case.pictures).map(|_| point()).collect();
         let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
         let policy = PRICES.into_iter().find(|(name, _)| *name == case.prices).map(|(_, policy)| policy);
-        let told = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, &asked, TIMES).ok());
-        let (adapter, pictures) = told.unwrap_or_default();
+        let predicted = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, &asked, TIMES).ok());
+        let (adapter, pictures) = predicted.unwrap_or_default();
         Row::of(case, adapter, &pictures)
     }
 
@@ -130,7 +136,8 @@ impl Experiment for Prediction {
 
     fn figure(rows: &[Row]) -> Figure {
         let adapter = rows.first().map_or("", |row| &row.adapter);
-        let (low, high) = span(rows.iter().flat_map(Row::pairs).flat_map(|(told, took)| [told, took]), true);
+        let (low, high) =
+            span(rows.iter().flat_map(Row::pairs).flat_map(|(predicted, measured)| [predicted, measured]), true);
         let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
         let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
         let panel = |prices: &str| {
@@ -185,9 +192,11 @@ mod tests {
     #[test]
     fn a_machine_that_is_a_third_slower_than_its_prices_is_told_from_one_that_errs() {
         let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
-        let took = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
-        let picture =
-            |k: u32| Predicted { told_ms: f64::from(k), took_ms: vec![took(k), 0.98 * took(k), 1.01 * took(k)] };
+        let measured = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
+        let picture = |k: u32| Predicted {
+            predicted_ms: f64::from(k),
+            measured_ms: vec![measured(k), 0.98 * measured(k), 1.01 * measured(k)],
+        };
         let row = Row::of(&case, String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
         assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
         assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");

@@ -8,7 +8,7 @@ use super::super::super::experiment::{Experiment, Finding};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, headings};
 use super::super::super::table::Table;
 use super::super::played::walk;
-use super::super::played::walk::{Still, Stood};
+use super::super::played::walk::{Still, StillRequest};
 use metachron_render::{PictureFile, psnr_db, ssim};
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -91,8 +91,8 @@ fn drawn(case: &Case, target_s: f64) -> Option<Arc<Still>> {
         return Some(Arc::clone(still));
     }
     let view = VIEWS.iter().find(|view| view.name == case.view)?;
-    let stood = Stood { part: view.part, target_s, frames: case.frames };
-    let still = Arc::new(walk::still(view.paper, &case.policy, stood).ok()?);
+    let request = StillRequest { part: view.part, target_s, frames: case.frames };
+    let still = Arc::new(walk::still(view.paper, &case.policy, request).ok()?);
     known().push((case.clone(), Arc::clone(&still)));
     Some(still)
 }
