@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_known_is_not_drawn_again() {
+    fn known_measurements_are_not_drawn_again() {
         let areas = [1.0, 16.0, 256.0];
         let all = test_pictures(&areas);
         assert_eq!(all[..3], EMPTY.map(TestPicture::Empty));
@@ -223,14 +223,14 @@ mod tests {
     }
 
     #[test]
-    fn areas_are_gone_through_from_both_ends() {
+    fn areas_are_measured_from_both_ends() {
         assert_eq!(ends_first(&[1.0, 2.0, 3.0, 4.0, 5.0]).collect::<Vec<_>>(), [1.0, 5.0, 2.0, 4.0, 3.0]);
         assert_eq!(ends_first(&[1.0, 2.0]).collect::<Vec<_>>(), [1.0, 2.0]);
         assert_eq!(ends_first(&[]).count(), 0);
     }
 
     #[test]
-    fn every_area_is_drawn_with_balls_that_stand_beside_each_other() {
+    fn every_area_is_drawn_with_balls_that_do_not_overlap() {
         for area_px in [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0] {
             let all: Vec<_> = numbers(area_px).collect();
             assert!(!all.is_empty() && (all.len() == NUMBERS || area_px > 2000.0), "{area_px}: {all:?}");

@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn later_frames_use_the_storage_of_the_first_ones() {
+    fn composing_reuses_storage_after_the_first_frames() {
         let (mut scene_view, camera) = scene_view();
         let mut places = Vec::new();
         let levels = [Resolution { eps_m: 0.005, n: 4 }.into()];
@@ -372,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_triangles_is_left_out_of_the_picture() {
+    fn objects_without_triangles_are_left_out_of_the_picture() {
         let (mut scene_view, camera) = scene_view();
         scene_view.set_snapshot(AgentId(0), &tube_at(0), true);
         scene_view.pose(SimTime::ZERO, States::Latest);

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn finer_cuts_have_their_triangles_at_once_and_their_shape_after_the_way() {
+    fn a_finer_cut_has_its_triangles_at_once_and_its_shape_after_the_geomorph() {
         let progressive = progressive();
         let (coarse, fine) = (progressive.cut(200).triangles, progressive.cut(900).triangles);
         let mut geomorph = Geomorph::at(&progressive, 200);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_asked_for_on_the_way_no_more_is_drawn_than_asked_for_and_allowed() {
+    fn a_geomorph_never_draws_more_than_requested_plus_the_allowance() {
         let progressive = progressive();
         let mut geomorph = Geomorph::at(&progressive, 300);
         let mut state = 1_u64;

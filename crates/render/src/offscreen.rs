@@ -49,7 +49,7 @@ pub enum GpuError {
         detail: String,
     },
     /// An adapter was found but could not be opened.
-    #[error("the graphics adapter {adapter} would not open: {detail}")]
+    #[error("the graphics adapter {adapter} could not be opened: {detail}")]
     NoDevice {
         /// The adapter's name.
         adapter: String,
@@ -328,7 +328,7 @@ pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Resul
     let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
     let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
     let image = RgbaImage::from_raw(width, height, rows.copied().collect());
-    image.ok_or_else(|| GpuError::ReadBack { detail: "fewer bytes than pixels".into() })
+    image.ok_or_else(|| GpuError::ReadBack { detail: "the buffer is shorter than the picture".into() })
 }
 
 /// Writes a picture as PNG.

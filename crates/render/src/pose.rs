@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn linear_motion_is_extrapolated_exactly_and_not_for_ever() {
+    fn linear_motion_is_extrapolated_exactly_up_to_a_limit() {
         let newest = at(100, 10, moving(8, 0.1));
         let mut body = Body::Nothing;
         beyond(&newest, SimTime::from_nanos(150_000_000), &mut body);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_that_was_divided_anew_is_matched_by_its_matter() {
+    fn a_remeshed_curve_is_matched_by_material_points() {
         let (before, newest) = (at(0, 0, moving(5, 0.0)), at(40, 1, moving(12, 0.04)));
         let mut body = Body::Nothing;
         between(&before, &newest, SimTime::from_nanos(50_000_000), &mut body);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn an_agent_that_is_late_is_held_at_its_newest_state() {
+    fn a_late_agent_keeps_its_newest_state() {
         let (before, newest) = (at(0, 0, moving(4, 0.0)), at(10, 1, moving(4, 0.01)));
         let mut body = Body::Nothing;
         let shown = between(&before, &newest, SimTime::from_nanos(900_000_000), &mut body);

@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_goes_on_as_it_went_is_carried_on_to_where_it_will_be() {
+    fn a_camera_in_steady_motion_is_extrapolated_exactly() {
         // once around in 7 s while the distance shrinks and the target drifts
         let at = |s: f64| Camera {
             target_m: DVec3::new(0.1 * s, 0.0, 1.0),
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_framed_is_seen_and_what_lies_behind_is_not() {
+    fn a_framed_object_is_visible_and_one_behind_the_camera_is_not() {
         let mut camera = camera();
         camera.show(DVec3::ZERO, 0.5, SIZE);
         assert!(camera.frustum(SIZE).sees(DVec3::ZERO, 0.5));
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn no_drag_or_zoom_makes_a_camera_without_numbers() {
+    fn a_camera_stays_finite_under_any_drag_or_zoom() {
         let mut camera = camera();
         for pixels in [1e9, -1e9, 0.0] {
             camera.orbit(DVec2::splat(pixels), SIZE);

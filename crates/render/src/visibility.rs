@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rests_is_posed_and_looked_at_once_and_again_when_the_camera_moves_or_there_is_news() {
+    fn a_resting_actor_is_posed_once_and_updated_when_the_camera_or_its_state_changes() {
         let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
         let actor = |id| Actor { id: AgentId(id), form: form.clone(), appearance };
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_sight_covers_nothing() {
+    fn an_actor_out_of_view_covers_no_pixels() {
         let behind = ball_at(DVec3::new(9.0, 0.0, 0.0), DVec3::ZERO);
         assert!(!behind.visible && behind.pixels == 0.0);
     }

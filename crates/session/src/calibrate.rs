@@ -49,7 +49,7 @@ pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: 
     let gpu = &open().filter(|gpu| gpu.describe() == adapter)?;
     let mut pictures = folder.as_deref().map_or_else(Vec::new, |folder| read_partial(folder, adapter));
     let left_s = LONGEST_S * metachron_render::benchmark_left(&AREAS_PX, pictures.len());
-    report(&format!("measuring once what drawing costs here (about {:.0} s)", left_s.max(1.0)));
+    report(&format!("measuring the drawing costs of this adapter, once (about {:.0} s)", left_s.max(1.0)));
     let options = RendererOptions::for_adapter(&gpu.info);
     let drawn = metachron_render::benchmark(gpu, options, &AREAS_PX, pictures.len()).ok()?;
     pictures.extend(drawn.iter().map(measured));
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_too_little_for_prices_is_gone_on_with() {
+    fn a_partial_benchmark_is_continued() {
         let folder = tempfile::tempdir().unwrap();
         let at = |seconds| Measured {
             picture_px: 57_600.0,
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn prices_come_back_as_they_were_kept_and_nothing_else_does() {
+    fn cached_prices_are_read_back_and_invalid_files_are_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let mut prices = Prices::default();
         prices.shading[1].vertex = 1.25e-7;

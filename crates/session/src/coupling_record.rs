@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn accounts_of_the_same_reading_are_compared_and_others_are_on_their_way() {
+    fn ledgers_of_equal_revision_are_compared_and_others_count_as_in_flight() {
         let mut given = Ledger::new(AgentId(1));
         given.give(Site::Whole, SimTime::ZERO, 0.0, pushed(2.0));
         let early = given.clone();
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn the_two_sides_of_a_penalty_are_one_coupling_with_what_they_differ_by() {
+    fn the_two_sides_of_a_penalty_are_one_coupling_with_their_difference() {
         for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
             let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
             let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_contact_weighs_is_told_in_the_order_of_the_two_names() {
+    fn inverse_masses_are_in_the_order_of_the_two_agents() {
         let scene = two_balls();
         let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
         let still = DVec3::ZERO;
@@ -417,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn who_shares_a_world_without_having_touched_is_an_island_with_its_leader() {
+    fn an_island_member_without_contact_is_coupled_to_its_leader() {
         let mut couplings = Couplings::of(&two_balls());
         let states = [Arc::default(), Arc::default()];
         (0..2).for_each(|id| couplings.mark_changed(AgentId(id)));
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_has_news_of_stays_and_either_side_opens_it_anew() {
+    fn a_coupling_without_new_states_is_kept_and_either_agent_resets_it() {
         let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
         let state = |pairs: Vec<PairState>| Arc::new(Snapshot { pairs, ..Snapshot::default() });
         let mut couplings = Couplings::of(&two_balls());

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_comparison_that_is_cut_short_is_of_what_both_runs_have_played() {
+    fn an_interrupted_comparison_covers_the_time_that_both_runs_played() {
         let scene = two_blows();
         let outcome = played(&scene, 60);
         let until = |share: f64| {

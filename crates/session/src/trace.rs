@@ -110,7 +110,7 @@ mod tests {
     use metachron_scene::{Source, load};
 
     #[test]
-    fn who_takes_another_time_for_its_own_is_traced_on_by_the_scenes() {
+    fn a_trace_follows_scene_time_when_an_agents_clock_jumps() {
         let text = "format = 1\nobject = [{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 }]\n";
         let scene = Source::memory("ball", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
         let at = |ms: u64| SimTime::ZERO + SimSpan::from_nanos(ms * 1_000_000);
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn the_flow_of_a_turning_line_is_its_middles() {
+    fn the_flow_of_a_turning_line_is_length_times_mean_velocity() {
         let arc_m = vec![0.0, 0.1, 0.3, 1.0];
         let velocities = arc_m.iter().map(|s| DVec3::Y * (2.0 * s)).collect();
         let flow = flow(&CurveState { arc_m, velocities, ..CurveState::default() });

@@ -109,7 +109,7 @@ impl Tuning {
     /// The share that is done, and a description.
     pub fn progress(&self) -> (f64, String) {
         match &self.stage {
-            Stage::Drawing(design) => (EXPERIMENT * design.done(), "drawing at many resolutions".to_owned()),
+            Stage::Drawing(design) => (EXPERIMENT * design.done(), "drawing frames at many resolutions".to_owned()),
             Stage::Searching(searching) => {
                 let progress = searching.shared.progress.lock().unwrap_or_else(PoisonError::into_inner);
                 (EXPERIMENT + (1.0 - EXPERIMENT) * progress.0, progress.1.clone())
@@ -124,11 +124,13 @@ impl Tuning {
 
     /// The result; waits for a search that has not ended.
     pub fn end(self) -> Tuned {
-        let Stage::Searching(searching) = self.stage else { return Tuned::Refused("it was not over".to_owned()) };
+        let Stage::Searching(searching) = self.stage else {
+            return Tuned::Refused("the search had not ended".to_owned());
+        };
         match searching.thread.join() {
             Ok(Ok(verdict)) => Tuned::Found(verdict),
             Ok(Err(why)) => Tuned::Refused(why),
-            Err(_) => Tuned::Refused("the search has failed, which is a bug".to_owned()),
+            Err(_) => Tuned::Refused("the search failed; please report this bug".to_owned()),
         }
     }
 }
@@ -154,7 +156,9 @@ fn find(observed: &[Observed], target_hz: f64, shared: &SearchState) -> Result<V
         !shared.stopped.load(Ordering::Relaxed)
     };
     let mut setting = Search { plant: &plant, target_hz, extent: EXTENT, go_on: &mut go_on };
-    search(&mut setting, Family::Corrected).map(|found| found.best).ok_or_else(|| "nothing could be judged".to_owned())
+    search(&mut setting, Family::Corrected)
+        .map(|found| found.best)
+        .ok_or_else(|| "no candidate could be evaluated".to_owned())
 }
 
 /// Gains and their performance, in one line.

@@ -192,7 +192,9 @@ impl<'a> WindowShow<'a> {
     fn reload(&mut self) {
         match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.show_message(Severity::Failure, format!("not reloaded: {}", first_problem(&error))),
+            Err(error) => {
+                self.show_message(Severity::Failure, format!("scene not reloaded: {}", first_problem(&error)))
+            }
         }
     }
 
@@ -200,7 +202,7 @@ impl<'a> WindowShow<'a> {
         self.plan.overrides.clear();
         match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.show_message(Severity::Failure, format!("not opened: {}", first_problem(&error))),
+            Err(error) => self.show_message(Severity::Failure, format!("scene not opened: {}", first_problem(&error))),
         }
     }
 

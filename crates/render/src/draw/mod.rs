@@ -100,7 +100,7 @@ pub enum DrawError {
         reason: String,
     },
     /// wgpu rejected a call: a bug of this crate, or a device out of memory. The picture is undefined.
-    #[error("the graphics device refused: {message}")]
+    #[error("the graphics device reported an error: {message}")]
     Refused {
         /// The message of wgpu.
         message: String,

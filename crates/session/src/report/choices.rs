@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn choices_are_counted_by_objects_in_view_and_errors_by_what_was_promised() {
+    fn level_changes_are_per_object_in_view_and_errors_relative_to_the_prediction() {
         let frame = |k: u32| FrameRecord {
             objects: 10,
             frame_ms: 10.0 + f64::from(k) * 0.01,

@@ -8,7 +8,9 @@ mod goal;
 mod summary;
 
 pub use choices::{ChoiceSummary, summarise_choices};
-pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
+pub use frames::{
+    BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Spread, summarise, summarise_undrawn,
+};
 pub use goal::{Goal, GoalError, Verdict};
 
 use metachron_world::{Moved, Overlap};
@@ -364,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_report_says_what_choices_came_to() {
+    fn the_report_includes_the_choice_summary() {
         let json = serde_json::to_value(Report::template()).unwrap();
         for path in [
             "/budget/value_over_bound",

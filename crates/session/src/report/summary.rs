@@ -35,7 +35,7 @@ impl Report {
 
 fn frame_line(out: &mut String, summary: &FrameSummary, target_ms: f64) {
     let (Some(work), Some(missed)) = (&summary.frame_ms, summary.missed_share) else {
-        let _ = writeln!(out, "frame  not measured: no frame was drawn, and none has a declared cost");
+        let _ = writeln!(out, "frame  not measured: nothing was drawn and no drawing cost is declared");
         return;
     };
     let Spread { mean, p99, max, .. } = work;
@@ -68,7 +68,7 @@ fn off_by(error: f64) -> String {
     if error < 1.0 {
         format!("off by less than {:.1} % (19 of 20 frames)", 100.0 * error)
     } else {
-        format!("useless: off by up to {error:.1} times what a frame took (19 of 20 frames)")
+        format!("unusable: off by up to {error:.1} times the frame's time (19 of 20 frames)")
     }
 }
 
@@ -99,7 +99,7 @@ fn out_of_reach(out: &mut String, agent: &AgentReport) {
     let eps = eps_m.map_or_else(String::new, |eps_m| format!(" and an ε of {:.2} mm", eps_m * 1e3));
     let _ = writeln!(
         out,
-        "note  `{name}` cannot hold {:.4} mm: at steps of {dt_ms:.2} ms{eps}, the finest of its ranges, it errs by {:.4} mm",
+        "note  `{name}` cannot meet its tolerance of {:.4} mm: at steps of {dt_ms:.2} ms{eps}, the finest of its ranges, its error is {:.4} mm",
         tolerance_m * 1e3,
         residual_m * 1e3
     );

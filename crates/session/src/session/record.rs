@@ -76,7 +76,7 @@ mod tests {
     use metachron_scene::Source;
 
     #[test]
-    fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {
+    fn time_before_the_first_step_counts_as_start_up() {
         let text = b"format = 1\nexecutor = \"threads\"\n[[object]]\nname = \"idle\"\nmodel = \"synthetic\"\nrate_hz = 10.0\ncost_us = 10.0\n";
         let scene = metachron_scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
         let opened = std::time::Instant::now();

@@ -20,8 +20,8 @@ const NARROW: f32 = 560.0;
 const SLIM: f32 = 360.0;
 
 /// Tooltip of the real-time factor.
-const REAL_TIME: &str = "Simulated time that was stepped for each second, by the agent that keeps up least: \
-                         what it cannot make up is dropped. The wanted speed is on the left";
+const REAL_TIME: &str = "Simulated seconds per second of the slowest agent; time that an agent cannot catch up is dropped. \
+                         The requested speed is on the left";
 
 /// Draws the bar.
 pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command> {
@@ -90,7 +90,7 @@ fn clock(ui: &mut Ui, status: &Status, wide: bool, palette: &Palette) {
 
 fn frame_rate(ui: &mut Ui, status: &Status, summary: &FrameSummary, palette: &Palette) {
     let (text, color) = rate_text(status, summary, palette);
-    ui.label(RichText::new(text).monospace().color(color)).on_hover_text("Frames per second, measured and wanted");
+    ui.label(RichText::new(text).monospace().color(color)).on_hover_text("Frames per second, measured and target");
     ui.add_space(5.0);
     let (rect, _) = ui.allocate_exact_size(egui::vec2(8.0, 8.0), egui::Sense::hover());
     ui.painter().circle_filled(rect.center(), 3.5, color);

@@ -121,7 +121,7 @@ pub const SHORTCUTS: [Shortcut; 23] = [
 
 /// Mouse actions over the picture, for the help.
 pub const MOUSE: [(&str, &str); 7] = [
-    ("Left drag on an object", "Pull it with a spring; the wheel moves the hand in depth"),
+    ("Left drag on an object", "Pull it with a spring; the wheel moves the spring's end in depth"),
     ("Left drag beside objects, or with Alt", "Orbit"),
     ("Right or middle drag", "Pan"),
     ("Wheel", "Zoom"),

@@ -9,10 +9,10 @@ use egui::{Grid, RichText, Ui};
 
 /// The columns and their tooltips.
 const COLUMNS: [(&str, &str); 4] = [
-    ("Pair", "Who owns the contact, and the other"),
-    ("Law", "How the two act on each other"),
-    ("Force", "With which they press, hold or pull now"),
-    ("Tank", "Energy that the coupling may still give before it fades"),
+    ("Pair", "Owner of the contact, and its peer"),
+    ("Law", "Contact law"),
+    ("Force", "Present contact, grasp or joint force"),
+    ("Tank", "Energy left before the coupling's push-out is turned off"),
 ];
 
 /// More rows than this are counted, not listed.
@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
 
 fn accessible_text(row: &CouplingRow) -> String {
     format!(
-        "{} contacts, {} deep; what the energy tank may still give before the coupling fades",
+        "{} contacts, {} deep; energy left in the tank before the push-out is turned off",
         row.contacts,
         text::metres(row.penetration_m)
     )
@@ -59,7 +59,7 @@ fn accessible_text(row: &CouplingRow) -> String {
 fn effective_mass_text(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
     let inverse_masses = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
     format!(
-        "The contact that bears most feels as heavy as {}: there {} gives way like {}, {} like {}",
+        "Effective mass at the contact with the largest force: {} ({} {}, {} {})",
         inverse_masses(a + b),
         row.a,
         inverse_masses(a),
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_contact_weighs_is_told_of_both_sides_and_of_both_together() {
+    fn the_tooltip_gives_the_effective_mass_of_both_agents_and_of_the_pair() {
         let row = CouplingRow {
             a: "hose".to_owned(),
             b: "floor".to_owned(),
@@ -109,9 +109,9 @@ mod tests {
         let tooltip = |pair| effective_mass_text(&row, pair);
         assert_eq!(
             tooltip([60.0, 20.0]),
-            "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
+            "Effective mass at the contact with the largest force: 12.5 g (hose 16.7 g, floor 50.0 g)"
         );
         // a driven body has no inverse mass: it does not give way at all
-        assert!(tooltip([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
+        assert!(tooltip([0.5, 0.0]).ends_with("(hose 2.00 kg, floor immovable)"));
     }
 }

@@ -49,10 +49,10 @@ pub enum WindowError {
     #[error("no graphics adapter can draw into a window: {0}; on Debian and Ubuntu install mesa-vulkan-drivers")]
     NoAdapter(String),
     /// The device was lost this many times in a row, each within a second of being made.
-    #[error("the graphics device was lost {0} times within a second of being made")]
+    #[error("the graphics device was lost {0} times, each within a second of its creation")]
     DeviceUnstable(u32),
     /// The window was open, and its display is gone.
-    #[error("the window is gone: {0}")]
+    #[error("the window was lost: {0}")]
     Gone(String),
     /// The window could not be made for another reason.
     #[error("the window could not be opened: {0}")]
@@ -100,7 +100,7 @@ pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<Window
             return Err(WindowError::DeviceUnstable(losses));
         }
         (options.lose_device_after, first) = (None, false);
-        let text = "The graphics device was lost and made anew.".to_owned();
+        let text = "The graphics device was lost and has been recreated.".to_owned();
         viewer.note(0.0, Message { severity: Severity::Warning, text });
     }
 }
@@ -195,19 +195,19 @@ fn named_error(error: eframe::Error, opened: bool) -> WindowError {
 fn no_answer(opened: bool) -> WindowError {
     let read = |key: &str| std::env::var(key).ok();
     if opened {
-        return WindowError::Gone(unanswered(read, "no longer answers"));
+        return WindowError::Gone(unanswered(read, "no longer responds"));
     }
-    let why = unanswered(read, "does not answer");
-    WindowError::NoDisplay(format!("{why}; name one that does, or run with --headless"))
+    let why = unanswered(read, "does not respond");
+    WindowError::NoDisplay(format!("{why}; set it to a working display, or run with --headless"))
 }
 
 /// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
 fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
     let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
     let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
-        return "the system gives no window".to_owned();
+        return "the system cannot open a window".to_owned();
     };
-    format!("`{value}`, which {key} names, {fails}")
+    format!("the display `{value}` ({key}) {fails}")
 }
 
 fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
@@ -431,13 +431,13 @@ mod tests {
 
     #[test]
     fn a_display_that_does_not_answer_is_named() {
-        let shell_state = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
-        assert_eq!(shell_state, "`:77`, which DISPLAY names, does not answer");
-        assert_eq!(unanswered(|_| None, "does not answer"), "the system gives no window");
+        let message = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not respond");
+        assert_eq!(message, "the display `:77` (DISPLAY) does not respond");
+        assert_eq!(unanswered(|_| None, "does not respond"), "the system cannot open a window");
     }
 
     #[test]
-    fn a_size_that_is_given_wins_over_the_one_that_is_restored() {
+    fn a_given_size_overrides_the_restored_one() {
         let restored = || egui::ViewportBuilder::default().with_inner_size([1000.0, 700.0]).with_maximized(true);
         let built = native_options("tube", Some([800.0, 600.0])).window_builder.unwrap()(restored());
         assert_eq!((built.inner_size, built.maximized), (Some([800.0, 600.0].into()), Some(false)));
@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_keep_their_beat_and_a_stall_starts_a_new_one() {
+    fn pictures_keep_their_schedule_and_a_stall_restarts_it() {
         let begin = Instant::now();
         let period = Duration::from_millis(20);
         let mut pace = Pace { due: begin, started: None, pictures: 0 };

@@ -104,10 +104,10 @@ pub fn costs(ui: &mut Ui, status: &Status) {
             let on_time = if share >= 0.95 { palette.good } else { palette.warn };
             bar(ui, column(rect, 0.68, 0.99), share, on_time);
             words(ui, rect, row, &palette);
-            response.on_hover_text(format!("{} a step", text::seconds(row.step_s)));
+            response.on_hover_text(format!("{} per step", text::seconds(row.step_s)));
         }
     });
-    legend(ui, &[("share of a core", palette.accent), ("rate of the wanted", palette.good)]);
+    legend(ui, &[("share of a core", palette.accent), ("rate / requested rate", palette.good)]);
 }
 
 fn column(rect: Rect, from: f32, to: f32) -> Rect {

@@ -105,7 +105,7 @@ impl GpuScreen {
     /// # Errors
     /// A sentence for the user with the file and the cause.
     pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf, String> {
-        let Some(canvas) = &self.canvas else { return Err("There is no picture yet.".to_owned()) };
+        let Some(canvas) = &self.canvas else { return Err("No picture has been drawn yet.".to_owned()) };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let path = folder.join(format!("metachron-{}-{}.png", file_name(scene), now.as_millis()));
         let image = offscreen::read_back(&self.gpu, &canvas.texture, self.lost());

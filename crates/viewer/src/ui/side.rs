@@ -16,7 +16,7 @@ use std::ops::RangeInclusive;
 const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 
 /// Tooltip of the tuning button.
-const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
+const TUNE: &str = "Tune the gains: a few seconds of frames at many resolutions, then a search in the background; the best gains are applied";
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut DrawingOptions) -> Vec<Action> {
@@ -55,10 +55,10 @@ fn frame(ui: &mut Ui, status: &Status, history: &History, summary: &FrameSummary
             work,
             "mean work",
             &text::seconds(summary.mean_s),
-            "Mean work of a frame: states, levels, drawing, panels",
+            "Mean frame time: reading states, selecting levels, drawing, panels",
         );
-        tile(tail, "99 % below", &text::seconds(summary.p99_s), "The work that 99 of 100 frames stay below");
-        tile(lateness, "late frames", &late, "Share of recent frames that came more than a tenth of a period late");
+        tile(tail, "99 % below", &text::seconds(summary.p99_s), "99th percentile of the frame time");
+        tile(lateness, "late frames", &late, "Fraction of recent frames late by more than a tenth of a period");
     });
     let mut target = status.target_hz;
     slider(ui, "Target rate", &mut target, TARGET_HZ, |s| s.step_by(1.0).suffix(" fps"));
@@ -84,7 +84,7 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
         out.push(Action::Policy(policy));
     }
     let mut frozen = status.frozen;
-    if ui.checkbox(&mut frozen, "Freeze selection").on_hover_text("Every object keeps the level it has").changed() {
+    if ui.checkbox(&mut frozen, "Freeze selection").on_hover_text("All objects keep their present level").changed() {
         out.push(Action::Freeze(frozen));
     }
     if let Some(sliders) = status.sliders {
@@ -136,7 +136,7 @@ fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
 /// Progress of the search for gains, with a cancel button.
 fn progress(ui: &mut Ui, tuning: &Tuning, out: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay as they were").clicked() {
+        if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay unchanged").clicked() {
             out.push(Action::StopTuning);
         }
         let bar = ProgressBar::new(tuning.done as f32).desired_height(14.0).show_percentage();
@@ -226,17 +226,22 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         ui.label(RichText::new(format!("Parked: {reason}")).color(palette.bad));
     }
     value(ui, "Error estimate", &text::metres(row.residual_m), "The agent's own estimate");
-    value(ui, "Dropped time", &text::seconds(row.dropped_s), "Simulated time that could not be made up");
+    value(
+        ui,
+        "Dropped time",
+        &text::seconds(row.dropped_s),
+        "Simulated time dropped because the agent could not keep up",
+    );
     if let Some(simulation) = &row.simulation {
         value(ui, "Simulation ε", &text::metres(simulation.eps_m), "Spacing of samples along the shape");
     }
     if let Some(picture) = &row.picture {
         // a primitive is not divided along a shape: only its level is meaningful
         let eps = row.simulation.map_or_else(String::new, |_| format!("ε {}, ", text::metres(picture.eps_m)));
-        value(ui, "Picture", &format!("{eps}n {}", picture.n), "Interval of the skin, and the level of its patch");
+        value(ui, "Picture", &format!("{eps}n {}", picture.n), "Sample spacing of the skin, and level of its patches");
     }
     if let Some(force_n) = row.force_n {
-        value(ui, "Force", &format!("{} N", text::figures(force_n)), "What is held pulls back with this");
+        value(ui, "Force", &format!("{} N", text::figures(force_n)), "Reaction force of the grasped object");
     }
 }
 
@@ -284,7 +289,7 @@ mod tests {
     use egui_kittest::kittest::Queryable;
 
     #[test]
-    fn the_slider_of_hysteresis_is_there_only_where_it_is_heeded() {
+    fn the_hysteresis_slider_is_shown_only_where_it_is_used() {
         let sliders = Some(Sliders::default());
         for (damped, there) in [(true, 1), (false, 0)] {
             let status = Status { sliders, damped, ..Status::default() };

@@ -15,7 +15,7 @@ const WIDTH_MIN: f32 = 940.0;
 const COLUMNS: [(&str, f32, bool); 10] = [
     ("Agent", 1.5, false),
     ("Model", 0.9, false),
-    ("Rate / wanted", 1.3, true),
+    ("Rate / requested", 1.3, true),
     ("dt", 0.85, true),
     ("Simulation ε", 1.0, true),
     ("Picture ε, n", 1.2, true),
@@ -153,7 +153,7 @@ fn dash() -> String {
 
 fn state_text(row: &AgentRow) -> String {
     match &row.state {
-        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("led by {by}")),
+        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("island of {by}")),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
     }

@@ -55,7 +55,7 @@ fn time_begins_after_the_first_picture_and_passes_a_frame_a_picture() {
 }
 
 #[test]
-fn a_single_step_passes_one_frame_and_pictures_of_standing_time_count_for_nothing() {
+fn a_single_step_advances_one_frame_and_paused_pictures_are_not_counted() {
     with_show(|show| {
         (0..5).for_each(|_| frame(show, None));
         show.apply(Action::Pause);
@@ -105,7 +105,7 @@ fn a_scene_that_cannot_be_opened_is_a_message_and_the_run_goes_on() {
 }
 
 #[test]
-fn tuning_draws_its_experiment_searches_beside_the_show_and_takes_what_it_finds() {
+fn tuning_runs_its_experiment_then_searches_in_the_background_and_applies_the_result() {
     with_tube(|show| {
         let before = show.session.control().law();
         show.apply(Action::Tune);
@@ -145,7 +145,7 @@ fn tuning_that_is_cancelled_leaves_everything_as_it_was() {
 }
 
 #[test]
-fn a_scene_that_leaves_nothing_to_tune_says_why() {
+fn a_scene_that_cannot_be_tuned_gives_the_reason() {
     with_tube(|show| {
         show.apply(Action::TargetFps(1000.0));
         show.apply(Action::Tune);
@@ -175,7 +175,7 @@ fn a_run_without_an_end_forgets_its_oldest_frames() {
 }
 
 #[test]
-fn time_that_an_agent_drops_is_no_real_time() {
+fn dropped_time_lowers_the_real_time_factor() {
     with_show(|show| {
         (0..60).for_each(|_| frame(show, None));
         let on_time = show.status().real_time_factor;
