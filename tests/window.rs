@@ -152,7 +152,7 @@ fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     });
     let Err(WindowFailure::Gone(outcome, error)) = played else { panic!("the window is still there") };
     assert!(outcome.interrupted && outcome.finished > FRAMES && outcome.agents[0].stats.steps > 0);
-    assert!(error.to_string().contains("no longer answers"), "{error}");
+    assert!(error.to_string().contains("no longer responds"), "{error}");
 }
 
 /// What the process says whose display is to be taken away.

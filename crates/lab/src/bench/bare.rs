@@ -72,7 +72,7 @@ pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duratio
             let life = move || alone(&mut *agent, period(k, mean_hz), start, span);
             thread::Builder::new().name(format!("bare:{k}")).spawn_scoped(scope, life)
         });
-        let lives = lives.collect::<Result<Vec<_>, _>>().context("no thread to be had")?;
+        let lives = lives.collect::<Result<Vec<_>, _>>().context("no thread could be started")?;
         let ended = lives.into_iter().map(|life| life.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         ended.collect::<anyhow::Result<Vec<_>>>()
     })?;

@@ -2,6 +2,7 @@
 //!
 //! In: a model and a number. Out: agents that step and touch nothing. Never here: time passing.
 
+use super::super::chart::GRAVITY;
 use anyhow::Context;
 use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
@@ -83,7 +84,7 @@ pub(super) fn rod(place: DVec3, segments: usize, self_contact: bool) -> anyhow::
         damping_per_s: 6.0,
         clamp: [true, false],
         self_contact,
-        gravity: DVec3::NEG_Z * 9.81,
+        gravity: DVec3::NEG_Z * GRAVITY,
         ..free
     };
     Tube::new(spec).context("the rod")

@@ -121,7 +121,7 @@ impl Subject for Pile {
         let panel = Panel {
             title: String::new(),
             x: Axis::linear("", 0.0, rows.len().max(1) as f64),
-            y: Axis::linear("whole steps a second of CPU time", 0.0, 1.1 * most),
+            y: Axis::linear("whole steps per second of CPU time", 0.0, 1.1 * most),
             layers: rows.iter().enumerate().map(bar).collect(),
         };
         Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
@@ -203,7 +203,7 @@ fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> 
     }
     let mut boxes = 0;
     for member in &scene.agents {
-        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is no rigid body", member.name) };
+        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
         insert(&mut world, spec, settings)?;
         boxes += 1;
     }
@@ -241,7 +241,7 @@ fn shape(solid: &Solid) -> anyhow::Result<ColliderBuilder> {
     match solid {
         Solid::Box { half_extents_m: half } => Ok(ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)),
         Solid::Plane => Ok(ColliderBuilder::new(SharedShape::halfspace(Vec3::Z))),
-        _ => None.context("the plain world knows boxes and planes alone"),
+        _ => None.context("the single rapier3d world supports boxes and planes only"),
     }
 }
 
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn who_made_fewer_steps_is_held_against_as_many_first_ones() {
+    fn fewer_steps_are_compared_with_as_many_first_ones() {
         let spent = [1.0, 2.0, 4.0, 8.0];
         let shares = [0.0, 1.0, 2.2, 4.0, 9.0, f64::INFINITY].map(|steps| first_steps_per_s(&spent, steps));
         assert_eq!(shares, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);

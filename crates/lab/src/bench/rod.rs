@@ -75,15 +75,16 @@ impl Subject for Rod {
         };
         let (low, high) = span(rows.iter().map(|row| row.segments as f64), true);
         let (least, most) = span(rows.iter().map(|row| row.us_per_step), true);
-        let lines = [("without self-contact", false), ("with the search for it", true)].into_iter().zip(Colour::LINES);
+        let lines =
+            [("without self-contact", false), ("with self-contact search", true)].into_iter().zip(Colour::LINES);
         let layers = lines.map(|((label, contact), colour)| {
             let points = points(contact);
             let label = format!("{label}: segments^{:.2}", exponent(&points).unwrap_or(f64::NAN));
             Layer { label, colour, mark: Mark::Line(points) }
         });
-        let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU a step, µs", least, most));
+        let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU time per step, µs", least, most));
         let panel = Panel { title: String::new(), x, y, layers: layers.collect() };
-        Figure { title: "What a step of a tube costs".to_owned(), panels: vec![panel], columns: 1 }
+        Figure { title: "Cost of a tube's step".to_owned(), panels: vec![panel], columns: 1 }
     }
 }
 

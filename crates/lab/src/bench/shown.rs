@@ -29,8 +29,7 @@ impl Subject for Agents {
         let all = cases(args.quick).into_iter();
         let chosen: Vec<_> = all.filter(|case| wanted(args, case) && possible(case)).collect();
         if chosen.is_empty() {
-            let why =
-                "no case is of that executor, that model and so few agents: the least have 1 agent, with --quick 10";
+            let why = "no case has this executor, this model and so few agents: the smallest case has 1 agent, with --quick 10";
             return Err(BadInput(why.to_owned()).into());
         }
         let span = args.seconds.map_or(SPANS[usize::from(args.quick)], Duration::from_secs_f64);
@@ -45,7 +44,7 @@ impl Subject for Agents {
         if let Err(refused) = granted
             && !args.quiet
         {
-            message(&format!("note: {refused}; nothing was measured of it"));
+            message(&format!("note: {refused}; the case was skipped"));
         }
         Ok(rows)
     }
@@ -149,11 +148,11 @@ fn drawn(all: &[Row]) -> Figure {
         Panel { title: title.to_owned(), x: Axis::log("agents", low, high), y: Axis::log(label, least, most), layers }
     };
     let mut panels = vec![
-        panel("CPU a step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
-        panel("lateness, 99 in 100", "ms", |row| row.late_ms_p99.max(1e-3), None),
+        panel("CPU time per step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
+        panel("lateness, 99th percentile", "ms", |row| row.late_ms_p99.max(1e-3), None),
     ];
     panels.extend((free.len() > 1).then(|| growth(&free)));
-    Figure { title: "What being an agent costs".to_owned(), panels, columns: 2 }
+    Figure { title: "Overhead per agent".to_owned(), panels, columns: 2 }
 }
 
 /// CPU time of a round (one step of every agent), where agents step as fast as they can.
@@ -162,12 +161,12 @@ fn growth(rows: &[&Row]) -> Panel {
     let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));
     let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
     let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
-    let title = format!("as fast as they can: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
+    let title = format!("unpaced: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
     let layers = vec![
         Layer { label: "pool".to_owned(), colour: Colour::LINES[1], mark: Mark::Line(ours) },
         Layer { label: "bare loop".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(bare) },
     ];
-    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs a round", least, most), layers }
+    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs per round", least, most), layers }
 }
 
 #[cfg(test)]

@@ -19,6 +19,8 @@ mod sweep;
 pub(super) mod table;
 mod timing;
 
+pub(crate) use stability::common::GRAVITY;
+
 use super::args::{ChartArgs, Subject};
 use accuracy::diagram::Diagram;
 use anyhow::Context;
@@ -145,7 +147,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
         (Subject::Coupling, false) => ("coupling", COUPLING),
         (Subject::Policies, false) => ("policies", POLICIES),
         (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
-        _ => return Err(BadInput("--live is for policies: nothing else is drawn".to_owned()).into()),
+        _ => return Err(BadInput("--live applies to `chart policies` only".to_owned()).into()),
     };
     if args.live {
         // fails here rather than in the rows of the first experiment
@@ -173,7 +175,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
         data(&format!("{}\n", serde_json::to_string_pretty(&whole)?))?;
     }
     if interrupted {
-        message("interrupted: the finished rows are kept, and the same command takes them up");
+        message("interrupted: the finished rows are kept; run the same command again to continue");
     }
     Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
 }

@@ -57,7 +57,10 @@ pub(super) fn sweep<E: Experiment>(
         for number in 0..workers.min(open.len()) {
             let (out, work) = (out.clone(), &work);
             let name = format!("sweep-{number}");
-            thread::Builder::new().name(name).spawn_scoped(scope, move || work(out)).context("no thread to be had")?;
+            thread::Builder::new()
+                .name(name)
+                .spawn_scoped(scope, move || work(out))
+                .context("no thread could be started")?;
         }
         drop(out);
         for (k, row) in rows_in {

@@ -52,7 +52,7 @@ struct Fitted {
 /// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     if !(args.tolerance.is_finite() && args.tolerance > 0.0) {
-        let what = format!("the tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);
+        let what = format!("--tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);
         return Err(BadInput(what).into());
     }
     if args.write {
@@ -75,7 +75,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
             return Ok(Exit::Failed);
         }
         Outcome::Interrupted => {
-            message("interrupted before anything was found to hold: nothing was written");
+            message("interrupted before any settings within the tolerance were found: nothing was written");
             return Ok(Exit::Interrupted);
         }
     };
@@ -89,7 +89,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
         message(&format!("{}: {changes} keys were changed", args.scene));
     }
     if stopped.load(Ordering::Relaxed) {
-        message("interrupted: this is the best that was found so far");
+        message("interrupted: these are the best settings found so far");
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Ok)
@@ -101,7 +101,7 @@ fn refuse_built_in(name: &str) -> anyhow::Result<()> {
         return Ok(());
     }
     let what = format!(
-        "`{name}` comes with the program and is not overwritten: `--write` changes scene files; save it as one, such as {name}.toml, and fit that"
+        "`{name}` is a built-in scene and cannot be overwritten: `--write` changes scene files; save it to a file such as {name}.toml and fit that"
     );
     Err(BadInput(what).into())
 }
@@ -156,7 +156,8 @@ fn ended<'a>(task: &mut Task<'a>, explain: impl FnOnce(&mut Task<'a>) -> String)
 
 /// The outcome where the runs were used up before anything was found.
 fn too_few(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
-    let what = "runs are too few to find the converged answer and settings that hold: give more with --runs";
+    let what =
+        "runs are too few to find the converged answer and settings within the tolerance: allow more with --runs";
     ended(task, |_| format!("{} {what}", args.runs))
 }
 

@@ -21,9 +21,9 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
         table.rows.push(row(task, fitted, object, 1, ["", if needs == pays { "" } else { needs }, "needs"]));
     }
     let Fitted { now, need, known_m, .. } = fitted;
-    let held = if now.1.error_m + known_m <= args.tolerance { "holds" } else { "does not hold" };
+    let held = if now.1.error_m + known_m <= args.tolerance { "met" } else { "not met" };
     let mut out = format!(
-        "{}: {} points within {} over {} s, against an answer known to {}\n  as it is it {held} it: {} off, {:.3} ms a simulated second\n  needed are {:.3} ms: {} off ({} runs)\n\n{}",
+        "{}: {} points within {} over {} s, against a converged answer known to {}\n  present settings: tolerance {held}, error {}, {:.3} ms per simulated second\n  needed settings: {:.3} ms, error {} ({} runs)\n\n{}",
         args.scene,
         task.held,
         length(args.tolerance),
@@ -36,11 +36,11 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
         task.runs.get(),
         table.text()
     );
-    out.push_str("ms_per_s: by the declared machine, milliseconds of one core a simulated second; cpu_ms_per_s: as measured here\n");
-    out.push_str(&format!("a solve as measured here, beside one of implicit-euler: {}\n", prices(task)));
+    out.push_str("ms_per_s: milliseconds of one core per simulated second on the declared machine; cpu_ms_per_s: measured on this machine\n");
+    out.push_str(&format!("cost of a solve on this machine, relative to implicit-euler: {}\n", prices(task)));
     notes(fitted).for_each(|note| out.push_str(&format!("note  {note}\n")));
     if need.cut_short {
-        out.push_str("note  the search ended before its end: there may be something cheaper\n");
+        out.push_str("note  the search was cut short: cheaper settings may exist\n");
     }
     out
 }

@@ -59,8 +59,8 @@ fn paths(task: &Task<'_>, played: &Played, object: usize) -> Vec<Path> {
 fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
     let tolerance_m = task.member(object).tolerance_m?;
     let (name, held) = (&task.objects[object].name, length(tolerance_m));
-    let note = format!("`{name}` holds an error of {held} by itself: its steps and segments are not chosen here");
-    Some(Simpler { word: "its own choice", note })
+    let note = format!("`{name}` controls its own error to {held}: its steps and segments are not chosen by fit");
+    Some(Simpler { word: "own control", note })
 }
 
 /// The note on an object that does not move.
@@ -84,7 +84,7 @@ fn flying(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Optio
     let flies = paths(task, played, object).iter().all(|path| path.from_flight_m(spec.gravity) <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
     let note = format!(
-        "nothing touches `{name}` in {seconds} s: it needs no contact solver, and its flight is exact at any step"
+        "`{name}` touches nothing in {seconds} s: it needs no contact solver, and its free flight is exact at any step"
     );
     (!paired && !jointed && flies).then_some(Simpler { word: "flight: no solver", note })
 }
@@ -104,10 +104,10 @@ fn slack(task: &mut Task<'_>, object: usize, need: &mut Found, limits: &Limits<'
     let Setting { dt_s, pieces, .. } = rope.settings[object];
     let [as_rope_ms, as_tube_ms] = [&rope, &*need].map(|found| found.trial.costs_s[object] * 1e3);
     let note = format!(
-        "`{}` neither twists nor bends stiffly enough to matter: `model = \"rope\"` with {pieces} segments and {:.3} ms costs {as_rope_ms:.3} ms a second, the tube {as_tube_ms:.3} ms{}",
+        "torsion and bending of `{}` have no effect here: `model = \"rope\"` with {pieces} segments and {:.3} ms costs {as_rope_ms:.3} ms per second, the tube {as_tube_ms:.3} ms{}",
         task.objects[object].name,
         dt_s * 1e3,
-        if cheaper { "" } else { ", so it stays one" },
+        if cheaper { "" } else { ", so it stays a tube" },
     );
     if cheaper {
         *need = rope;

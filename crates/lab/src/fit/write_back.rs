@@ -24,7 +24,7 @@ pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Re
     let again = Source::open(&path.to_string_lossy()).and_then(|source| load(&source, &[]));
     if let Err(error) = again {
         std::fs::write(path, &before).with_context(|| format!("{shown} cannot be written"))?;
-        return Err(anyhow::Error::from(error).context(format!("{shown} was left as it was")));
+        return Err(anyhow::Error::from(error).context(format!("{shown} is unchanged")));
     }
     Ok(changes)
 }
@@ -42,7 +42,7 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
         let wanted = &task.objects[object];
         let member = &scene.agents[wanted.agents[0].0 as usize];
         let table = tables(&mut document).find(|table| name(table) == Some(&wanted.name));
-        let table = table.ok_or_else(|| format!("`{}` has no table `[[object]]` of its own", wanted.name))?;
+        let table = table.ok_or_else(|| format!("`{}` has no `[[object]]` table of its own", wanted.name))?;
         changes += put_dt(table, now, need);
         changes += if becomes_rope { to_rope::put(table, member) } else { put(table, member, now, need) };
     }

@@ -48,9 +48,9 @@ fn fit(plant: &Plant) -> Panel {
     let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
     let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
     Panel {
-        title: "the plant: measured, and the fitted line".to_owned(),
+        title: "plant: measured frames and fitted line".to_owned(),
         x: Axis::linear("polygons, thousands", x.0.max(0.0), x.1),
-        y: Axis::linear("time of a frame, ms", y.0.max(0.0), y.1),
+        y: Axis::linear("frame time, ms", y.0.max(0.0), y.1),
         layers: vec![
             layer("frames", Colour::Sky, Mark::Dots(points)),
             layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
@@ -84,9 +84,9 @@ fn responses(on: &Identified, tuned: &Tuned) -> Panel {
         }
     }
     Panel {
-        title: "from 0.4 and from 2.5 times the rate".to_owned(),
+        title: "step responses from 0.4 and from 2.5 times the rate".to_owned(),
         x: Axis::linear("time, s", 0.0, SHOWN_S),
-        y: Axis::log("time of a frame over the wanted one", 0.2, 4.0),
+        y: Axis::log("frame time / target", 0.2, 4.0),
         layers,
     }
 }
@@ -122,13 +122,13 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
     let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
     let [good, slow, swings] = [0, 1, 2].map(of);
     Panel {
-        title: "the printed law over its gains".to_owned(),
+        title: "stability map of the printed law".to_owned(),
         x: Axis::log("α", alphas.0, alphas.1),
         y: Axis::log("β", betas.0, betas.1),
         layers: vec![
             layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
-            layer("slower, or elsewhere", Colour::Sky, Mark::Cells(slow)),
-            layer("swings for ever", Colour::Red, Mark::Cells(swings)),
+            layer("settles later or elsewhere", Colour::Sky, Mark::Cells(slow)),
+            layer("limit cycle", Colour::Red, Mark::Cells(swings)),
             layer("chosen", Colour::Blue, Mark::Dots(found)),
         ],
     }
@@ -169,7 +169,7 @@ fn misses(on: &Identified, tuned: &Tuned) -> Panel {
     let layers: Vec<_> = lines.collect();
     let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);
     Panel {
-        title: "tuned at 1, run on a machine of another speed, load + 40 %".to_owned(),
+        title: "gains tuned at speed 1, on machines of other speeds, load + 40 %".to_owned(),
         x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
         y: Axis::linear("late frames, %", 0.0, 1.05 * high),
         layers,
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_found_stands_inside_the_map() {
+    fn the_found_gains_are_inside_the_map() {
         assert_eq!(widened(BETA, [1.0].into_iter()), BETA);
         let (low, high) = widened(BETA, [50.0, 0.01].into_iter());
         assert!(low < 0.004 && high > 150.0, "{low} {high}");

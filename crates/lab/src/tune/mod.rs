@@ -99,12 +99,12 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
     let bar = Bar::new("experiment", args.common.quiet || args.common.json);
     let done = experiment(session, plan, &mut |share| {
-        bar.tell(share, "drawing at many resolutions".to_owned());
+        bar.tell(share, "drawing frames at many resolutions".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
     drop(bar);
     if done.interrupted {
-        message("interrupted before the experiment was over: nothing is known yet, and nothing was written");
+        message("interrupted before the identification experiment ended: nothing was written");
         return Ok(None);
     }
     let plant = Plant::identify(&done.observed).map_err(|why| BadInput(format!("{}: {why}", scene.name)))?;
@@ -195,7 +195,7 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
             break;
         }
     }
-    let best = best_law(&found).context("not one candidate could be judged")?;
+    let best = best_law(&found).context("no candidate could be evaluated")?;
     let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
     let mut rows: Vec<_> =
         found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
@@ -219,7 +219,7 @@ fn rivals(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
     let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
     let margin = 1.0 - best.contender.set_share();
     let rivals = [
-        ("corrected, its own", Some(Law::CORRECTED)),
+        ("corrected, default gains", Some(Law::CORRECTED)),
         ("printed, α = 1e-4", Some(Law::PRINTED)),
         ("normalised, α = k/f₀", Some(normalised)),
         ("relay (Ziegler-Nichols)", relay_gains(&on.plant.on(best.at_speed), on.target_hz, margin)),

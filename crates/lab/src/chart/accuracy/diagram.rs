@@ -84,7 +84,8 @@ impl Goal {
         let asked = || rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
         asked().next()?;
         let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
-        let claim = format!("{case}{size}: CPU ms a simulated second by calibration for an error of at most {error:e}");
+        let claim =
+            format!("{case}{size}: CPU ms per simulated second by calibration for an error of at most {error:e}");
         let pace = pace_for_goals(rows.iter().map(|row| row.calibration_us));
         Some(Finding::at_most(claim, cheapest(asked(), error).map_or(f64::NAN, |ms| ms * pace), cpu_ms_per_s))
     }

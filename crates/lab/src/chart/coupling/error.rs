@@ -66,7 +66,8 @@ impl Experiment for CouplingError {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "error";
-    const TITLE: &'static str = "the same scene with clocks apart and under one tiny clock: the coupling error";
+    const TITLE: &'static str =
+        "coupling error: the same scene with separate clocks and under one very fine common clock";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
@@ -95,9 +96,9 @@ impl Experiment for CouplingError {
     fn figure(rows: &[Row]) -> Figure {
         let panels = vec![
             panel(rows, "position", "position, rms over the run, mm", |r| 1e3 * r.position_rms_m),
-            panel(rows, "impulse", "impulse, share of that under one clock", |r| r.impulse),
+            panel(rows, "impulse", "impulse error / impulse under the common clock", |r| r.impulse),
         ];
-        Figure { title: "What clocks apart change, against one clock of 4 kHz".to_owned(), panels, columns: 2 }
+        Figure { title: "Coupling error against one common clock of 4 kHz".to_owned(), panels, columns: 2 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -122,10 +123,14 @@ impl Experiment for CouplingError {
         let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
         let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.scene == scene).map(get));
         vec![
-            Finding::at_most("runs that did not come to their end", lost, 0.0),
-            Finding::at_most("two balls: impulse against that under one clock", of(SCENES[0], |r| r.impulse), BLOW_MAX),
-            Finding::at_most("two balls: momentum over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
-            Finding::at_most("ball on box: position, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
+            Finding::at_most("runs that stopped early", lost, 0.0),
+            Finding::at_most(
+                "two balls: impulse error over the impulse under the common clock",
+                of(SCENES[0], |r| r.impulse),
+                BLOW_MAX,
+            ),
+            Finding::at_most("two balls: momentum error over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
+            Finding::at_most("ball on box: position error, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
         ]
     }
 }
@@ -144,7 +149,7 @@ fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -
         }
     }
     let (low, high) = span(rows.iter().map(|r| least(get(r))), true);
-    let x = Axis::log("ratio of the clocks", 0.8, 125.0);
+    let x = Axis::log("ratio of step rates", 0.8, 125.0);
     Panel { title: title.to_owned(), x, y: Axis::log(label, low, 30.0 * high), layers }
 }
 

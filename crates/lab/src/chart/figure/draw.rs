@@ -69,7 +69,7 @@ pub fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<Rgb
     }
     root.present().map_err(undrawn)?;
     drop(root);
-    RgbImage::from_raw(all.0, all.1, pixels).context("there is nothing to name")
+    RgbImage::from_raw(all.0, all.1, pixels).context("there are no names to draw")
 }
 
 fn columns(figure: &Figure) -> usize {
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_are_drawn_with_the_font_that_the_program_brings() {
+    fn text_is_drawn_with_the_built_in_font() {
         assert_eq!(dark_pixels(""), 0);
         // Greek and signs that the charts' labels need: each draws a glyph of its own, not an empty one
         let counts = ["μ", "φ", "π", "²", "×", "≤", "Δ", "τ", "₁"].map(dark_pixels);
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_beyond_the_axes_is_marked_once_a_run_at_the_border() {
+    fn points_beyond_the_axes_are_marked_once_per_run_at_the_border() {
         let panel = |points: &[(f64, f64)]| {
             let layers = vec![Layer { label: String::new(), colour: Colour::Red, mark: Mark::Line(points.to_vec()) }];
             Panel { title: String::new(), x: Axis::linear("", 0.0, 1.0), y: Axis::log("", 0.1, 10.0), layers }
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_drawn_is_in_both_kinds_of_file() {
+    fn a_figure_is_written_as_svg_and_as_png() {
         let dots = Layer {
             label: "dots".to_owned(),
             colour: Colour::Blue,

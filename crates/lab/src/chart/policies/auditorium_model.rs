@@ -5,6 +5,7 @@
 
 use super::camera::{Path, key};
 use super::closed_loop::Show;
+use super::common::LEVEL_PARTS;
 use super::machine::Fault;
 use super::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
 use glam::DVec3;
@@ -17,8 +18,6 @@ const SEAT_POLYGONS: f64 = 186.0;
 /// The first piece has the polygons that are missing to 87,565.
 const PIECE_POLYGONS: [f64; 2] = [1021.0, 1008.0];
 const PIECES: usize = 16;
-/// Share of all polygons in each level.
-const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 /// A polygon takes 13.5 µs (FS93, view A: 0.98 s for 72,570); the cost of a pixel is such that a polygon takes 18.9 µs at 5300 of them.
 const STAGES: Stages = Stages { setup: 20.0, polygon: 12.0, vertex: 3.0, pixel: 0.012 };
 /// Frames of the path.
@@ -49,7 +48,14 @@ fn object(centre_m: DVec3, radius_m: f64, fill: f64, polygons: f64) -> SceneObje
         algorithm: 0,
         worth: BenefitModel::Shaded(Shading::Flat),
     };
-    SceneObject { centre_m, radius_m, fill, importance: 1.0, complexity: polygons, forms: PARTS.map(form).to_vec() }
+    SceneObject {
+        centre_m,
+        radius_m,
+        fill,
+        importance: 1.0,
+        complexity: polygons,
+        forms: LEVEL_PARTS.map(form).to_vec(),
+    }
 }
 
 fn path() -> Path {

@@ -78,7 +78,7 @@ impl Experiment for Domes {
     type Row = Row;
     const NAME: &'static str = "domes";
     const TITLE: &'static str =
-        "eight domes of 120 struts at half of the nominal cost, at it and at twice: groups or holes";
+        "eight domes of 120 struts at half, one and two times the nominal cost: groups or holes";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = if quick { QUICK_FRAMES } else { FRAMES };
@@ -126,7 +126,7 @@ impl Experiment for Domes {
             Panel { title: title.to_owned(), x, y: Axis::linear(label, 0.0, 1.0), layers }
         };
         let panels = vec![
-            panel("holes", "part of struts that are not drawn", |r| r.holes),
+            panel("holes", "fraction of struts not drawn", |r| r.holes),
             panel("image error", "wrong pixels / pixels of struts", |r| r.error),
         ];
         figure("Domes of struts (MB97, fig. 7)", panels, 2)

@@ -85,7 +85,7 @@ impl Experiment for Grove {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "grove";
-    const TITLE: &'static str = "600 trees and more, five targets, two paths, with levels and without";
+    const TITLE: &'static str = "600 to 2000 trees, five targets, two paths, with levels and without";
 
     fn cases(quick: bool) -> Vec<Case> {
         let asked = |s: &&Setting| !quick || QUICK.contains(&s.name);
@@ -120,7 +120,7 @@ impl Experiment for Grove {
             primitives(&levels.show(hood, frames), hood),
             primitives(&levels.show(ours, frames), ours),
         ];
-        figure("Walks through the grove (RH05, fig. 3, 6 and 7)", panels, 2)
+        figure("Fly-throughs of the grove (RH05, fig. 3, 6 and 7)", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -167,6 +167,6 @@ fn primitives(show: &Show, policy: Policy) -> Panel {
     let layers = named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) });
     let x = Axis::linear("frame", 0.0, show.frames as f64);
     let (title, y) =
-        (format!("primitives, {}", policy.name()), Axis::linear("primitives in a frame", low.max(0.0), high));
+        (format!("primitives, {}", policy.name()), Axis::linear("primitives per frame", low.max(0.0), high));
     Panel { title, x, y, layers: layers.collect() }
 }

@@ -73,7 +73,7 @@ impl Experiment for Levels {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "levels";
-    const TITLE: &'static str = "woods that may be drawn as one each: what levels of groups gain";
+    const TITLE: &'static str = "impostors for whole woods: benefit of levels of groups";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES[usize::from(quick)];
@@ -118,7 +118,7 @@ impl Experiment for Levels {
             [
                 Finding::at_most(claim("frames past 1.05 T"), of(3, over, |row| row.misses), 0.01),
                 Finding::at_most(claim("objects left out"), of(3, over, |row| row.holes), 0.0),
-                at_least(claim("SSIM less that of the better one level"), of(3, over, |row| row.ssim) - single, -0.01),
+                at_least(claim("SSIM minus the better single level's"), of(3, over, |row| row.ssim) - single, -0.01),
             ]
         });
         claims.collect()

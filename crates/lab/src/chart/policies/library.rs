@@ -80,8 +80,7 @@ impl Experiment for Library {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "library";
-    const TITLE: &'static str =
-        "a textured room of some 20,000 polygons: levels and the way of drawing are chosen together";
+    const TITLE: &'static str = "textured room of about 20,000 polygons: levels and shading chosen together";
 
     fn cases(_: bool) -> Vec<Case> {
         TARGETS.iter().flat_map(|t| POLICIES.map(|policy| Case::new(t.0, policy, 1, FRAMES))).collect()
@@ -99,7 +98,7 @@ impl Experiment for Library {
     fn figure(_: &[Row]) -> Figure {
         let mut panels: Vec<Panel> = TARGETS.iter().map(|t| shares(t.0, &show(t.1))).collect();
         panels.extend(TARGETS.iter().map(|t| curves(t.0, &show(t.1), &[Policy::Greedy, Policy::Adaptive], 1.5)));
-        figure("The library: what is drawn in which way (FS93, fig. 11)", panels, 2)
+        figure("The library: shading of the drawn objects (FS93, fig. 11)", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -152,7 +151,7 @@ fn shares(title: &str, show: &Show) -> Panel {
     let named = ["flat", "Gouraud", "textured"].into_iter().zip(Colour::LINES).zip(counts);
     let layers =
         named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) }).collect();
-    let (x, y) = (Axis::linear("frame", 0.0, FRAMES as f64), Axis::linear("things drawn so", 0.0, 170.0));
+    let (x, y) = (Axis::linear("frame", 0.0, FRAMES as f64), Axis::linear("objects drawn", 0.0, 170.0));
     Panel { title: format!("{title}, adaptive"), x, y, layers }
 }
 

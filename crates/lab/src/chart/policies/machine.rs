@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn table_errs_by_five_parts_in_a_hundred_that_stay_for_ten_frames() {
+    fn the_cost_table_errs_by_five_percent_correlated_over_ten_frames() {
         let mut machine = Machine::new(7, Fault::NONE);
         let errors: Vec<f64> = (0..20_000).map(|frame| machine.slower(frame) - 1.0).collect();
         let product =

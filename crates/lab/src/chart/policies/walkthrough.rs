@@ -72,7 +72,7 @@ impl Experiment for Walkthrough {
     type Row = Row;
     const NAME: &'static str = "walkthrough";
     const TITLE: &'static str =
-        "200 meshes of 1.5 million triangles and a sudden turn: predicted and measured, and the certificate";
+        "200 meshes of 1.5 million triangles and a sudden turn: prediction, measurement and certificate";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES / if quick { QUICK_PART } else { 1 };
@@ -93,7 +93,7 @@ impl Experiment for Walkthrough {
             curves("no choice", &show, &[Policy::Full], 15.0),
             curves("meshes of any resolution", &show, &[Policy::Convex, Policy::Adaptive], 1.5),
         ];
-        figure("A walk among 200 meshes", panels, 2)
+        figure("A walkthrough of 200 meshes", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {

@@ -190,7 +190,7 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
     let all = || rows.iter().flat_map(|row| [row.point(), row.floor()]).chain(peers.iter().map(|p| (p.1, p.2)));
     let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log(G::COST, low, high));
-    Panel { title: "all of them".to_owned(), x, y, layers }
+    Panel { title: "total".to_owned(), x, y, layers }
 }
 
 /// Cost of each item against count.
@@ -201,7 +201,7 @@ fn each<G: Growth>(rows: &[Row]) -> Panel {
     let ((left, right), (low, high)) =
         (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(Row::ns_each), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log("ns each", low, high));
-    Panel { title: "each of them".to_owned(), x, y, layers: layers.collect() }
+    Panel { title: "per item".to_owned(), x, y, layers: layers.collect() }
 }
 
 #[cfg(test)]

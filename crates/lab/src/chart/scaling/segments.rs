@@ -27,10 +27,10 @@ const DT: SimSpan = SimSpan::from_nanos(10_000_000);
 
 impl Growth for Segments {
     const NAME: &'static str = "segments";
-    const TITLE: &'static str = "What a step of a tube costs by its segments";
+    const TITLE: &'static str = "Cost of a tube's step, by number of segments";
     const COUNTED: &'static str = "segments";
-    const COST: &'static str = "CPU µs a step";
-    const FLOOR: &'static str = "the same memory once";
+    const COST: &'static str = "CPU µs per step";
+    const FLOOR: &'static str = "one pass over the same memory";
 
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick {
@@ -58,7 +58,7 @@ impl Growth for Segments {
         let slowest = pace(rows) * worst(rows.iter().filter(inside).map(Row::ns_each));
         let range = format!("{} … {} segments", CLAIMED.start(), CLAIMED.end());
         vec![
-            Finding::at_most(format!("ns a segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
+            Finding::at_most(format!("ns per segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
             Finding::at_most(format!("exponent, {range}, alone"), power(rows, ALONE, CLAIMED), CLAIMED_POWER),
         ]
     }

@@ -72,7 +72,7 @@ impl Experiment for Capstan {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "capstan";
-    const TITLE: &'static str = "a tube around a fixed cylinder: the ratio of tensions at which it slips";
+    const TITLE: &'static str = "capstan: tension ratio at which a tube around a fixed cylinder slips";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };
@@ -107,7 +107,7 @@ impl Experiment for Capstan {
         }
         let (x, y) = (Axis::linear("angle of wrap φ, rad", 0.0, 8.0), Axis::log("T₂/T₁ at which it slips", 1.0, top));
         let panel = Panel { title: String::new(), x, y, layers };
-        Figure { title: "A tube around a fixed cylinder slips".to_owned(), panels: vec![panel], columns: 1 }
+        Figure { title: "Capstan: slip of a tube around a fixed cylinder".to_owned(), panels: vec![panel], columns: 1 }
     }
 
     fn table(rows: &[Row]) -> Table {

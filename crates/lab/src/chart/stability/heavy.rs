@@ -101,7 +101,7 @@ impl Experiment for Heavy {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "heavy-on-light";
-    const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, beside other engines";
+    const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, compared with other engines";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (tests, ratios) = if quick { (&TESTS[..], &RATIOS[2..]) } else { (&TESTS[..], &RATIOS[..]) };
@@ -168,9 +168,9 @@ impl Experiment for Heavy {
                 rows.iter().filter(fails).count() as f64,
                 0.0,
             ),
-            Finding::at_most("cases that fail at all", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
+            Finding::at_most("cases that fail", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
             Finding::at_most(
-                "cases that sink or stretch by more than 0.001 and more than the best",
+                "cases that sink or stretch by more than 0.001 and more than the best engine",
                 rows.iter().filter(worse).count() as f64,
                 0.0,
             ),
@@ -304,7 +304,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_case_has_the_others_beside_it() {
+    fn every_case_has_values_of_other_engines() {
         for case in Heavy::cases(false) {
             let here = |p: &&Peer| p.test == case.test && p.ratio == case.ratio && p.inv_dt == case.rate_hz;
             assert!(peers().iter().filter(here).count() >= 2, "{case:?}");

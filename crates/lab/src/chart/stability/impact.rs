@@ -61,7 +61,7 @@ impl Experiment for Impact {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "impact";
-    const TITLE: &'static str = "two balls of different clocks meet: velocities after the blow against the closed form";
+    const TITLE: &'static str = "impact of two balls on different clocks: velocities against the closed form";
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &[1.0, 10.0, 1000.0][..] } else { &MASS_RATIOS[..] };
@@ -118,7 +118,7 @@ impl Experiment for Impact {
             let y = Axis::log("error of the velocity / closing speed", low, high);
             Panel { title: format!("e = {e}"), x, y, layers }
         });
-        Figure { title: "Two balls between two clocks".to_owned(), panels: panels.collect(), columns: 3 }
+        Figure { title: "Impact of two balls on two clocks".to_owned(), panels: panels.collect(), columns: 3 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -148,11 +148,11 @@ impl Experiment for Impact {
         let other = rows.iter().filter(|r| r.kind != PairKind::Ledger.name() || r.led).count();
         vec![
             Finding::at_most(
-                "velocities after the blow, error over the closing speed",
+                "velocities after the impact: error over the closing speed",
                 worst(rows.iter().map(|r| r.error)),
                 TOLERANCE,
             ),
-            Finding::at_most("pairs that met otherwise than by the ledger, or in one world", other as f64, 0.0),
+            Finding::at_most("pairs not coupled by the ledger, or stepped in one island", other as f64, 0.0),
         ]
     }
 }

@@ -108,7 +108,7 @@ impl Experiment for TubeMap {
 
     fn figure(rows: &[Row]) -> Figure {
         let panels = Integrator::ALL.into_iter().map(|integrator| panel(integrator.name(), rows)).collect();
-        Figure { title: "A clamped tube let go from the horizontal, 6 s".to_owned(), panels, columns: 3 }
+        Figure { title: "Clamped tube released from the horizontal, 6 s".to_owned(), panels, columns: 3 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -153,8 +153,12 @@ impl Experiment for TubeMap {
         let bad = rows.iter().filter(|r| implicit.contains(&r.integrator.as_str()) && r.verdict != Verdict::Stable);
         let unsaid = rows.iter().filter(|r| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp));
         vec![
-            Finding::at_most("implicit methods: squares of the map that are not stable", bad.count() as f64, 0.0),
-            Finding::at_most("all methods: squares that fail without a word beforehand", unsaid.count() as f64, 0.0),
+            Finding::at_most("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
+            Finding::at_most(
+                "all methods: cells that fail without being refused beforehand",
+                unsaid.count() as f64,
+                0.0,
+            ),
         ]
     }
 }

@@ -106,7 +106,7 @@ impl Experiment for Prediction {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "prediction";
-    const TITLE: &'static str = "what pictures were to take by the adapter's prices, and took";
+    const TITLE: &'static str = "predicted and measured drawing times, by the adapter's cost model";
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -141,8 +141,7 @@ impl Experiment for Prediction {
         let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
         let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
         let panel = |prices: &str| {
-            let mut layers =
-                vec![grey("as told, and ten per cent off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
+            let mut layers = vec![grey("exact, and 10 % off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
             let here = rows.iter().filter(|row| row.prices == prices);
             layers.extend(here.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
                 label: row.scene.clone(),
@@ -150,7 +149,7 @@ impl Experiment for Prediction {
                 mark: Mark::Dots(row.pairs()),
             }));
             let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
-            Panel { title: format!("prices by {prices}"), x, y, layers }
+            Panel { title: format!("cost model: {prices}"), x, y, layers }
         };
         let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
         Figure { title, panels: PRICES.map(|(prices, _)| panel(prices)).to_vec(), columns: 2 }
@@ -179,8 +178,8 @@ impl Experiment for Prediction {
         let all = |of: fn(&Row) -> f64| worst(by_areas().map(of));
         vec![
             Finding::at_most("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
-            Finding::at_most("the same with one factor a scene", all(|r| r.scaled_error95), WANTED),
-            Finding::at_most("19 of 20 times of one and the same picture: scatter", all(|r| r.scatter95), WANTED),
+            Finding::at_most("the same with one factor per scene", all(|r| r.scaled_error95), WANTED),
+            Finding::at_most("19 of 20 drawings of the same picture: scatter", all(|r| r.scatter95), WANTED),
         ]
     }
 }
@@ -190,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_machine_that_is_a_third_slower_than_its_prices_is_told_from_one_that_errs() {
+    fn a_uniformly_slower_machine_is_distinguished_from_prediction_errors() {
         let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
         let measured = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
         let picture = |k: u32| Predicted {

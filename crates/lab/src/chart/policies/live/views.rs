@@ -115,7 +115,7 @@ impl Experiment for Views {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "views";
-    const TITLE: &'static str = "what policies make of one view: triangles, likeness to full detail, pictures";
+    const TITLE: &'static str = "one view by every policy: triangles, similarity to full detail, pictures";
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -164,7 +164,7 @@ impl Experiment for Views {
             let y = Axis::linear("SSIM against full detail", (least - 0.02).max(0.0), 1.005);
             Panel { title: view.name.to_owned(), x, y, layers: dots.collect() }
         };
-        let title = "Triangles and likeness of one view (FS93, fig. 10 and 11)".to_owned();
+        let title = "Triangles and similarity of one view (FS93, fig. 10 and 11)".to_owned();
         Figure { title, panels: VIEWS.iter().map(panel).collect(), columns: VIEWS.len() }
     }
 
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quick_run_draws_less_of_the_same_and_no_run_takes_the_rows_of_the_other() {
+    fn quick_and_full_runs_do_not_share_rows() {
         let (long, quick) = (Views::cases(false), Views::cases(true));
         assert_eq!(long.len(), quick.len());
         assert!(long.iter().zip(&quick).all(|(long, quick)| quick.frames < long.frames && quick.view == long.view));
