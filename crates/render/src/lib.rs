@@ -3,7 +3,7 @@
 //! In: snapshots, looks, a camera, a level for every actor. Out: the actors in view and their sizes ([`Visibility`]), a [`Picture`] as numbers,
 //! and with the feature `gpu` its pixels. Never here: a window, a policy, the runtime.
 //!
-//! A frame: [`SceneView::see`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`]
+//! A frame: [`SceneView::set_snapshot`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`]
 //! finds which actors are visible and how large, [`SceneView::compose`] makes the [`Picture`] at the requested levels,
 //! `Renderer::render` draws it. [`SceneView`] needs no GPU; `Offscreen` needs no window.
 //!

@@ -235,7 +235,7 @@ pub fn law(target: &metachron_world::Target) -> Law {
 }
 
 /// Updates `views`, control's description of every object on the stage in the order of its actors, for the objects in `updated`.
-pub fn renew(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], scene: &Scene) {
+pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], scene: &Scene) {
     if views.len() != seen.len() {
         views.clear();
         views.extend((0..seen.len()).map(|at| view_at(at, &seen[at], scene)));

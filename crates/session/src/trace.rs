@@ -81,7 +81,7 @@ pub(super) fn points(body: &Body) -> impl Iterator<Item = (DVec3, DVec3)> {
 pub(super) fn momentum(spec: &Spec, body: &Body) -> DVec3 {
     match (spec, body) {
         (Spec::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
-        (Spec::Tube(spec), Body::Curve(curve)) => flow(curve) * spec.mass_per_length_kg_m,
+        (Spec::Tube(spec), Body::Curve(curve)) => velocity_integral(curve) * spec.mass_per_length_kg_m,
         _ => DVec3::ZERO,
     }
 }
@@ -98,7 +98,7 @@ pub(super) fn mass_kg(spec: &Spec, body: &Body) -> f64 {
 }
 
 /// Velocity summed along the rest length, m²/s: exact for a velocity that is linear between nodes.
-fn flow(curve: &CurveState) -> DVec3 {
+fn velocity_integral(curve: &CurveState) -> DVec3 {
     let pairs = curve.arc_m.windows(2).zip(curve.velocities.windows(2));
     pairs.map(|(arc, velocity)| 0.5 * (arc[1] - arc[0]) * (velocity[0] + velocity[1])).sum()
 }
@@ -133,7 +133,7 @@ mod tests {
     fn the_flow_of_a_turning_line_is_length_times_mean_velocity() {
         let arc_m = vec![0.0, 0.1, 0.3, 1.0];
         let velocities = arc_m.iter().map(|s| DVec3::Y * (2.0 * s)).collect();
-        let flow = flow(&CurveState { arc_m, velocities, ..CurveState::default() });
+        let flow = velocity_integral(&CurveState { arc_m, velocities, ..CurveState::default() });
         assert!((flow - DVec3::Y).length() < 1e-15, "{flow}"); // 1 m at a mean of 1 m/s
     }
 }

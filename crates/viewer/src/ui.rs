@@ -283,7 +283,7 @@ impl Viewer {
             Command::Frame => self.frame_object(show, status.selected),
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
             Command::SceneCamera => self.hand.follow_scene(),
-            Command::Free => self.leave(show, actions),
+            Command::Free => self.close_or_deselect(show, actions),
             Command::Colours => {
                 *looks = DrawingOptions { colours: !looks.colours, ages: false, details: false, ..*looks }
             }
@@ -301,7 +301,7 @@ impl Viewer {
         }
     }
 
-    fn leave(&mut self, show: &dyn Show, actions: &mut Vec<Action>) {
+    fn close_or_deselect(&mut self, show: &dyn Show, actions: &mut Vec<Action>) {
         if self.help || self.finder.is_some() {
             (self.help, self.finder) = (false, None);
         } else {

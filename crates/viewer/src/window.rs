@@ -109,14 +109,14 @@ const HAND_DAMPING: f64 = 0.7;
 
 impl<'a> WindowShow<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
-        session.keep_frames(kept(&plan));
+        session.keep_frames(frames_kept(&plan));
         // time is paused until the window shows the scene
         session.drive(Drive::Pause);
         let mut show = Self {
             go_on,
             adapter: None,
             stopped: false,
-            status: view_model::first(&session),
+            status: view_model::initial_status(&session),
             meter: Meter::new(&session),
             notices: Vec::new(),
             session,
@@ -145,7 +145,7 @@ impl<'a> WindowShow<'a> {
 
     fn replace(&mut self, mut session: Session) {
         self.stop_tuning();
-        session.keep_frames(kept(&self.plan));
+        session.keep_frames(frames_kept(&self.plan));
         session.drive(Drive::Speed(self.speed));
         if self.running {
             session.begin();
@@ -158,7 +158,7 @@ impl<'a> WindowShow<'a> {
         }
         let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
         drop(std::mem::replace(&mut self.session, session));
-        self.status = Status { selected, ..view_model::first(&self.session) };
+        self.status = Status { selected, ..view_model::initial_status(&self.session) };
         self.meter = Meter::new(&self.session);
         self.notices.clear();
         (self.hand, self.refreshed) = (None, None);
@@ -301,8 +301,8 @@ impl<'a> WindowShow<'a> {
         if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
             return;
         }
-        let news = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
-        news.into_iter().for_each(|text| self.show_message(Severity::Failure, text));
+        let messages = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
+        messages.into_iter().for_each(|text| self.show_message(Severity::Failure, text));
         self.refreshed = Some(now);
     }
 
@@ -327,7 +327,7 @@ fn first_problem(error: &SceneError) -> String {
 }
 
 /// Frames stored in a run of this plan: all if it ends by itself.
-const fn kept(plan: &WindowPlan) -> usize {
+const fn frames_kept(plan: &WindowPlan) -> usize {
     if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
 }
 

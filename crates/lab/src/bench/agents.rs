@@ -150,10 +150,10 @@ pub fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
         over_thread: thread_us_per_step.map(|floor| cpu_us_per_step / floor),
         steps_per_s: observed.steps / observed.wall.as_secs_f64(),
         wanted_steps_per_s: stats.iter().map(|s| s.wanted_hz).sum(),
-        age_ms_p50: 1e3 * among(&stats, 0.5, |s| s.age.p50_s),
-        age_ms_p99: 1e3 * among(&stats, 0.99, |s| s.age.p99_s),
-        late_ms_p50: 1e3 * among(&stats, 0.5, |s| s.late.p50_s),
-        late_ms_p99: 1e3 * among(&stats, 0.99, |s| s.late.p99_s),
+        age_ms_p50: 1e3 * quantile_over(&stats, 0.5, |s| s.age.p50_s),
+        age_ms_p99: 1e3 * quantile_over(&stats, 0.99, |s| s.age.p99_s),
+        late_ms_p50: 1e3 * quantile_over(&stats, 0.5, |s| s.late.p50_s),
+        late_ms_p99: 1e3 * quantile_over(&stats, 0.99, |s| s.late.p99_s),
         dropped_ms: 1e3 * stats.iter().map(|s| s.dropped.as_secs_f64()).sum::<f64>() / stats.len().max(1) as f64,
         bytes_per_agent: before.zip(after).map(|(from, to)| (to - from).max(0.0) / case.agents as f64),
         switches_per_step: observed.switches_per_step,
@@ -198,11 +198,18 @@ fn observe(run: &mut dyn Run, is_virtual: bool, span: Duration) -> ObservedRun {
     reader.finish(run.agents());
     let (wall, cpu, made) = (from.elapsed(), (cpu() - from_cpu).saturating_sub(reading), steps(run) - from_steps);
     let switched = (switches(), steps(run));
-    ObservedRun { wall, cpu, steps: made, switches_per_step: rise(from_switched, switched), late_s, read_s }
+    ObservedRun {
+        wall,
+        cpu,
+        steps: made,
+        switches_per_step: increase_per_step(from_switched, switched),
+        late_s,
+        read_s,
+    }
 }
 
 /// Rise of a count per step from one moment to another; each is a count and the number of steps made by then.
-fn rise(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
+fn increase_per_step(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
     let count = to.0.zip(from.0).map(|(to, from)| (to - from).max(0.0))?;
     let steps = to.1 - from.1;
     Some(if steps > 0.0 { count / steps } else { f64::NAN })
@@ -231,7 +238,7 @@ fn steps(run: &dyn Run) -> f64 {
 }
 
 /// The value that a share `part` of the agents does not exceed.
-fn among(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
+fn quantile_over(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
     share(stats.iter().map(of).collect(), part)
 }
 

@@ -27,7 +27,7 @@ impl Subject for Agents {
         let granted = Priority::Realtime.ask();
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
-        let chosen: Vec<_> = all.filter(|case| wanted(args, case) && possible(case)).collect();
+        let chosen: Vec<_> = all.filter(|case| is_selected(args, case) && possible(case)).collect();
         if chosen.is_empty() {
             let why = "no case has this executor, this model and so few agents: the smallest case has 1 agent, with --quick 10";
             return Err(BadInput(why.to_owned()).into());
@@ -54,11 +54,11 @@ impl Subject for Agents {
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        drawn(rows)
+        figure_of(rows)
     }
 }
 
-fn wanted(args: &BenchArgs, case: &Case) -> bool {
+fn is_selected(args: &BenchArgs, case: &Case) -> bool {
     let named = |names: &[String], name: &str| names.is_empty() || names.iter().any(|n| n == name);
     named(&args.executor, case.executor.name())
         && named(&args.model, case.model.name())
@@ -121,7 +121,7 @@ fn table(rows: &[Row]) -> Table {
 }
 
 /// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
-fn drawn(all: &[Row]) -> Figure {
+fn figure_of(all: &[Row]) -> Figure {
     let of_a_kind = |row: &&Row| row.model == Model::Synthetic && ![1000.0, TENTH_HZ].contains(&row.rate_hz);
     let (free, rows): (Vec<&Row>, Vec<&Row>) = all.iter().filter(of_a_kind).partition(|row| row.rate_hz == UNPACED_HZ);
     let of = |executor: Executor, y: fn(&Row) -> f64| -> Vec<(f64, f64)> {

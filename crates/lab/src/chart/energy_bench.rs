@@ -1,9 +1,9 @@
-//! A stage with energy sums: agents, their springs, and the sums over them.
+//! A step harness with energy sums: agents, their springs, and the sums over them.
 //!
 //! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent reports it at its
 //! own time, and energy and momentum at a common time. Never here: which bodies, which claims.
 
-use super::bench::{Faults, Stage};
+use super::bench::{Faults, StepHarness};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
 use metachron_contact::audit::{Audit, audit, on_their_way, settled};
@@ -19,7 +19,7 @@ use metachron_models::rod::TubeSpec;
 /// Agents, and the data for sums over them.
 pub(super) struct Play {
     /// The agents.
-    pub(super) stage: Stage,
+    pub(super) stage: StepHarness,
     solids: Vec<Solid>,
     links: Vec<(AgentId, Link)>,
 }
@@ -35,14 +35,14 @@ struct Solid {
 impl Play {
     /// An empty stage; all pairs touch by `law`.
     pub(super) fn new(law: Law, faults: Faults) -> Self {
-        Self { stage: Stage::new(law, faults), solids: Vec::new(), links: Vec::new() }
+        Self { stage: StepHarness::new(law, faults), solids: Vec::new(), links: Vec::new() }
     }
 
     /// Adds a rigid body that fixed springs pull; `None` where the body cannot be built.
     pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<AnchorSpring>) -> Option<AgentId> {
         let (mass_kg, gravity) = (spec.mass_kg, spec.gravity);
         let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz, [0.0; 2]);
-        self.stage.hold(id, springs.clone());
+        self.stage.attach_springs(id, springs.clone());
         self.solids.push(Solid { mass_kg, gravity, springs });
         Some(id)
     }

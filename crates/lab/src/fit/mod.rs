@@ -121,17 +121,17 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let found = converge(LEVELS_MAX, KNOWN * tolerance_m, &mut |level| task.reference(level));
     task.failure()?;
     let Some(answer) = found else {
-        return Ok(if task.left() <= 1 { too_few(task, args) } else { ended(task, |task| task.lost()) });
+        return Ok(if task.left() <= 1 { too_few_runs(task, args) } else { ended(task, |task| task.lost()) });
     };
     let room_m = tolerance_m - answer.error_m;
     let present = task.attempt(&now, &answer.paths);
     task.failure()?;
-    let Some(present) = present else { return Ok(too_few(task, args)) };
+    let Some(present) = present else { return Ok(too_few_runs(task, args)) };
     let mut best = f64::INFINITY;
     let start = start(task, &answer, room_m, &mut best);
     task.failure()?;
     if task.left() < AFTER_SEARCH {
-        return Ok(too_few(task, args));
+        return Ok(too_few_runs(task, args));
     }
     let Some((settings, trial)) = start else {
         return Ok(ended(task, |task| limits::explain(task, &answer, tolerance_m, best)));
@@ -155,7 +155,7 @@ fn ended<'a>(task: &mut Task<'a>, explain: impl FnOnce(&mut Task<'a>) -> String)
 }
 
 /// The outcome where the runs were used up before anything was found.
-fn too_few(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
+fn too_few_runs(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
     let what =
         "runs are too few to find the converged answer and settings within the tolerance: allow more with --runs";
     ended(task, |_| format!("{} {what}", args.runs))

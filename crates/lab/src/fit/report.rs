@@ -46,7 +46,7 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
 }
 
 fn row(task: &Task<'_>, fitted: &Fitted, object: usize, which: usize, head: [&str; 3]) -> Vec<Cell> {
-    let (setting, cost_s) = picked(fitted, object, which);
+    let (setting, cost_s) = setting_and_cost(fitted, object, which);
     let pieces: Cell = if setting.pieces > 0 { Cell::Number(f64::from(setting.pieces), 0) } else { "-".into() };
     let mut cells: Vec<Cell> = head.iter().map(|text| (*text).into()).collect();
     cells.extend([
@@ -80,7 +80,7 @@ fn prices(task: &Task<'_>) -> String {
 }
 
 /// An object's setting and cost: present or needed.
-fn picked(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
+fn setting_and_cost(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
     match which {
         0 => (fitted.now.0[object], fitted.now.1.costs_s[object]),
         _ => (fitted.need.settings[object], fitted.need.trial.costs_s[object]),
@@ -94,7 +94,7 @@ fn method(model: &str, setting: Setting) -> Option<&'static str> {
 /// The same as JSON.
 pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bool) -> anyhow::Result<String> {
     let side = |object: usize, which: usize| -> Value {
-        let (setting, cost_s) = picked(fitted, object, which);
+        let (setting, cost_s) = setting_and_cost(fitted, object, which);
         let cpu = fitted.cpu_s[which][object];
         let model = models(task, object)[which];
         json!({

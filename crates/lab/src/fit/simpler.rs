@@ -35,7 +35,7 @@ pub(super) struct Limits<'a> {
 pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -> Vec<Option<Simpler>> {
     let Some(played) = task.play(&need.settings) else { return Vec::new() };
     let plain = |object: usize| {
-        own(task, object)
+        own_control(task, object)
             .or_else(|| resting(task, &played, object, limits.room_m))
             .or_else(|| flying(task, &played, object, limits.room_m))
     };
@@ -56,7 +56,7 @@ fn paths(task: &Task<'_>, played: &Played, object: usize) -> Vec<Path> {
 }
 
 /// The note on an object whose settings may not be chosen.
-fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
+fn own_control(task: &Task<'_>, object: usize) -> Option<Simpler> {
     let tolerance_m = task.member(object).tolerance_m?;
     let (name, held) = (&task.objects[object].name, length(tolerance_m));
     let note = format!("`{name}` controls its own error to {held}: its steps and segments are not chosen by fit");

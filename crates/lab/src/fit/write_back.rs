@@ -53,7 +53,7 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
 fn put_dt(table: &mut Table, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.dt_s != now.dt_s {
-        let dt_ms = tidy(need.dt_s * 1e3);
+        let dt_ms = rounded(need.dt_s * 1e3);
         let has_rate = table.contains_key("rate_hz");
         if has_rate {
             changes += set(table, "rate_hz", (1e3 / dt_ms).into());
@@ -102,6 +102,6 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) -> usize {
 }
 
 /// Rounds to six digits after the point, so that 0.1 + 0.2 is 0.3.
-pub(super) fn tidy(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.6}").parse().unwrap_or(value)
 }

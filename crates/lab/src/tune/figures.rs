@@ -26,7 +26,7 @@ const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 
 /// Draws and writes the figure.
 pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuned) -> anyhow::Result<[PathBuf; 2]> {
-    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), misses(on, tuned)];
+    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), late_frames(on, tuned)];
     let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
     let figure = Figure { title, panels, columns: 2 };
     let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
@@ -58,7 +58,7 @@ fn fit(plant: &Plant) -> Panel {
     }
 }
 
-fn calm(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
+fn undisturbed_trial(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
     Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
 }
 
@@ -74,11 +74,11 @@ fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
 
 /// Step responses from 0.4 and from 2.5 times the target rate.
 fn responses(on: &Identified, tuned: &Tuned) -> Panel {
-    let plant = judged_on(on, tuned);
+    let plant = evaluated_plant(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
     for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
         for (k, rate) in STARTS.into_iter().enumerate() {
-            let beats = play(&plant, &calm(on, row.verdict.contender, rate, SHOWN_S));
+            let beats = play(&plant, &undisturbed_trial(on, row.verdict.contender, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
             layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
         }
@@ -92,13 +92,13 @@ fn responses(on: &Identified, tuned: &Tuned) -> Panel {
 }
 
 /// The plant on the machine on which the gains were judged.
-fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
+fn evaluated_plant(on: &Identified, tuned: &Tuned) -> Plant {
     on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
 }
 
 /// The printed law over (α, β): where it settles, is slow, or swings; the chosen gains as a dot.
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
-    let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
+    let ([columns, rows], plant) = (CELLS, evaluated_plant(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
     let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
         Candidate::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
@@ -115,7 +115,7 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
         .collect();
     let starts = cells.iter().flat_map(|[a, a_end, b, b_end]| {
         let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
-        STARTS.map(|rate| calm(on, law, rate, MAP_S))
+        STARTS.map(|rate| undisturbed_trial(on, law, rate, MAP_S))
     });
     let measured = measure(&plant, &starts.collect::<Vec<_>>(), None);
     let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
@@ -150,14 +150,14 @@ fn kind(measured: &[Measures]) -> usize {
 }
 
 /// Late frames over the speed of the machine, with 40 % more load for a third of the time.
-fn misses(on: &Identified, tuned: &Tuned) -> Panel {
+fn late_frames(on: &Identified, tuned: &Tuned) -> Panel {
     let trial = |contender: Candidate, speed: f64| Trial {
         speed,
         disturbance: Disturbance::Load(1.4),
         noise: on.plant.line.scatter,
         seed: 1,
         start: Start::Rate(speed),
-        ..calm(on, contender, 1.0, 4.0)
+        ..undisturbed_trial(on, contender, 1.0, 4.0)
     };
     let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.contender, speed)));
     let measured = measure(&on.plant, &trials.collect::<Vec<_>>(), None);

@@ -47,7 +47,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
     format!(
         "{}{}\n{}\nbest: {}\n{}files: {}\n",
         plant(on),
-        elsewhere(tuned),
+        speed_note(tuned),
         table.text(),
         gains::told(tuned.best.into()),
         checked.iter().map(Checked::text).collect::<String>(),
@@ -56,7 +56,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
 }
 
 /// A note where the gains were judged on another machine, because the view leaves nothing to control on this one.
-fn elsewhere(tuned: &Tuned) -> String {
+fn speed_note(tuned: &Tuned) -> String {
     let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
     if speed == 1.0 {
         return String::new();

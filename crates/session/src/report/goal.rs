@@ -150,7 +150,7 @@ fn find<'v>(root: &'v Value, path: &str, any: bool) -> Result<&'v Value, GoalErr
             }
             _ => None,
         };
-        here = next.ok_or_else(|| unknown(path, part, here))?;
+        here = next.ok_or_else(|| unknown_field(path, part, here))?;
     }
     Ok(here)
 }
@@ -159,7 +159,7 @@ fn is_named(entry: &Value, name: &str) -> bool {
     ["name", "object", "a"].iter().any(|key| entry.get(key).and_then(Value::as_str) == Some(name))
 }
 
-fn unknown(path: &str, part: &str, here: &Value) -> GoalError {
+fn unknown_field(path: &str, part: &str, here: &Value) -> GoalError {
     let known: Vec<&str> = match here {
         Value::Object(table) => table.keys().map(String::as_str).collect(),
         Value::Array(list) => {

@@ -55,7 +55,7 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
         let _ = write!(out, "; {:.2} % of levels change, {:.2} % back", 100.0 * change, 100.0 * back);
     }
     if let Some(error) = choices.model_error {
-        let _ = write!(out, "; predictions {}", off_by(error));
+        let _ = write!(out, "; predictions {}", error_text(error));
     }
     if let Some(gap) = choices.certificate {
         let _ = write!(out, "; within {:.2} % of the best", 100.0 * gap);
@@ -64,7 +64,7 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
 }
 
 /// The error of predictions in 19 of 20 frames, relative to the predicted time, as text.
-fn off_by(error: f64) -> String {
+fn error_text(error: f64) -> String {
     if error < 1.0 {
         format!("off by less than {:.1} % (19 of 20 frames)", 100.0 * error)
     } else {
@@ -130,7 +130,7 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
             c.penetration_m * 1e3
         );
     }
-    more(out, couplings.len());
+    omitted_rows(out, couplings.len());
 }
 
 fn reference_table(out: &mut String, oracle: &ReferenceReport) {
@@ -154,10 +154,10 @@ fn reference_table(out: &mut String, oracle: &ReferenceReport) {
             shown(c.impulse_oracle_n_s)
         );
     }
-    more(out, oracle.couplings.len());
+    omitted_rows(out, oracle.couplings.len());
 }
 
-fn more(out: &mut String, count: usize) {
+fn omitted_rows(out: &mut String, count: usize) {
     if count > COUPLINGS_SHOWN {
         let _ = writeln!(out, "and {} more in the report", count - COUPLINGS_SHOWN);
     }

@@ -45,7 +45,7 @@ impl Session {
     /// Finds the objects seen by `camera`.
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         self.scene_view.survey(camera, size);
-        assemble::renew(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), &self.scene);
+        assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), &self.scene);
     }
 
     /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.

@@ -154,7 +154,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     let flying = ctx.input(|input| input.pointer.secondary_down());
     let mut found = Vec::new();
     for shortcut in &SHORTCUTS {
-        for keys in shortcut.keys.iter().filter(|keys| listens(keys, typing, focused, flying)) {
+        for keys in shortcut.keys.iter().filter(|keys| is_active(keys, typing, focused, flying)) {
             if ctx.input_mut(|input| input.consume_shortcut(keys)) {
                 found.push(shortcut.command);
             }
@@ -163,7 +163,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     found
 }
 
-fn listens(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool) -> bool {
+fn is_active(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool) -> bool {
     if keys.modifiers.any() || is_function(keys.logical_key) || keys.logical_key == Key::Escape {
         return true;
     }

@@ -94,10 +94,10 @@ impl Hand {
 
     /// Frames all of `bounds` in a picture of this size.
     pub fn frame(&mut self, show: &dyn Show, bounds: &Bounds, size: Size) {
-        self.steer(show, |camera| camera.show(bounds.centre, FRAME_ROOM * bounds.radius_m, size));
+        self.change_camera(show, |camera| camera.show(bounds.centre, FRAME_ROOM * bounds.radius_m, size));
     }
 
-    fn steer(&mut self, show: &dyn Show, change: impl FnOnce(&mut Camera)) {
+    fn change_camera(&mut self, show: &dyn Show, change: impl FnOnce(&mut Camera)) {
         let mut camera = self.camera(show);
         change(&mut camera);
         self.own = Some(camera);
@@ -128,7 +128,7 @@ impl Hand {
         let selected = if self.track { show.status().selected } else { None };
         let centre = selected.and_then(|id| show.bounds(Some(id))).map(|ball| ball.centre);
         if let (Some(before), Some(now)) = (self.tracked, centre) {
-            self.steer(show, |camera| camera.target_m += now - before);
+            self.change_camera(show, |camera| camera.target_m += now - before);
         }
         self.tracked = centre;
     }
@@ -166,7 +166,10 @@ impl Hand {
         }
         let (pixels, size) = (turn.window.pixels(delta), turn.window.size());
         let turning = turn.response.dragged_by(PointerButton::Primary);
-        self.steer(turn.show, |camera| if turning { camera.orbit(pixels, size) } else { camera.pan(pixels, size) });
+        self.change_camera(
+            turn.show,
+            |camera| if turning { camera.orbit(pixels, size) } else { camera.pan(pixels, size) },
+        );
     }
 
     /// The wheel zooms, or moves the spring's free end in depth while an object is pulled.
@@ -183,7 +186,7 @@ impl Hand {
             turn.actions.push(Action::DragMove(target));
         } else if self.grip.is_none() && (scroll != 0.0 || pinch != 1.0) {
             let factor = (-scroll * ZOOM_PER_POINT).exp() / pinch;
-            self.steer(turn.show, |camera| camera.zoom(factor));
+            self.change_camera(turn.show, |camera| camera.zoom(factor));
         }
     }
 
@@ -195,7 +198,7 @@ impl Hand {
             (if input.pointer.secondary_down() { flight } else { DVec3::ZERO }, f64::from(input.stable_dt))
         });
         if flight != DVec3::ZERO && turn.response.is_pointer_button_down_on() {
-            self.steer(turn.show, |camera| camera.fly(flight * FLY_PER_S * dt * camera.distance_m));
+            self.change_camera(turn.show, |camera| camera.fly(flight * FLY_PER_S * dt * camera.distance_m));
         }
     }
 

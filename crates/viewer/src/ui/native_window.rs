@@ -154,7 +154,7 @@ fn open(
     // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
     // modified at that point
     match catch_winit_panic(|| panic::catch_unwind(AssertUnwindSafe(run))) {
-        (_, true) => return Err(no_answer(opened())),
+        (_, true) => return Err(display_error(opened())),
         (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
         (Err(_), _) if lost() => return Ok(WindowState::DeviceLost),
         (Err(bug), _) => panic::resume_unwind(bug),
@@ -185,24 +185,24 @@ const LAYOUT: &str = "metachron layout";
 
 fn named_error(error: eframe::Error, opened: bool) -> WindowError {
     match error {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => no_answer(opened),
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => display_error(opened),
         eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
         other => WindowError::Failed(other.to_string()),
     }
 }
 
 /// The error for a display that does not answer, or no longer answers if the window was already `opened`.
-fn no_answer(opened: bool) -> WindowError {
+fn display_error(opened: bool) -> WindowError {
     let read = |key: &str| std::env::var(key).ok();
     if opened {
-        return WindowError::Gone(unanswered(read, "no longer responds"));
+        return WindowError::Gone(display_message(read, "no longer responds"));
     }
-    let why = unanswered(read, "does not respond");
+    let why = display_message(read, "does not respond");
     WindowError::NoDisplay(format!("{why}; set it to a working display, or run with --headless"))
 }
 
 /// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
-fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
+fn display_message(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
     let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
     let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
         return "the system cannot open a window".to_owned();
@@ -431,9 +431,9 @@ mod tests {
 
     #[test]
     fn a_display_that_does_not_answer_is_named() {
-        let message = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not respond");
+        let message = display_message(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not respond");
         assert_eq!(message, "the display `:77` (DISPLAY) does not respond");
-        assert_eq!(unanswered(|_| None, "does not respond"), "the system cannot open a window");
+        assert_eq!(display_message(|_| None, "does not respond"), "the system cannot open a window");
     }
 
     #[test]

@@ -51,14 +51,14 @@ fn frame(ui: &mut Ui, status: &Status, history: &History, summary: &FrameSummary
     let late = format!("{:.1} %", 100.0 * summary.late_share);
     ui.add_space(2.0);
     ui.columns_const(|[work, tail, lateness]| {
-        tile(
+        number_tile(
             work,
             "mean work",
             &text::seconds(summary.mean_s),
             "Mean frame time: reading states, selecting levels, drawing, panels",
         );
-        tile(tail, "99 % below", &text::seconds(summary.p99_s), "99th percentile of the frame time");
-        tile(lateness, "late frames", &late, "Fraction of recent frames late by more than a tenth of a period");
+        number_tile(tail, "99 % below", &text::seconds(summary.p99_s), "99th percentile of the frame time");
+        number_tile(lateness, "late frames", &late, "Fraction of recent frames late by more than a tenth of a period");
     });
     let mut target = status.target_hz;
     slider(ui, "Target rate", &mut target, TARGET_HZ, |s| s.step_by(1.0).suffix(" fps"));
@@ -246,7 +246,7 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
 }
 
 /// A number over its name.
-fn tile(ui: &mut Ui, name: &str, value: &str, hover: &str) {
+fn number_tile(ui: &mut Ui, name: &str, value: &str, hover: &str) {
     ui.spacing_mut().item_spacing.y = 0.0;
     ui.label(RichText::new(value).monospace().size(13.5)).on_hover_text(hover);
     ui.label(RichText::new(name).small().color(palette(ui).weak));

@@ -200,7 +200,7 @@ fn draw_leaving<D: DrawingBackend>(
 ) -> anyhow::Result<()> {
     let (Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points)) = &layer.mark else { return Ok(()) };
     let (long, half) = (pen.at(9), pen.at(4));
-    let arrows = leaving(points, panel).into_iter().map(|(at, [right, up])| {
+    let arrows = border_crossings(points, panel).into_iter().map(|(at, [right, up])| {
         // on the screen y points down; the tip is at the border
         let corner = |along: i32, across: i32| (-right * along + up * across, up * along + right * across);
         EmptyElement::at(at)
@@ -211,7 +211,7 @@ fn draw_leaving<D: DrawingBackend>(
 }
 
 /// The points where a layer leaves the axes, once for each run beyond one border, and the direction: (right, up) of −1, 0, 1.
-fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
+fn border_crossings(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
     let mut before = [0, 0];
     let mut all = Vec::new();
     for (x, y) in finite(points) {
@@ -273,10 +273,10 @@ mod tests {
         };
         let points =
             [(0.0, 1.0), (0.1, 20.0), (0.2, 90.0), (0.3, 10.0), (0.4, 0.01), (0.5, 11.0), (1.5, 1.0), (0.6, f64::NAN)];
-        let marks = leaving(&points, &panel(&points));
+        let marks = border_crossings(&points, &panel(&points));
         let wanted = [((0.1, 10.0), [0, 1]), ((0.4, 0.1), [0, -1]), ((0.5, 10.0), [0, 1]), ((1.0, 1.0), [1, 0])];
         assert_eq!(marks, wanted);
-        assert_eq!(leaving(&[(0.0, 10.0 * (1.0 + 1e-12)), (1.0, 0.1)], &panel(&[])), [], "rounding");
+        assert_eq!(border_crossings(&[(0.0, 10.0 * (1.0 + 1e-12)), (1.0, 0.1)], &panel(&[])), [], "rounding");
         let polygons = |points: &[(f64, f64)]| {
             let figure = Figure { title: String::new(), panels: vec![panel(points)], columns: 1 };
             svg(&figure).unwrap().matches("<polygon").count()

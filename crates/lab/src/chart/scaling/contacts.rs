@@ -3,7 +3,7 @@
 use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace};
-use super::tubes::{folded, holding, step};
+use super::tubes::{folded, gripping_neighbours, step};
 use metachron_core::SimSpan;
 use std::time::Duration;
 
@@ -40,7 +40,7 @@ impl Growth for Contacts {
             step(&mut tube, DT, &[])?;
         }
         let held = case.case == HELD;
-        let (dt, neighbours) = if held { (DT_HELD, holding(&tube)?) } else { (DT, vec![]) };
+        let (dt, neighbours) = if held { (DT_HELD, gripping_neighbours(&tube)?) } else { (DT, vec![]) };
         for _ in 0..if held { HOLDS } else { 0 } {
             step(&mut tube, dt, &neighbours)?;
         }

@@ -4,7 +4,7 @@ use super::super::accuracy::peers;
 use super::super::experiment::{Finding, worst};
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
-use super::tubes::{holding, step, straight};
+use super::tubes::{gripping_neighbours, step, straight};
 use metachron_core::SimSpan;
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -44,7 +44,7 @@ impl Growth for Segments {
 
     fn measure(case: &Case) -> Option<Cost> {
         let mut tube = straight(case.size, case.case != ALONE)?;
-        let neighbours = if case.case == HELD { holding(&tube)? } else { vec![] };
+        let neighbours = if case.case == HELD { gripping_neighbours(&tube)? } else { vec![] };
         for _ in 0..WARM {
             step(&mut tube, DT, &neighbours)?;
         }

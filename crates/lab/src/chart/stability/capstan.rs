@@ -83,7 +83,7 @@ impl Experiment for Capstan {
 
     fn measure(case: &Case) -> Row {
         let Case { wrap_rad, friction } = *case;
-        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slips_at(case) }
+        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slip_ratio(case) }
     }
 
     fn case_of(row: &Row) -> Case {
@@ -172,7 +172,7 @@ fn tube(case: &Case) -> Option<Tube> {
 }
 
 /// Raises the load at the end until the start has moved; returns the ratio of the loads then.
-fn slips_at(case: &Case) -> Option<f64> {
+fn slip_ratio(case: &Case) -> Option<f64> {
     let mut tube = tube(case)?;
     let dt = SimSpan::from_secs_f64(DT_S)?;
     let theory = libm::exp(case.friction * case.wrap_rad);

@@ -306,7 +306,7 @@ fn play(case: &Case) -> Option<(Extremes, bool)> {
         let (now, at_s) = (play.common(first), first.as_secs_f64());
         let energy = [now.energy_j / start.energy_j, play.raw_j() / raw_start];
         let drift = [
-            (published_momentum(play) + on_its_way(play, ids) - published_start).length(),
+            (published_momentum(play) + momentum_in_flight(play, ids) - published_start).length(),
             (now.angular - start.angular).length() / ROOM_M,
         ];
         let published = [(published_momentum(play) - published_start).length(), now.in_flight_n_s];
@@ -325,7 +325,7 @@ fn momenta(play: &Play, ids: [AgentId; 5]) -> f64 {
 }
 
 /// The linear impulses that were given and not yet taken, kg·m/s.
-fn on_its_way(play: &Play, ids: [AgentId; 5]) -> DVec3 {
+fn momentum_in_flight(play: &Play, ids: [AgentId; 5]) -> DVec3 {
     ids.iter().map(|id| play.in_flight(*id)).sum()
 }
 

@@ -117,7 +117,7 @@ impl Experiment for Heavy {
 
     fn measure(case: &Case) -> Row {
         let Case { test, ratio, rate_hz } = case.clone();
-        let result = if test.starts_with("stack") { stacked(case) } else { hung(case) };
+        let result = if test.starts_with("stack") { cube_stack(case) } else { hanging_chain(case) };
         let MassRatioResult { value, aside_m, gain, led } =
             result.unwrap_or(MassRatioResult { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
         let holds = if test.starts_with("stack") {
@@ -194,7 +194,7 @@ fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
 }
 
 /// Stacks cubes a millimetre apart; the top one is heavier.
-fn stacked(case: &Case) -> Option<MassRatioResult> {
+fn cube_stack(case: &Case) -> Option<MassRatioResult> {
     let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
     let ground = Obstacle {
         name: "floor".to_owned(),
@@ -226,7 +226,7 @@ fn stacked(case: &Case) -> Option<MassRatioResult> {
 }
 
 /// Hangs a chain from the origin, straight down or horizontal; the last link is heavier.
-fn hung(case: &Case) -> Option<MassRatioResult> {
+fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
     let along = if case.test.ends_with("swing") { DVec3::X } else { DVec3::NEG_Z };
     let joint = |i: u32| Joint {
         anchor_a_m: DVec3::Z * HALF_LINK_M,

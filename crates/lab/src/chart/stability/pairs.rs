@@ -67,7 +67,7 @@ impl Experiment for Pairs {
     fn measure(case: &Case) -> Row {
         let Case { scene, ratio, first_is_fast } = case.clone();
         let slow_hz = FAST_HZ / ratio;
-        let [peak, depth_m, creep_m_s, contacts] = lie(case, slow_hz).unwrap_or([f64::NAN; 4]);
+        let [peak, depth_m, creep_m_s, contacts] = settle_pair(case, slow_hz).unwrap_or([f64::NAN; 4]);
         Row { scene, ratio, first_is_fast, slow_hz, peak, depth_m, creep_m_s, contacts: contacts as u32 }
     }
 
@@ -136,7 +136,7 @@ impl Experiment for Pairs {
 }
 
 /// Peak, depth, creep, contacts.
-fn lie(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
+fn settle_pair(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
     let rates_hz = if case.first_is_fast { [FAST_HZ, slow_hz] } else { [slow_hz, FAST_HZ] };
     let Scene { play, points, zero_j } = scene(&case.scene, rates_hz, Faults::default())?;
     let start_j = play.raw_j() - zero_j;

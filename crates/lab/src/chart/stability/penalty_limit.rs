@@ -69,7 +69,7 @@ impl Experiment for PenaltyLimit {
         let [mut low, mut high] = STIFFNESS_N_M.map(libm::log);
         for _ in 0..case.halvings {
             let middle = 0.5 * (low + high);
-            if dies_away(case, libm::exp(middle)) { low = middle } else { high = middle }
+            if decays(case, libm::exp(middle)) { low = middle } else { high = middle }
         }
         let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
         let tau_s = 0.5 / case.rate_hz;
@@ -121,7 +121,7 @@ impl Experiment for PenaltyLimit {
 }
 
 /// Whether the motion decays at this stiffness.
-fn dies_away(case: &Case, stiffness_n_m: f64) -> bool {
+fn decays(case: &Case, stiffness_n_m: f64) -> bool {
     let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
     let faults = Faults { seed: 1, due: true, ..Faults::default() };
     let set = pair("1d", law, case.rate_hz, faults, FALL_M);

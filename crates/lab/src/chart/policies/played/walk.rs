@@ -81,7 +81,7 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
         let own = if full_itself { Arc::clone(&full) } else { Arc::new(played(shown, case, target_s, times)?) };
         Ok((full, own, target_s))
     });
-    let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
+    let (full, own, target_s) = measured.unwrap_or_else(|_| (empty_path(), empty_path(), f64::NAN));
     let pairs = own.pictures.iter().zip(&full.pictures);
     let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
     let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
@@ -97,7 +97,7 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     played.row()
 }
 
-fn nothing() -> Arc<PlayedPath> {
+fn empty_path() -> Arc<PlayedPath> {
     Arc::new(PlayedPath { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
 }
 
