@@ -1,4 +1,4 @@
-//! Solids, tools, fixed props and scenery in the picture: one instance each, in runs of a kind.
+//! Solids, tools, static solids and scenery in the picture: one instance each, in runs of a kind.
 //!
 //! In: posed objects, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, the choice of levels.
 

@@ -85,7 +85,7 @@ pub struct Actor {
     pub appearance: Appearance,
 }
 
-/// A visible static solid. The first plane among the props is the floor.
+/// A visible static solid. The first plane among the static solids is the floor.
 #[derive(Debug, Clone)]
 pub struct StaticObject {
     /// Shape and pose.
@@ -186,7 +186,7 @@ impl Bounds {
 }
 
 impl SceneView {
-    /// A stage with these actors and props.
+    /// A view of these actors and static solids.
     #[must_use]
     pub fn new(actors: Vec<Actor>, statics: Vec<StaticObject>) -> Self {
         let (mut meshes, mut models) = (Vec::new(), Models::default());

@@ -1,6 +1,6 @@
 //! Converts a scene into agents for the runtime and into what the renderer draws.
 //!
-//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the renderer, views for control, the declared machine.
+//! In: a [`Scene`]. Out: spawns for the runtime, actors and static solids for the renderer, views for control, the declared machine.
 //! Never here: time passing.
 
 use super::cpu_budget::AgentBudget;
@@ -234,7 +234,7 @@ pub fn law(target: &metachron_world::Target) -> Law {
     }
 }
 
-/// Updates `views`, control's description of every object on the stage in the order of its actors, for the objects in `updated`.
+/// Updates `views`, control's description of every object of the scene view in the order of its actors, for the objects in `updated`.
 pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], scene: &Scene) {
     if views.len() != seen.len() {
         views.clear();

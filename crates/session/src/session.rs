@@ -1,4 +1,4 @@
-//! A running scene: the runtime, the controller and the stage of one run, connected.
+//! A running scene: the runtime, the controller and the scene view of one run, connected.
 //!
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by the caller, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.

@@ -8,7 +8,7 @@ use super::view_model;
 use super::view_model::Meter;
 use crate::ui;
 use crate::ui::{
-    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Show, Skip, Status, ViewRequest, WindowError,
+    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Simulation, Skip, Status, ViewRequest, WindowError,
     WindowOptions, run_window,
 };
 use glam::DVec3;
@@ -61,13 +61,13 @@ pub enum WindowFailure {
 /// [`WindowFailure::NoWindow`] returns the session with its time paused, [`WindowFailure::Gone`] the outcome.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
-    let mut show = WindowShow::new(session, plan, go_on);
-    match run_window(&mut show, &options) {
-        Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
+    let mut simulation = WindowSimulation::new(session, plan, go_on);
+    match run_window(&mut simulation, &options) {
+        Ok(_) => Ok(simulation.session.end(simulation.adapter, simulation.stopped)),
         Err(error @ WindowError::Gone(_)) => {
-            Err(WindowFailure::Gone(Box::new(show.session.end(show.adapter, true)), error))
+            Err(WindowFailure::Gone(Box::new(simulation.session.end(simulation.adapter, true)), error))
         }
-        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
+        Err(error) => Err(WindowFailure::NoWindow(Box::new(simulation.session), error)),
     }
 }
 
@@ -75,7 +75,7 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
 pub type GoOn<'a> = &'a mut dyn FnMut(&FrameRecord, Option<f64>) -> bool;
 
 /// A session as the viewer sees it.
-struct WindowShow<'a> {
+struct WindowSimulation<'a> {
     go_on: GoOn<'a>,
     adapter: Option<String>,
     stopped: bool,
@@ -107,12 +107,12 @@ const HAND_RAD_S: f64 = 25.0;
 /// Fraction of critical damping of the user spring.
 const HAND_DAMPING: f64 = 0.7;
 
-impl<'a> WindowShow<'a> {
+impl<'a> WindowSimulation<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(frames_kept(&plan));
         // time is paused until the window shows the scene
         session.drive(Drive::Pause);
-        let mut show = Self {
+        let mut simulation = Self {
             go_on,
             adapter: None,
             stopped: false,
@@ -131,8 +131,8 @@ impl<'a> WindowShow<'a> {
             speed: 1.0,
             running: true,
         };
-        show.refresh();
-        show
+        simulation.refresh();
+        simulation
     }
 
     /// Restarts with `scene`; speed and pause are kept.
@@ -331,7 +331,7 @@ const fn frames_kept(plan: &WindowPlan) -> usize {
     if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
 }
 
-impl Show for WindowShow<'_> {
+impl Simulation for WindowSimulation<'_> {
     fn apply(&mut self, action: Action) {
         if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
             self.stop_tuning();

@@ -1,4 +1,4 @@
-//! A window without a device: a show and a screen that write down what they are asked for.
+//! A window without a device: a simulation and a screen that write down what they are asked for.
 
 use egui::{Key, Pos2, Rect, Shape};
 use egui_kittest::Harness;
@@ -7,7 +7,7 @@ use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 use metachron_render::{Camera, Hit, Picture, Ray, Size};
 use metachron_viewer::ui::{
-    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Show, Status, Tuning, ViewRequest,
+    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Simulation, Status, Tuning, ViewRequest,
     Viewer, WindowRequests,
 };
 
@@ -48,7 +48,7 @@ impl Fake {
     }
 }
 
-impl Show for Fake {
+impl Simulation for Fake {
     fn apply(&mut self, action: Action) {
         match &action {
             Action::Pause => self.status.running = false,
@@ -105,8 +105,8 @@ pub struct Blank {
 }
 
 impl Screen for Blank {
-    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, _over: Rect) -> Option<Shape> {
-        show.compose(view);
+    fn draw(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest, _over: Rect) -> Option<Shape> {
+        simulation.compose(view);
         self.views.push(view.clone());
         None
     }
@@ -119,7 +119,7 @@ impl Screen for Blank {
 /// The interface, and what it is shown on.
 pub struct World {
     pub viewer: Viewer,
-    pub show: Fake,
+    pub simulation: Fake,
     pub screen: Blank,
     pub requests: WindowRequests,
     /// What the harness gives the interface to draw on: its window without a margin.
@@ -132,10 +132,10 @@ pub fn window() -> Harness<'static, World> {
 }
 
 /// The same before another show.
-pub fn window_of(show: Fake) -> Harness<'static, World> {
+pub fn window_of(simulation: Fake) -> Harness<'static, World> {
     let world = World {
         viewer: Viewer::default(),
-        show,
+        simulation,
         screen: Blank::default(),
         requests: WindowRequests::default(),
         inner: Size { width: 0, height: 0 },
@@ -143,7 +143,7 @@ pub fn window_of(show: Fake) -> Harness<'static, World> {
     let draw = |ui: &mut egui::Ui, world: &mut World| {
         let room = ui.max_rect().size();
         world.inner = Size { width: room.x.round() as u32, height: room.y.round() as u32 };
-        let (requests, _) = world.viewer.ui(ui, &mut world.show, &mut world.screen);
+        let (requests, _) = world.viewer.ui(ui, &mut world.simulation, &mut world.screen);
         world.requests.screenshot |= requests.screenshot;
         world.requests.quit |= requests.quit;
     };
@@ -159,7 +159,7 @@ pub fn window_of(show: Fake) -> Harness<'static, World> {
 /// What it asked for since it was asked last.
 pub fn asked(harness: &mut Harness<'static, World>) -> Vec<Action> {
     harness.run_steps(2);
-    std::mem::take(&mut harness.state_mut().show.asked)
+    std::mem::take(&mut harness.state_mut().simulation.asked)
 }
 
 /// What it asks for when this key is pressed.

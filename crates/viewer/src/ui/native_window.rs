@@ -1,11 +1,11 @@
 //! The window itself: eframe around the [`Viewer`], paced at the target rate, reopened when its device is lost.
 //!
-//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
+//! In: a [`Simulation`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
 //! eframe reconfigures an outdated surface and remakes a lost one, but does not notice a lost device; so [`run_window`] receives the loss
-//! from wgpu, closes the window and opens it again on a new device. The show keeps running.
+//! from wgpu, closes the window and opens it again on a new device. The simulation keeps running.
 
 use super::present_time::Presenting;
-use super::protocol::{FrameTimes, Message, Severity, Show, Skip};
+use super::protocol::{FrameTimes, Message, Severity, Simulation, Skip};
 use super::screen::GpuScreen;
 use super::{Layout, Screen, Viewer, WindowRequests};
 use eframe::{CreationContext, NativeOptions, egui_wgpu};
@@ -34,7 +34,7 @@ pub struct WindowOptions {
 pub enum WindowEnd {
     /// The user closed it.
     Closed,
-    /// The show requested it ([`Show::wants_close`]).
+    /// The simulation requested it ([`Simulation::wants_close`]).
     Finished,
 }
 
@@ -63,7 +63,7 @@ pub enum WindowError {
 const YOUNG: Duration = Duration::from_secs(1);
 /// Early losses in a row after which the window gives up.
 const LOSSES_MAX: u32 = 5;
-/// While the window is hidden, [`Show::wants_close`] is polled at this interval.
+/// While the window is hidden, [`Simulation::wants_close`] is polled at this interval.
 const HIDDEN_POLL: Duration = Duration::from_millis(200);
 /// Interval between pictures while the simulation is paused and there is no input.
 const STILL_PERIOD: Duration = Duration::from_millis(250);
@@ -76,21 +76,21 @@ const EARLY: Duration = Duration::from_micros(500);
 /// A picture later than this was delayed by the one before.
 const LATE: Duration = Duration::from_millis(1);
 
-/// Opens the window and shows `show` in it until the user or the show closes it.
+/// Opens the window and shows `simulation` in it until the user or the simulation closes it.
 ///
-/// To be called on the main thread. A lost device is replaced; the show is not notified and need not react.
+/// To be called on the main thread. A lost device is replaced; the simulation is not notified and need not react.
 ///
 /// # Errors
 /// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as its display is gone;
-/// the others where graphics fail. The show is left unchanged.
-pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
+/// the others where graphics fail. The simulation is left unchanged.
+pub fn run_window(simulation: &mut dyn Simulation, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
     find_display()?;
     let mut viewer = Viewer::default();
     let mut options = options.clone();
     let (mut losses, mut first) = (0, true);
     loop {
         let opened = Instant::now();
-        match open(show, &mut viewer, &options, first)? {
+        match open(simulation, &mut viewer, &options, first)? {
             WindowState::Open | WindowState::Closed => return Ok(WindowEnd::Closed),
             WindowState::Finished => return Ok(WindowEnd::Finished),
             WindowState::DeviceLost => {}
@@ -129,14 +129,14 @@ enum WindowState {
 
 /// One window on one device, until either ends.
 fn open(
-    show: &mut dyn Show,
+    simulation: &mut dyn Simulation,
     viewer: &mut Viewer,
     options: &WindowOptions,
     first: bool,
 ) -> Result<WindowState, WindowError> {
     let (window_state, device) = (Rc::new(Cell::new(WindowState::Open)), Rc::new(OnceCell::<DeviceLoss>::new()));
     let (shell_state, watched) = (Rc::clone(&window_state), Rc::clone(&device));
-    let native = native_options(&show.status().scene, options.size);
+    let native = native_options(&simulation.status().scene, options.size);
     let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
         Viewer::install(&cc.egui_ctx);
         if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
@@ -145,13 +145,13 @@ fn open(
         let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
-        show.drawn_by(screen.adapter(), screen.is_software());
-        Ok(Box::new(Shell::new(show, viewer, screen, shell_state, options.screenshots.clone())))
+        simulation.drawn_by(screen.adapter(), screen.is_software());
+        Ok(Box::new(Shell::new(simulation, viewer, screen, shell_state, options.screenshots.clone())))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
     let opened = || device.get().is_some();
-    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
+    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the simulation nor the viewer is being
     // modified at that point
     match catch_winit_panic(|| panic::catch_unwind(AssertUnwindSafe(run))) {
         (_, true) => return Err(display_error(opened())),
@@ -198,7 +198,9 @@ fn display_error(opened: bool) -> WindowError {
         return WindowError::Gone(display_message(read, "no longer responds"));
     }
     let why = display_message(read, "does not respond");
-    WindowError::NoDisplay(format!("{why}; set it to a working display, or run with --headless"))
+    WindowError::NoDisplay(format!(
+        "{why}; set DISPLAY or WAYLAND_DISPLAY to a working display, or run with --headless"
+    ))
 }
 
 /// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
@@ -239,7 +241,7 @@ fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
 
 /// The application inside eframe.
 struct Shell<'a> {
-    show: &'a mut dyn Show,
+    simulation: &'a mut dyn Simulation,
     viewer: &'a mut Viewer,
     screen: GpuScreen,
     window_state: Rc<Cell<WindowState>>,
@@ -283,7 +285,7 @@ impl Pace {
 
 impl<'a> Shell<'a> {
     fn new(
-        show: &'a mut dyn Show,
+        simulation: &'a mut dyn Simulation,
         viewer: &'a mut Viewer,
         screen: GpuScreen,
         window_state: Rc<Cell<WindowState>>,
@@ -291,7 +293,7 @@ impl<'a> Shell<'a> {
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
         Self {
-            show,
+            simulation,
             viewer,
             screen,
             window_state,
@@ -310,7 +312,7 @@ impl<'a> Shell<'a> {
             let held = input.pointer.any_down() || !input.keys_down.is_empty();
             (input.time, held || !input.raw.events.is_empty() || !input.raw.dropped_files.is_empty())
         });
-        if touched || self.show.status().running {
+        if touched || self.simulation.status().running {
             self.touched_s = now_s;
         }
         now_s - self.touched_s > CALM
@@ -321,7 +323,7 @@ impl<'a> Shell<'a> {
         ctx.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
-    /// Collects the times of the picture just drawn, and passes them to the show and the plots.
+    /// Collects the times of the picture just drawn, and passes them to the simulation and the plots.
     fn account(&mut self, interval: Duration, panels: Duration) {
         let Some(drawn) = self.screen.take_times() else { return };
         // a GPU presents on its own: waiting for it is not work
@@ -332,7 +334,7 @@ impl<'a> Shell<'a> {
             Some(Skip::Hidden)
         } else if drawn.resized {
             Some(Skip::Resized)
-        } else if !self.show.status().running {
+        } else if !self.simulation.status().running {
             Some(Skip::Still)
         } else {
             None
@@ -348,7 +350,7 @@ impl<'a> Shell<'a> {
             skip,
         };
         self.presenting.worked(drawn.compose + drawn.draw + panels, skip.is_none());
-        self.show.measured(&times);
+        self.simulation.measured(&times);
         self.viewer.measured(&times);
     }
 
@@ -357,7 +359,7 @@ impl<'a> Shell<'a> {
             self.close(ctx, WindowState::Closed);
         }
         if requests.screenshot {
-            let scene = self.show.status().scene.clone();
+            let scene = self.simulation.status().scene.clone();
             let message = match self.screen.save(&self.screenshots, &scene) {
                 Ok(path) => {
                     Message { severity: Severity::Note, text: format!("Picture written to {}", path.display()) }
@@ -376,7 +378,7 @@ impl eframe::App for Shell<'_> {
         }
         if self.screen.lost().reason().is_some() {
             self.close(ctx, WindowState::DeviceLost);
-        } else if self.show.wants_close() {
+        } else if self.simulation.wants_close() {
             self.close(ctx, WindowState::Finished);
         }
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
@@ -392,7 +394,7 @@ impl eframe::App for Shell<'_> {
         let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
         let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
         let panels = panels.saturating_sub(self.drawing);
-        let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
+        let period = Duration::from_secs_f64(1.0 / self.simulation.status().target_hz.clamp(0.1, 1000.0));
         let still = self.is_still(ui.ctx());
         let due = first_pass && self.pace.is_due(now, still);
         let late = now.saturating_duration_since(self.pace.next(still)) > LATE;
@@ -401,7 +403,7 @@ impl eframe::App for Shell<'_> {
             self.presenting.started(interval, late);
         }
         self.screen.set_due(due);
-        let (requests, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
+        let (requests, drawing) = self.viewer.ui(ui, self.simulation, &mut self.screen);
         self.drawing = if first_pass { drawing } else { self.drawing + drawing };
         self.account(interval, panels);
         if let Some(error) = self.screen.take_failure() {

@@ -93,7 +93,7 @@ fn info_rows(status: &Status, summary: &FrameSummary, adapter: &str) -> Vec<(&'s
         ("Simulated time", format!("{:.3} s", status.sim_time.as_secs_f64())),
         ("Speed", format!("{:.2}× of {}", status.real_time_factor, text::speed(status.speed))),
         ("Frames", format!("{:.1} of {:.0} per s", summary.rate_hz, status.target_hz)),
-        ("Work", format!("{}, 99 % below {}", text::seconds(summary.mean_s), text::seconds(summary.p99_s))),
+        ("Work", format!("{}, 99th percentile {}", text::seconds(summary.mean_s), text::seconds(summary.p99_s))),
         ("Triangles", text::count(status.triangles)),
         ("Agents", format!("{} on {}", status.agents.len(), status.executor)),
         ("Policy", status.policy.clone()),

@@ -1,6 +1,6 @@
 //! The interface between the window and the program: data shown, and actions requested.
 //!
-//! In: a [`Show`], implemented where the program's parts are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
+//! In: a [`Simulation`], implemented where the program's parts are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
 //! Never here: egui, a window, the runtime. The viewer knows the rest of metachron through these types only.
 
 use glam::DVec3;
@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Supplies the window with its content and applies the user's actions.
 ///
 /// No call may wait for an agent: the thread that makes these calls draws the window.
-pub trait Show {
+pub trait Simulation {
     /// Applies a user action.
     fn apply(&mut self, action: Action);
 

@@ -5,7 +5,7 @@
 
 use super::Screen;
 use super::blit::{Blit, BlitShape};
-use super::protocol::{Show, ViewRequest};
+use super::protocol::{Simulation, ViewRequest};
 use egui::{Rect, Shape};
 use egui_wgpu::{RenderState, wgpu};
 use metachron_render::Gpu;
@@ -113,16 +113,16 @@ impl GpuScreen {
         written.map(|()| path).map_err(|error| error.to_string())
     }
 
-    fn render(&mut self, show: &mut dyn Show, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {
+    fn render(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {
         let start = Instant::now();
-        let picture = show.compose(view);
+        let picture = simulation.compose(view);
         let composed = Instant::now();
         let max = self.gpu.device.limits().max_texture_dimension_2d;
         let size = Size { width: view.size.width.clamp(1, max), height: view.size.height.clamp(1, max) };
         let resized = self.resize(size);
         let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
         let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
-        show.while_drawn(view);
+        simulation.while_drawn(view);
         // a failure here means a lost device, which is noticed before the next frame
         let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
         let gpu = self.renderer.gpu_time().or(times.gpu);
@@ -170,12 +170,12 @@ fn file_name(scene: &str) -> String {
 }
 
 impl Screen for GpuScreen {
-    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<Shape> {
+    fn draw(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest, over: Rect) -> Option<Shape> {
         if self.lost().reason().is_some() {
             return None;
         }
         if self.due || self.canvas.is_none() {
-            match self.render(show, view) {
+            match self.render(simulation, view) {
                 Ok(times) => self.times = Some(times),
                 Err(error) => self.failure = Some(error),
             }

@@ -57,7 +57,7 @@ fn frame(ui: &mut Ui, status: &Status, history: &History, summary: &FrameSummary
             &text::seconds(summary.mean_s),
             "Mean frame time: reading states, selecting levels, drawing, panels",
         );
-        number_tile(tail, "99 % below", &text::seconds(summary.p99_s), "99th percentile of the frame time");
+        number_tile(tail, "99th percentile", &text::seconds(summary.p99_s), "99th percentile of the frame time");
         number_tile(lateness, "late frames", &late, "Fraction of recent frames late by more than a tenth of a period");
     });
     let mut target = status.target_hz;
