@@ -11,7 +11,8 @@ use metachron_runtime::AgentState;
 use metachron_scene::Source;
 use metachron_session::Session;
 use metachron_viewer::ui::{
-    Action, Bounds, FrameTimes, Show, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions, run_window,
+    Action, Bounds, FrameTimes, Simulation, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions,
+    run_window,
 };
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use std::io::{BufRead, BufReader, Write};
@@ -55,7 +56,7 @@ impl Empty {
     }
 }
 
-impl Show for Empty {
+impl Simulation for Empty {
     fn apply(&mut self, action: Action) {
         self.actions.push(action);
     }
@@ -94,21 +95,21 @@ fn options() -> WindowOptions {
 }
 
 fn a_lost_device_is_replaced_and_the_show_goes_on() {
-    let mut show = Empty::new();
-    let end = run_window(&mut show, &options());
+    let mut simulation = Empty::new();
+    let end = run_window(&mut simulation, &options());
     assert_eq!(end.unwrap(), WindowEnd::Finished);
-    assert_eq!(show.frames.len(), PICTURES, "the window was stuck");
-    let warm_up = show.frames.iter().filter(|frame| frame.skip == Some(Skip::WarmUp)).count();
+    assert_eq!(simulation.frames.len(), PICTURES, "the window was stuck");
+    let warm_up = simulation.frames.iter().filter(|frame| frame.skip == Some(Skip::WarmUp)).count();
     assert_eq!(warm_up, 6, "three pictures of each of two devices say nothing");
-    assert_eq!(show.actions, [], "the show must not notice");
-    assert!(show.frames.iter().all(|frame| frame.work >= frame.draw && frame.draw > Duration::ZERO));
+    assert_eq!(simulation.actions, [], "the show must not notice");
+    assert!(simulation.frames.iter().all(|frame| frame.work >= frame.draw && frame.draw > Duration::ZERO));
 }
 
 fn without_a_display_the_error_says_so() {
-    let mut show = Empty::new();
-    let error = run_window(&mut show, &options()).unwrap_err();
+    let mut simulation = Empty::new();
+    let error = run_window(&mut simulation, &options()).unwrap_err();
     assert!(matches!(error, WindowError::NoDisplay(_)), "{error}");
-    assert!(show.frames.is_empty());
+    assert!(simulation.frames.is_empty());
 }
 
 /// Frames of the run that ends by itself.
@@ -152,7 +153,7 @@ fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     });
     let Err(WindowFailure::Gone(outcome, error)) = played else { panic!("the window is still there") };
     assert!(outcome.interrupted && outcome.finished > FRAMES && outcome.agents[0].stats.steps > 0);
-    assert!(error.to_string().contains("no longer answers"), "{error}");
+    assert!(error.to_string().contains("no longer responds"), "{error}");
 }
 
 /// What the process says whose display is to be taken away.

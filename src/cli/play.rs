@@ -10,12 +10,12 @@ use metachron_render::Size;
 use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
 use metachron_runtime::{AgentState, Spread};
 use metachron_session::report::{
-    AgentReport, BudgetReport, CouplingError, CouplingReport, MovedReport, OracleReport, OverlapReport, ProbeReport,
-    Quantiles, Report, summarise, summarise_choices, summarise_undrawn,
+    AgentReport, BudgetReport, CouplingError, CouplingReport, MovedReport, OverlapReport, ProbeReport, Quantiles,
+    ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
 };
 use metachron_session::{
-    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Oracle, Outcome, PairError, ProbeOutcome, Session,
-    consult_oracle, play_headless,
+    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Outcome, PairError, ProbeOutcome, ReferenceComparison,
+    Session, compare_with_reference, play_headless,
 };
 #[cfg(feature = "viewer")]
 use metachron_viewer::ui::WindowError;
@@ -38,7 +38,7 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
     if !request.quiet {
-        session.tell_by(metachron_console::output::message);
+        session.report_start_up(metachron_console::output::message);
     }
     if request.oracle {
         session.keep_trace();
@@ -112,10 +112,11 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
         return Ok(played(&request.scene, outcome, picture));
     }
     let last = outcome.frames.last().copied().unwrap_or_default();
-    let oracle = consult_oracle(&request.scene, &outcome, &mut |done| go_on(step(&last, Some(half + half * done))))?;
+    let oracle =
+        compare_with_reference(&request.scene, &outcome, &mut |done| go_on(step(&last, Some(half + half * done))))?;
     let mut played = played(&request.scene, outcome, picture);
     played.interrupted = oracle.interrupted;
-    played.report.oracle = Some(oracle_report(&request.scene, &oracle));
+    played.report.oracle = Some(reference_report(&request.scene, &oracle));
     Ok(played)
 }
 
@@ -232,8 +233,8 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
         energy_j: stats.energy_j,
         residual_m: stats.residual_m,
         drift_m: stats.drift_m,
-        tolerance_m: agent.held.map(|held| held.tolerance_m),
-        rests: agent.held.and_then(|held| held.rests).map(|end| match end {
+        tolerance_m: agent.tolerance.map(|status| status.tolerance_m),
+        rests: agent.tolerance.and_then(|status| status.rests).map(|end| match end {
             Bound::Finest => "finest",
             Bound::Coarsest => "coarsest",
         }),
@@ -264,7 +265,7 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
     }
 }
 
-fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {
+fn reference_report(scene: &Scene, oracle: &ReferenceComparison) -> ReferenceReport {
     let name = |id: AgentId| scene.name_of(id).to_owned();
     let error = |pair: &PairError| CouplingError {
         a: name(pair.a),
@@ -276,7 +277,7 @@ fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {
         impulse_oracle_n_s: pair.impulse_oracle_n_s,
     };
     let couplings = oracle.pairs.iter().map(error).collect();
-    OracleReport { dt_ms: oracle.dt_s * 1e3, sim_s: oracle.sim_s, states: oracle.states, couplings }
+    ReferenceReport { dt_ms: oracle.dt_s * 1e3, sim_s: oracle.sim_s, states: oracle.states, couplings }
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {

@@ -134,7 +134,7 @@ fn the_quick_scaling_of_a_tube_stands_beside_a_floor() {
     }
     assert!(table.iter().all(|line| line["floor ns each"].as_f64().unwrap() > 0.0 && line["exponent"].is_number()));
     let svg = std::fs::read_to_string(out.path().join("scaling-segments.svg")).unwrap();
-    for word in ["held by a tool", "the same memory once", "mujoco 4.0.0", "ns each"] {
+    for word in ["held by a tool", "one pass over the same memory", "mujoco 4.0.0", "ns each"] {
         assert!(svg.contains(word), "{word} is not in the figure");
     }
 }
@@ -208,7 +208,7 @@ fn an_interrupted_sweep_keeps_its_rows_and_the_next_run_takes_them_up() {
     let out = folder();
     let (code, printed, words) = interrupted(out.path(), "tube-map", 0);
     assert_eq!(code, Some(130), "{words}");
-    assert!(words.contains("takes them up"), "{words}");
+    assert!(words.contains("same command again"), "{words}");
     assert!(printed.contains("holds so far"), "{printed}");
     let (path, mark) = (out.path().join("stability-tube-map.csv"), out.path().join("stability-tube-map.unfinished"));
     let kept = rows(&path);

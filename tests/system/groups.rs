@@ -4,7 +4,7 @@ use crate::adapter::gpu;
 use metachron_lod::control::{LevelDemand, Policy};
 use metachron_render::{Offscreen, PictureFile, RendererOptions, Size};
 use metachron_scene::Source;
-use metachron_session::{Drawing, Walk};
+use metachron_session::{Drawing, FlyThrough};
 
 const SIZE: Size = Size { width: 320, height: 240 };
 const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 512, shadow_taps: 1, lean: false };
@@ -52,10 +52,10 @@ fn drawn(levels: &[LevelDemand]) -> Vec<Wood> {
     balls.chunks(BALLS).zip(groups).map(wood).collect()
 }
 
-fn walk(drawing: Drawing) -> Walk {
+fn walk(drawing: Drawing) -> FlyThrough {
     let source = Source::memory("woods", woods().as_bytes()).expect("short and UTF-8");
     let scene = metachron_scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
-    Walk::open(scene, drawing, SIZE).expect("scenery alone")
+    FlyThrough::open(scene, drawing, SIZE).expect("scenery alone")
 }
 
 #[test]

@@ -168,7 +168,7 @@ fn what_comes_into_view_after_the_choice_is_drawn_at_its_coarsest_and_chosen_for
     let mut frame = |y: f64| {
         let (camera, started) = (looking(y), session.now());
         let triangles = session.compose(&camera, SIZE, Style::default(), None).triangles();
-        session.choose_beside(&camera, SIZE);
+        session.choose_next_frame(&camera, SIZE);
         let draw = session.spend_declared(SIZE);
         let work = session.now() - started;
         session.finish(started, Finished { work, draw, gpu: None, skip: false });
@@ -208,7 +208,7 @@ fn eye_error_m(target: &str) -> f64 {
         session.wait_until(due);
         let started = session.now();
         let read: Camera = session.scene_camera();
-        let camera = session.ahead(read);
+        let camera = session.predict_camera(read);
         session.compose(&camera, SIZE, Style::default(), None);
         session.spend_declared(SIZE);
         let done = session.now() - started;

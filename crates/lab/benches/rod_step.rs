@@ -26,12 +26,12 @@ fn tube(segments: usize) -> Tube {
 fn step_tube(c: &mut Criterion) {
     let mut group = c.benchmark_group("rod/step");
     let dt = SimSpan::from_nanos(5_000_000);
-    let around = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    let context = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
     for segments in [16_usize, 64, 256] {
         let mut tube = tube(segments);
         group.throughput(Throughput::Elements(segments as u64));
         group.bench_function(BenchmarkId::from_parameter(segments), |b| {
-            b.iter(|| tube.step(dt, &around).expect("it swings freely"));
+            b.iter(|| tube.step(dt, &context).expect("it swings freely"));
         });
     }
     group.finish();

@@ -13,24 +13,24 @@ Examples:
   metachron bench pile --quick
   metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
 
-CPU times are the measure: on a machine that does other things too, wall times tell of those.";
+Compare CPU times: wall times include the load of other programs.";
 
 /// Examples for the help of the command.
 pub const TUNE_EXAMPLES: &str = "\
 Examples:
   metachron tune tube                                  finds gains on the declared machine; writes tube.gains.toml and charts/
-  metachron run tube --gains tube.gains.toml           and with them
+  metachron run tube --gains tube.gains.toml           plays the scene with them
   metachron tune yard --target-fps 120 --quick
-  metachron tune tube --analyse α=1e-4,β=5             why given gains are slow, swing, or are fine
-  metachron tune tube --live --size 640x360            on the machine and the adapter present
+  metachron tune tube --analyse α=1e-4,β=5             explains why given gains are slow, unstable or good
+  metachron tune tube --live --size 640x360            on this machine and its adapter
 
 Ctrl-C keeps the best gains so far.";
 
 /// Examples for the help of the command.
 pub const FIT_EXAMPLES: &str = "\
 Examples:
-  metachron fit my.toml --tolerance 1e-3               what every object pays, and what a millimetre needs
-  metachron fit my.toml --tolerance 1e-3 --write       and the scene with that
+  metachron fit my.toml --tolerance 1e-3               present cost of every object, and cost needed for 1 mm
+  metachron fit my.toml --tolerance 1e-3 --write       and writes these settings into the scene
   metachron fit tube --tolerance 5e-3 --probe intestine --seconds 1
   metachron fit my.toml --tolerance 1e-4 --json -q | jq '.objects[].needs'
 
@@ -42,10 +42,10 @@ Examples:
   metachron chart stability                            every experiment, into the folder charts/
   metachron chart stability --quick --only tube-map --out /tmp/charts
   metachron chart coupling --quick
-  metachron chart policies --live --only auditorium    the paper's walk on this adapter
+  metachron chart policies --live --only auditorium    the paper's walkthrough on this adapter
   metachron chart stability --json -q | jq '.experiments[].findings'
 
-Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
+Ctrl-C ends a sweep after the rows in progress; run the same command again to continue.";
 
 /// `tune`.
 #[derive(Debug, Args)]
@@ -53,7 +53,7 @@ pub struct TuneArgs {
     /// A built-in scene or the path of a scene file
     #[arg(default_value = "tube", value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Explain these gains instead of looking for better ones, such as α=1e-4,β=5 or kappa=0.5,margin=0.1
+    /// Explain these gains instead of searching for better ones, such as α=1e-4,β=5 or kappa=0.5,margin=0.1
     #[arg(long, value_name = "GAINS")]
     pub analyse: Option<String>,
     /// Write the gains here (TOML); SCENE.gains.toml where not given
@@ -68,7 +68,7 @@ pub struct TuneArgs {
     /// Run the experiment on this machine and its graphics adapter instead of the declared machine
     #[arg(long)]
     pub live: bool,
-    /// Frames a second to hold, 1 to 1000
+    /// Target frame rate, frames per second, 1 to 1000
     #[arg(long, value_name = "F", value_parser = target_fps)]
     pub target_fps: Option<f64>,
     /// Size of the picture in pixels, each 1 to 8192; 1280x720 where not given
@@ -77,7 +77,7 @@ pub struct TuneArgs {
     /// Seed of the declared machine's noise
     #[arg(long, value_name = "N")]
     pub seed: Option<u32>,
-    /// Fewer frames and fewer seeds: seconds instead of a minute
+    /// Fewer frames and seeds: takes seconds instead of a minute
     #[arg(long)]
     pub quick: bool,
     /// The arguments common to `check`, `tune` and `fit`.
@@ -91,10 +91,10 @@ pub struct FitArgs {
     /// A built-in scene or the path of a scene file
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Greatest distance of a probe from its place in the converged answer, metres
+    /// Greatest distance of a probe from its position in the converged answer, metres
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub tolerance: f64,
-    /// Compare only the probes of this object; its ends and its middle where it has none
+    /// Compare only the probes of this object, or its ends and middle where it has none
     #[arg(long, value_name = "NAME")]
     pub probe: Option<String>,
     /// Simulated seconds that are compared, 0.01 to 1000
@@ -119,10 +119,10 @@ pub struct ChartArgs {
     /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
-    /// A small part of the cases, or shorter runs: minutes become seconds
+    /// Fewer cases or shorter runs: takes seconds instead of minutes
     #[arg(long)]
     pub quick: bool,
-    /// For policies: run on the graphics adapter present, through the renderer, instead of on a declared machine
+    /// For policies: draw with the renderer on this machine's graphics adapter instead of using a declared machine
     #[arg(long)]
     pub live: bool,
     /// Only this experiment; may be repeated
@@ -172,9 +172,9 @@ pub struct BenchArgs {
 pub enum BenchSubject {
     /// Agents on threads, in a pool and in lockstep: CPU per step against the bare loop, lateness, ages, memory
     Agents,
-    /// Cost of a tube's step by number of segments, with and without the search for self-contact
+    /// Cost of a tube's step by number of segments, with and without self-contact search
     Rod,
-    /// Time to choose a level of detail for every object, by policy and number of objects
+    /// Time to select a level of detail for every object, by policy and number of objects
     Select,
     /// A thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes
     Pile,
@@ -185,15 +185,15 @@ pub enum BenchSubject {
 /// A subject of `chart`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Subject {
-    /// Error of each method against an independent answer, and its cost, next to the points of other engines
+    /// Error and cost of each method against independent solutions, compared with other engines
     Accuracy,
-    /// How cost grows with segments, contacts and agents, and how far it is from the limit of the machine
+    /// Growth of cost with segments, contacts and agents, and its distance from the machine's limit
     Scaling,
-    /// Where integrators and couplings blow up, and where they are bounded but wrong
+    /// Where integrators and couplings diverge, and where they are bounded but wrong
     Stability,
-    /// How far a scene with separate clocks is from the same scene under one very fine common clock
+    /// Difference of a scene with separate clocks from the same scene under one very fine common clock
     Coupling,
-    /// How well each frame-budget policy keeps its time, on the scenes of the papers
+    /// How well each frame-budget policy holds the frame time, on the scenes of the papers
     Policies,
 }
 

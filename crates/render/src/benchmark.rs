@@ -8,7 +8,7 @@ use super::draw::RendererOptions;
 use super::level::{Level, Shading};
 use super::offscreen::{Gpu, GpuError, Offscreen};
 use super::picture::Style;
-use super::scene_view::{Actor, Form, Look, Material, SceneView, States};
+use super::scene_view::{Actor, Appearance, Form, Material, SceneView, States};
 use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Resolution, SimTime};
@@ -57,25 +57,35 @@ const DRAWINGS: usize = 5;
 const PICTURE: Duration = Duration::from_millis(60);
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
-/// A picture to draw: of this size without an object, or balls of (shading, triangles, pixels) each.
+/// Equal balls: shading, requested triangles and covered pixels of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Ask {
+struct Balls {
+    shading: Shading,
+    triangles: u32,
+    pixels: f64,
+}
+
+/// A picture to draw: of this size without an object, or balls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum TestPicture {
     Empty(Size),
-    Balls(Shading, u32, f64),
+    Balls(Balls),
 }
 
 /// All pictures in drawing order: balls whose triangles cover the least and the greatest area come first.
-fn asks(areas_px: &[f64]) -> Vec<Ask> {
+fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
     let of = |area_px| {
-        numbers(area_px).flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(shading, triangles, pixels)))
+        numbers(area_px).flat_map(|(triangles, pixels)| {
+            SHADINGS.map(|shading| TestPicture::Balls(Balls { shading, triangles, pixels }))
+        })
     };
-    EMPTY.into_iter().map(Ask::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
+    EMPTY.into_iter().map(TestPicture::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
 }
 
 /// The fraction of all pictures still to be measured when `known` are done, 0 … 1.
 #[must_use]
 pub fn benchmark_left(areas_px: &[f64], known: usize) -> f64 {
-    let all = asks(areas_px).len();
+    let all = test_pictures(areas_px).len();
     all.saturating_sub(known) as f64 / all.max(1) as f64
 }
 
@@ -91,16 +101,16 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
     // shaders are compiled at their first use, which must not count as drawing time
     for shading in SHADINGS {
-        measure(&mut screen, &ball, (shading, TRIANGLES[0], SQUARES[0].1))?;
+        measure(&mut screen, &ball, Balls { shading, triangles: TRIANGLES[0], pixels: SQUARES[0].1 })?;
     }
     let (begun, mut drawn) = (Instant::now(), Vec::new());
-    for ask in asks(areas_px).into_iter().skip(known) {
+    for wanted in test_pictures(areas_px).into_iter().skip(known) {
         if begun.elapsed() > LONGEST {
             break;
         }
-        drawn.push(match ask {
-            Ask::Balls(shading, triangles, pixels) => measure(&mut screen, &ball, (shading, triangles, pixels))?,
-            Ask::Empty(size) => {
+        drawn.push(match wanted {
+            TestPicture::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
+            TestPicture::Empty(size) => {
                 screen = screen.resized(size)?;
                 let found = empty(&mut screen)?;
                 screen = screen.resized(SIZE)?;
@@ -130,35 +140,37 @@ fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
     covers.filter(|(_, pixels)| (LEAST_PX..=SQUARES[SQUARES.len() - 1].1).contains(pixels)).take(NUMBERS)
 }
 
-fn measure(
-    screen: &mut Offscreen,
-    ball: &Arc<ProgressiveMesh>,
-    (shading, triangles, pixels): (Shading, u32, f64),
-) -> Result<Drawn, GpuError> {
+fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -> Result<Drawn, GpuError> {
+    let Balls { shading, triangles, pixels } = wanted;
     let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
-    let mut stage = balls(ball, side, shading == Shading::Textured);
+    let mut scene_view = balls(ball, side, shading == Shading::Textured);
     let cut = ball.cut(triangles).triangles;
     let level = Level { shading, triangles: cut, ..Resolution { eps_m: 1.0, n: 0 }.into() };
     // covered pixels are measured at 1 m; from there they fall with the square of the distance
-    let distance_m = (seen_pixels(&mut stage, 1.0) / (pixels / f64::from(triangles) * f64::from(cut))).sqrt();
-    let seconds = median(screen, &mut stage, distance_m, &vec![level; (side * side) as usize])?;
-    let pixels = seen_pixels(&mut stage, distance_m);
+    let distance_m = (seen_pixels(&mut scene_view, 1.0) / (pixels / f64::from(triangles) * f64::from(cut))).sqrt();
+    let seconds = median(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
+    let pixels = seen_pixels(&mut scene_view, distance_m);
     let polygons = f64::from(cut);
     Ok(Drawn { picture_px: SIZE.pixels(), objects: side * side, polygons, pixels, shading, seconds })
 }
 
 /// Pixels that the first ball covers.
-fn seen_pixels(stage: &mut SceneView, distance_m: f64) -> f64 {
-    stage.survey(&camera(distance_m), SIZE);
-    stage.seen().first().map_or(0.0, |seen| seen.pixels)
+fn seen_pixels(scene_view: &mut SceneView, distance_m: f64) -> f64 {
+    scene_view.survey(&camera(distance_m), SIZE);
+    scene_view.seen().first().map_or(0.0, |seen| seen.pixels)
 }
 
-fn median(screen: &mut Offscreen, stage: &mut SceneView, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
+fn median(
+    screen: &mut Offscreen,
+    scene_view: &mut SceneView,
+    distance_m: f64,
+    levels: &[Level],
+) -> Result<f64, GpuError> {
     let (camera, mut times) = (camera(distance_m), Vec::with_capacity(DRAWINGS));
     let mut draw = || -> Result<f64, GpuError> {
         let started = Instant::now();
-        stage.survey(&camera, screen.size());
-        screen.render(stage.compose(&camera, levels, Style::default(), None), &camera)?;
+        scene_view.survey(&camera, screen.size());
+        screen.render(scene_view.compose(&camera, levels, Style::default(), None), &camera)?;
         Ok(started.elapsed().as_secs_f64())
     };
     draw()?;
@@ -176,19 +188,19 @@ fn camera(distance_m: f64) -> Camera {
 
 /// A square of balls across the view, with or without a pattern on them.
 fn balls(ball: &Arc<ProgressiveMesh>, side: u32, painted: bool) -> SceneView {
-    let look = Look { colour: [200, 120, 100], material: Material::Plastic };
+    let appearance = Appearance { colour: [200, 120, 100], material: Material::Plastic };
     let model = Model::Mesh(Arc::clone(ball));
     let actor = |id| {
         let at = Placement { position: place(id, side), rotation: DQuat::IDENTITY, scale: RADIUS_M };
-        Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look }
+        Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), appearance }
     };
-    let mut stage = SceneView::new((0..side * side).map(actor).collect(), Vec::new());
+    let mut scene_view = SceneView::new((0..side * side).map(actor).collect(), Vec::new());
     if painted {
         let texture = Arc::new(Pattern::Checker.texture(RADIUS_M as f32));
-        (0..side * side).for_each(|id| stage.paint(AgentId(id), &texture));
+        (0..side * side).for_each(|id| scene_view.paint(AgentId(id), &texture));
     }
-    stage.pose(SimTime::ZERO, States::Latest);
-    stage
+    scene_view.pose(SimTime::ZERO, States::Latest);
+    scene_view
 }
 
 /// Position of a ball in the square, metres.
@@ -202,23 +214,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_known_is_not_drawn_again() {
+    fn known_measurements_are_not_drawn_again() {
         let areas = [1.0, 16.0, 256.0];
-        let all = asks(&areas);
-        assert_eq!(all[..3], EMPTY.map(Ask::Empty));
-        assert!(all.len() > 20 && all[3..].iter().all(|ask| matches!(ask, Ask::Balls(..))));
+        let all = test_pictures(&areas);
+        assert_eq!(all[..3], EMPTY.map(TestPicture::Empty));
+        assert!(all.len() > 20 && all[3..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
         assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
     }
 
     #[test]
-    fn areas_are_gone_through_from_both_ends() {
+    fn areas_are_measured_from_both_ends() {
         assert_eq!(ends_first(&[1.0, 2.0, 3.0, 4.0, 5.0]).collect::<Vec<_>>(), [1.0, 5.0, 2.0, 4.0, 3.0]);
         assert_eq!(ends_first(&[1.0, 2.0]).collect::<Vec<_>>(), [1.0, 2.0]);
         assert_eq!(ends_first(&[]).count(), 0);
     }
 
     #[test]
-    fn every_area_is_drawn_with_balls_that_stand_beside_each_other() {
+    fn every_area_is_drawn_with_balls_that_do_not_overlap() {
         for area_px in [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0] {
             let all: Vec<_> = numbers(area_px).collect();
             assert!(!all.is_empty() && (all.len() == NUMBERS || area_px > 2000.0), "{area_px}: {all:?}");

@@ -3,15 +3,15 @@
 //! In: a posed and surveyed [`SceneView`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
 //! An object outside the view is in the picture where it may shade a visible one: for its shadow only.
 
-use super::instances::{Solids, add_prop, add_solid, kind, sort_solids};
+use super::instances::{Solids, add_solid, add_static, kind, sort_solids};
 use super::level::{Level, Shading};
 use super::light_volume::LightColumn;
 use super::picture::{
     Colouring, MeshKey, Picture, SkinSample, SolidInstance, Style, TubeRun, age_colour, detail_colour,
     resolution_colour,
 };
-use super::scene_view::{Form, Look, Material, SceneView, Track};
-use super::skin::{ROPE_LEVEL, SkinRoom, SkinWish, curve_of_rope, drawn_radius_m};
+use super::scene_view::{Appearance, Form, Material, SceneView, Track};
+use super::skin::{ROPE_LEVEL, SkinOptions, SkinScratch, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
 use metachron_core::{AgentId, Anchor, Body, Resolution};
@@ -47,7 +47,7 @@ pub(super) struct Scratch {
     shown: Vec<usize>,
     solids: Solids,
     tubes: Vec<(u8, usize)>,
-    skins: SkinRoom,
+    skins: SkinScratch,
 }
 
 impl SceneView {
@@ -72,14 +72,16 @@ impl SceneView {
         for &number in &scratch.shown {
             let (track, at) = (&mut self.tracks[number], level(levels, number));
             if at.triangles > 0 {
-                add_solid(track, at, &picture, (&mut scratch.solids, &mut allowance));
+                add_solid(track, at, &picture, &mut scratch.solids, &mut allowance);
             } else {
-                track.glide = None;
+                track.geomorph = None;
             }
         }
-        self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
+        self.statics.iter().for_each(|prop| add_static(prop, &mut picture, &mut scratch.solids));
         self.add_grasps(&picture, &mut scratch);
-        if let Some((from, to)) = hand.and_then(|hand| Some((self.place(hand.object, hand.anchor)?, hand.target))) {
+        if let Some((from, to)) =
+            hand.and_then(|hand| Some((self.anchor_position(hand.object, hand.anchor)?, hand.target)))
+        {
             add_spring(from, to, SPRING_SHARE * camera.distance_m, &mut picture);
         }
         sort_solids(&mut scratch.solids, &mut picture);
@@ -91,7 +93,7 @@ impl SceneView {
 
     /// Displayed position of a material point of an agent, metres.
     #[must_use]
-    pub fn place(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
+    pub fn anchor_position(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
         let track = self.tracks.iter().find(|track| track.actor.id == id)?;
         track.pose.point(anchor).map(|(position, _)| position)
     }
@@ -102,7 +104,7 @@ impl SceneView {
         let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
         let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.bounds.half_m));
-        let fixed = self.props.iter().map(|p| (p.position, p.body.radius_m, p.half_extents()));
+        let fixed = self.statics.iter().map(|p| (p.position, p.body.radius_m, p.half_extents()));
         let (mut ball, mut tight) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], [DVec3::INFINITY, DVec3::NEG_INFINITY]);
         for (centre, radius, half) in moving.chain(fixed).filter(|(c, r, _)| near(*c, *r)) {
             ball = [ball[0].min(centre - radius), ball[1].max(centre + radius)];
@@ -157,12 +159,12 @@ impl SceneView {
             }
             let frames = track.skeleton.frames();
             let Some(last) = frames.len().checked_sub(1) else { continue };
-            let paint = Paint::of(track.actor.look, tint(picture.style, asked, track.age_s));
+            let paint = Paint::of(track.actor.appearance, tint(picture.style, asked, track.age_s));
             let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
             let texture_per_m = TEXTURE_AROUND / (TAU * mean.max(1e-6));
             let (first, origin) = (picture.samples.len() as u32, picture.origin);
             picture.samples.extend(frames.iter().map(|f| sample(f, origin, texture_per_m as f32, paint)));
-            let tissue = track.actor.look.material == Material::Tissue;
+            let tissue = track.actor.appearance.material == Material::Tissue;
             picture.tubes.push(TubeRun { first, intervals: last as u32, n, tissue, shading, shown: track.seen });
             for end in [&frames[0], &frames[last]] {
                 let size = Rounding { extents: Vec3::ZERO, radius_m: end.radius_m as f32 };
@@ -181,13 +183,14 @@ impl SceneView {
             if at.triangles == 0 {
                 continue;
             }
-            let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+            let paint = Paint::of(track.actor.appearance, tint(picture.style, at, track.age_s));
             let size = Rounding { extents: Vec3::ONE, radius_m: drawn_radius_m(form) as f32 };
             let number = picture.instances.len() as u32;
             picture.instances.push(instance(DVec3::ZERO, DQuat::IDENTITY, size, paint));
             let Picture { skins, origin, style, .. } = picture;
-            let wish = SkinWish { origin: *origin, instance: number, shading: at.shading, edges: style.wireframe };
-            skins.add(form, soft, wish, room);
+            let options =
+                SkinOptions { origin: *origin, instance: number, shading: at.shading, edges: style.wireframe };
+            skins.add(form, soft, options, room);
         }
     }
 
@@ -196,7 +199,7 @@ impl SceneView {
         for track in shown.iter().map(|&number| &self.tracks[number]) {
             let (Body::Tool(tool), Form::Tool(shape)) = (&track.pose, &track.actor.form) else { continue };
             let Some(grasp) = tool.grasp else { continue };
-            let Some(point) = self.place(grasp.target, grasp.anchor) else { continue };
+            let Some(point) = self.anchor_position(grasp.target, grasp.anchor) else { continue };
             let heat = (tool.force_n / FORCE_RED_N).clamp(0.0, 1.0);
             let cool = (235.0 * (1.0 - heat)) as u8;
             let colour = [235, cool, (f64::from(cool) * 0.8) as u8];
@@ -217,8 +220,8 @@ pub(super) struct Paint {
 }
 
 impl Paint {
-    pub fn of(look: Look, tint: [u8; 4]) -> Self {
-        Self { colour: look.colour, material: look.material, tint }
+    pub fn of(appearance: Appearance, tint: [u8; 4]) -> Self {
+        Self { colour: appearance.colour, material: appearance.material, tint }
     }
 
     fn packed(self) -> [u8; 4] {
@@ -264,7 +267,7 @@ pub(super) fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: 
         position: position.as_vec3().to_array(),
         radius_m: size.radius_m,
         extents: size.extents.to_array(),
-        glide: 0.0,
+        geomorph: 0.0,
         colour: paint.packed(),
         tint: paint.tint,
         wrap: [0.0; 2],
@@ -331,25 +334,25 @@ mod tests {
         Arc::new(Snapshot { time: SimTime::from_nanos(ms * 1_000_000), steps: ms, body, ..Snapshot::default() })
     }
 
-    fn stage() -> (SceneView, Camera) {
-        let look = Look { colour: [220, 120, 110], material: Material::Tissue };
-        let stage = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
-        (stage, Camera::looking(DVec3::new(0.2, -1.0, 0.5), DVec3::new(0.2, 0.0, 0.0), 0.7))
+    fn scene_view() -> (SceneView, Camera) {
+        let appearance = Appearance { colour: [220, 120, 110], material: Material::Tissue };
+        let scene_view = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, appearance }], vec![]);
+        (scene_view, Camera::looking(DVec3::new(0.2, -1.0, 0.5), DVec3::new(0.2, 0.0, 0.0), 0.7))
     }
 
     #[test]
-    fn later_frames_use_the_storage_of_the_first_ones() {
-        let (mut stage, camera) = stage();
+    fn composing_reuses_storage_after_the_first_frames() {
+        let (mut scene_view, camera) = scene_view();
         let mut places = Vec::new();
         let levels = [Resolution { eps_m: 0.005, n: 4 }.into()];
         for frame in 0..6 {
-            stage.see(AgentId(0), &tube_at(10 * frame), true);
-            stage.pose(SimTime::from_nanos(10_000_000 * frame + 500_000), States::Interpolate);
-            stage.survey(&camera, SIZE);
-            let picture = stage.compose(&camera, &levels, Style::default(), None);
+            scene_view.set_snapshot(AgentId(0), &tube_at(10 * frame), true);
+            scene_view.pose(SimTime::from_nanos(10_000_000 * frame + 500_000), States::Interpolate);
+            scene_view.survey(&camera, SIZE);
+            let picture = scene_view.compose(&camera, &levels, Style::default(), None);
             let buffers = [picture.samples.as_ptr().addr(), picture.instances.as_ptr().addr()];
-            let seen = stage.seen().as_ptr().addr();
-            let Some((Body::Curve(curve), _)) = stage.shown(AgentId(0)) else { panic!("a curve was seen") };
+            let seen = scene_view.seen().as_ptr().addr();
+            let Some((Body::Curve(curve), _)) = scene_view.shown(AgentId(0)) else { panic!("a curve was seen") };
             places.push((buffers, curve.positions.as_ptr().addr(), seen));
         }
         assert!(places[1..].iter().all(|p| *p == places[1]), "{places:?}");
@@ -357,11 +360,11 @@ mod tests {
 
     #[test]
     fn a_tube_gets_the_intervals_and_triangles_of_its_level() {
-        let (mut stage, camera) = stage();
-        stage.see(AgentId(0), &tube_at(0), true);
-        stage.pose(SimTime::ZERO, States::Latest);
+        let (mut scene_view, camera) = scene_view();
+        scene_view.set_snapshot(AgentId(0), &tube_at(0), true);
+        scene_view.pose(SimTime::ZERO, States::Latest);
         for (eps_m, n, intervals) in [(0.1, 0, 4), (0.005, 3, 80)] {
-            let picture = stage.compose(&camera, &[Resolution { eps_m, n }.into()], Style::default(), None);
+            let picture = scene_view.compose(&camera, &[Resolution { eps_m, n }.into()], Style::default(), None);
             assert_eq!((picture.tubes[0].intervals, picture.samples.len()), (intervals, intervals as usize + 1));
             let caps = 2 * u64::from(Primitive::Ball.triangles(n));
             assert_eq!(picture.triangles(), u64::from(intervals) * (12 << n) + caps);
@@ -369,28 +372,28 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_triangles_is_left_out_of_the_picture() {
-        let (mut stage, camera) = stage();
-        stage.see(AgentId(0), &tube_at(0), true);
-        stage.pose(SimTime::ZERO, States::Latest);
+    fn objects_without_triangles_are_left_out_of_the_picture() {
+        let (mut scene_view, camera) = scene_view();
+        scene_view.set_snapshot(AgentId(0), &tube_at(0), true);
+        scene_view.pose(SimTime::ZERO, States::Latest);
         let gone = Level { triangles: 0, ..Resolution { eps_m: 0.005, n: 3 }.into() };
-        let picture = stage.compose(&camera, &[gone], Style::default(), None);
+        let picture = scene_view.compose(&camera, &[gone], Style::default(), None);
         assert!(picture.tubes.is_empty() && picture.instances.is_empty());
     }
 
     #[test]
     fn a_tube_out_of_sight_is_kept_for_its_shadow_only() {
-        let (mut stage, camera) = stage();
-        stage.see(AgentId(0), &tube_at(0), true);
-        stage.pose(SimTime::ZERO, States::Latest);
+        let (mut scene_view, camera) = scene_view();
+        scene_view.set_snapshot(AgentId(0), &tube_at(0), true);
+        scene_view.pose(SimTime::ZERO, States::Latest);
         let away = Camera::looking(camera.eye(), camera.eye() - camera.forward(), camera.fov_y_rad);
-        stage.survey(&away, SIZE);
-        let picture = stage.compose(&away, &[], Style::default(), None);
+        scene_view.survey(&away, SIZE);
+        let picture = scene_view.compose(&away, &[], Style::default(), None);
         assert!(!picture.tubes[0].shown);
         let aside = camera.eye() + camera.right() * 50.0;
         let far = Camera::looking(aside, aside - camera.forward(), camera.fov_y_rad);
-        stage.survey(&far, SIZE);
-        let picture = stage.compose(&far, &[], Style::default(), None);
+        scene_view.survey(&far, SIZE);
+        let picture = scene_view.compose(&far, &[], Style::default(), None);
         assert!(picture.tubes.is_empty() && picture.instances.is_empty(), "its shadow falls on nothing that is seen");
     }
 }

@@ -1,24 +1,24 @@
-//! Solids, tools, fixed props and scenery in the picture: one instance each, in runs of a kind.
+//! Solids, tools, static solids and scenery in the picture: one instance each, in runs of a kind.
 //!
 //! In: posed objects, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, the choice of levels.
 
 use super::compose::{Paint, instance, level, tint};
 use super::level::{Level, Shading};
-use super::lod_transition::{Allowance, Glide};
+use super::lod_transition::{Allowance, Geomorph};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
-use super::scene_view::{Actor, Form, Material, PropShape, SceneView, Track};
+use super::scene_view::{Actor, Form, Material, SceneView, StaticShape, Track};
 use glam::{DVec3, Vec3};
 use metachron_core::{Body, ToolState};
 use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
 
 /// Level at which fixed solids are drawn.
-const PROP_LEVEL: u8 = 4;
+const STATIC_LEVEL: u8 = 4;
 /// Cells of a fixed box are at most this fraction of the light's radius long: light is close to linear across one.
 const CELL_SHARE: f64 = 0.125;
 /// Most cells along a side of a fixed box; a larger box is lit per pixel everywhere.
 const CELLS_MAX: f64 = 24.0;
 /// Triangles by which coarsening meshes may exceed their request in total, as a fraction of all triangles requested.
-const GLIDE_SHARE: f64 = 0.05;
+const GEOMORPH_SHARE: f64 = 0.05;
 
 /// Solids by kind, before sorting.
 pub(super) type Solids = Vec<(SolidKind, SolidInstance)>;
@@ -28,23 +28,23 @@ impl SceneView {
     ///
     /// A coarsening mesh then has more triangles than requested until its morph ends; the excess is at most a twentieth of all meshes'
     /// triangles.
-    pub const fn glide_over(&mut self, frames: u8) {
-        self.glide_frames = frames;
+    pub const fn set_geomorph_frames(&mut self, frames: u8) {
+        self.geomorph_frames = frames;
     }
 
     /// Limits on morphs in the next picture.
     pub(super) fn allowance(&self, levels: &[Level], shown: &[usize]) -> Allowance {
-        if self.glide_frames < 2 {
+        if self.geomorph_frames < 2 {
             return Allowance { step: 1.0, triangles: 0.0 };
         }
         let asked = shown.iter().map(|&number| match &self.tracks[number] {
-            Track { actor: Actor { form: Form::Scenery(Model::Mesh(tom), _), .. }, seen: true, .. } => {
-                level(levels, number).triangles.min(tom.range().1)
+            Track { actor: Actor { form: Form::Scenery(Model::Mesh(progressive), _), .. }, seen: true, .. } => {
+                level(levels, number).triangles.min(progressive.range().1)
             }
             _ => 0,
         });
-        let triangles = GLIDE_SHARE * asked.map(f64::from).sum::<f64>();
-        Allowance { step: 1.0 / f32::from(self.glide_frames), triangles }
+        let triangles = GEOMORPH_SHARE * asked.map(f64::from).sum::<f64>();
+        Allowance { step: 1.0 / f32::from(self.geomorph_frames), triangles }
     }
 }
 
@@ -55,9 +55,9 @@ pub(super) fn kind(shading: Shading, mesh: MeshKey) -> SolidKind {
 }
 
 /// The mesh and size of a solid at level `n`; `None` for one that has neither a given mesh nor a primitive.
-fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Rounding)> {
-    if let Some(number) = given {
-        return Some((MeshKey::Given(number), Rounding { extents: Vec3::ONE, radius_m: 0.0 }));
+fn mesh_of(solid: &Solid, mesh_index: Option<u32>, n: u8) -> Option<(MeshKey, Rounding)> {
+    if let Some(number) = mesh_index {
+        return Some((MeshKey::Custom(number), Rounding { extents: Vec3::ONE, radius_m: 0.0 }));
     }
     Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
 }
@@ -66,38 +66,37 @@ pub(super) fn add_solid(
     track: &mut Track,
     at: Level,
     picture: &Picture,
-    (solids, allowance): (&mut Solids, &mut Allowance),
+    solids: &mut Solids,
+    allowance: &mut Allowance,
 ) {
-    let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
     if matches!(track.actor.form, Form::Scenery(..)) {
-        return add_scenery(track, at, (paint, picture.origin), (solids, allowance));
+        return add_scenery(track, at, picture, solids, allowance);
     }
+    let paint = Paint::of(track.actor.appearance, tint(picture.style, at, track.age_s));
     match (&track.actor.form, &track.pose) {
         (Form::Solid(solid), Body::Rigid(rigid)) => {
-            let Some((mesh, size)) = mesh_of(solid, track.body.given, at.resolution.n) else { return };
+            let Some((mesh, size)) = mesh_of(solid, track.body.mesh_index, at.resolution.n) else { return };
             let place = rigid.position - picture.origin;
             solids.push((kind(at.shading, mesh), instance(place, rigid.rotation, size, paint)));
         }
-        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at, paint, picture.origin), solids),
+        (Form::Tool(shape), Body::Tool(tool)) => {
+            solids.extend(tool_parts(shape, tool, at, paint, picture.origin));
+        }
         _ => {}
     }
 }
 
 /// Adds visible scenery with the triangles that its level gives.
-fn add_scenery(
-    track: &mut Track,
-    level: Level,
-    (mut paint, origin): (Paint, DVec3),
-    (solids, allowance): (&mut Solids, &mut Allowance),
-) {
-    let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.given, track.seen) else {
+fn add_scenery(track: &mut Track, level: Level, picture: &Picture, solids: &mut Solids, allowance: &mut Allowance) {
+    let mut paint = Paint::of(track.actor.appearance, tint(picture.style, level, track.age_s));
+    let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.mesh_index, track.seen) else {
         return;
     };
     let (mesh, growth, share) = match model {
-        Model::Mesh(tom) => {
-            let glide = track.glide.get_or_insert_with(|| Glide::at(tom, level.triangles));
-            glide.advance(tom, level.triangles, allowance);
-            let (mesh, share) = glide.drawn(number);
+        Model::Mesh(progressive) => {
+            let geomorph = track.geomorph.get_or_insert_with(|| Geomorph::at(progressive, level.triangles));
+            geomorph.advance(progressive, level.triangles, allowance);
+            let (mesh, share) = geomorph.drawn(number);
             (mesh, 0.0, share)
         }
         Model::Foliage(foliage) => {
@@ -108,43 +107,49 @@ fn add_scenery(
         }
     };
     let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
-    let painted = track.painting.as_ref().map(|painting| painting.lies(&mut paint, level.shading));
+    let painted = track.painting.as_ref().map(|painting| painting.apply(&mut paint, level.shading));
     let (kind, wrap) = match painted.flatten() {
         Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, mesh }, wrap),
         None => (kind(level.shading, mesh), 0.0),
     };
-    let still = instance(at.position - origin, at.rotation, size, paint);
-    solids.push((kind, SolidInstance { glide: share, wrap: [wrap, 0.0], ..still }));
+    let still = instance(at.position - picture.origin, at.rotation, size, paint);
+    solids.push((kind, SolidInstance { geomorph: share, wrap: [wrap, 0.0], ..still }));
 }
 
-fn add_tool(shape: &ToolShape, tool: &ToolState, (level, paint, origin): (Level, Paint, DVec3), solids: &mut Solids) {
-    let n = level.resolution.n;
-    for part in shape.parts(tool.jaw) {
+/// The parts of a tool at a level, relative to `origin`.
+fn tool_parts(
+    shape: &ToolShape,
+    tool: &ToolState,
+    level: Level,
+    paint: Paint,
+    origin: DVec3,
+) -> impl Iterator<Item = (SolidKind, SolidInstance)> {
+    shape.parts(tool.jaw).into_iter().map(move |part| {
         let position = tool.tip + tool.rotation * part.position - origin;
-        let mesh = MeshKey::Primitive(part.primitive, n);
-        solids.push((kind(level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint)));
-    }
+        let mesh = MeshKey::Primitive(part.primitive, level.resolution.n);
+        (kind(level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint))
+    })
 }
 
-pub(super) fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Solids) {
+pub(super) fn add_static(prop: &StaticShape, picture: &mut Picture, solids: &mut Solids) {
     if matches!(prop.solid, Solid::Plane) {
         let point = prop.position - picture.origin;
-        let floor = FloorDraw { point, normal: prop.rotation * DVec3::Z, colour: prop.look.colour };
+        let floor = FloorDraw { point, normal: prop.rotation * DVec3::Z, colour: prop.appearance.colour };
         picture.floor.get_or_insert(floor);
         return;
     }
     let slab = slab_of(prop, picture.focus_radius_m);
-    let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.given, PROP_LEVEL)) else { return };
-    let paint = Paint::of(prop.look, [0; 4]);
+    let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.mesh_index, STATIC_LEVEL)) else { return };
+    let paint = Paint::of(prop.appearance, [0; 4]);
     solids.push((kind(Shading::PerPixel, mesh), instance(prop.position - picture.origin, prop.rotation, size, paint)));
 }
 
 /// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and divided into cells small enough to be lit per vertex.
 /// Excluded are brushed metal, and boxes far larger than the light's region.
-fn slab_of(prop: &PropShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)> {
+fn slab_of(prop: &StaticShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)> {
     let Solid::Box { half_extents_m } = prop.solid else { return None };
     let cells = (2.0 * half_extents_m / (CELL_SHARE * light_radius_m)).ceil().max(DVec3::ONE);
-    let fits = cells.max_element() <= CELLS_MAX && prop.look.material != Material::Metal;
+    let fits = cells.max_element() <= CELLS_MAX && prop.appearance.material != Material::Metal;
     let size = Rounding { extents: half_extents_m.as_vec3(), radius_m: 0.0 };
     fits.then(|| (MeshKey::Slab(cells.to_array().map(|count| count as u8)), size))
 }

@@ -1,9 +1,9 @@
 //! Draws the newest states with wgpu at levels of detail that the caller chooses.
 //!
-//! In: snapshots, looks, a camera, a level for every actor. Out: the actors in view and their sizes ([`Seen`]), a [`Picture`] as numbers,
+//! In: snapshots, looks, a camera, a level for every actor. Out: the actors in view and their sizes ([`Visibility`]), a [`Picture`] as numbers,
 //! and with the feature `gpu` its pixels. Never here: a window, a policy, the runtime.
 //!
-//! A frame: [`SceneView::see`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`]
+//! A frame: [`SceneView::set_snapshot`] receives the newest snapshots, [`SceneView::pose`] poses them at the frame's time, [`SceneView::survey`]
 //! finds which actors are visible and how large, [`SceneView::compose`] makes the [`Picture`] at the requested levels,
 //! `Renderer::render` draws it. [`SceneView`] needs no GPU; `Offscreen` needs no window.
 //!
@@ -51,10 +51,10 @@ pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use image_metrics::{psnr_db, ssim};
 pub use level::{Level, Shading};
 #[cfg(feature = "gpu")]
-pub use offscreen::{Gpu, GpuError, Lost, Offscreen, PictureFile};
+pub use offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
 pub use pick::Hit;
 pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
-pub use scene_view::{Actor, Form, Look, Material, SceneView, States, StaticObject};
+pub use scene_view::{Actor, Appearance, Form, Material, SceneView, States, StaticObject};
 pub use skin::{ROPE_LEVEL, SkinRun, Skins};
 pub use view::{Camera, Frustum, Ray, Size};
-pub use visibility::Seen;
+pub use visibility::Visibility;

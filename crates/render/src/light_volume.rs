@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stands_between_the_light_and_what_is_lit_is_held_and_what_stands_beside_is_not() {
+    fn the_light_column_contains_occluders_and_excludes_objects_beside_it() {
         let picture = Picture {
             focus_m: DVec3::new(3.0, -1.0, 0.4),
             focus_radius_m: 0.7,

@@ -20,7 +20,7 @@ pub(super) struct Allowance {
 
 /// A mesh at a cut, or morphing from one cut to another.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Glide {
+pub(super) struct Geomorph {
     /// The triangles last requested.
     asked: u32,
     /// Both ends of the morph; equal at rest.
@@ -32,10 +32,10 @@ pub(super) struct Glide {
     rising: bool,
 }
 
-impl Glide {
+impl Geomorph {
     /// At rest at the cut for `triangles`.
-    pub fn at(tom: &ProgressiveMesh, triangles: u32) -> Self {
-        Self::resting(triangles, tom.cut(triangles))
+    pub fn at(progressive: &ProgressiveMesh, triangles: u32) -> Self {
+        Self::resting(triangles, progressive.cut(triangles))
     }
 
     fn resting(asked: u32, cut: Cut) -> Self {
@@ -43,10 +43,10 @@ impl Glide {
     }
 
     /// Advances by one frame towards the cut for `triangles`.
-    pub fn advance(&mut self, tom: &ProgressiveMesh, triangles: u32, allowance: &mut Allowance) {
+    pub fn advance(&mut self, progressive: &ProgressiveMesh, triangles: u32, allowance: &mut Allowance) {
         if triangles != self.asked {
             self.asked = triangles;
-            self.aim(tom.cut(triangles));
+            self.aim(progressive.cut(triangles));
         }
         if self.fine == self.coarse {
             return;
@@ -77,7 +77,7 @@ impl Glide {
     /// The mesh key drawn for model number `model`, and its morph fraction towards the coarse end.
     pub fn drawn(&self, model: u32) -> (MeshKey, f32) {
         if self.share > 0.0 {
-            (MeshKey::Glide(model, self.fine, self.coarse.vertices), self.share)
+            (MeshKey::Geomorph(model, self.fine, self.coarse.vertices), self.share)
         } else {
             (MeshKey::Cut(model, self.fine), 0.0)
         }
@@ -89,63 +89,63 @@ mod tests {
     use super::*;
     use metachron_geometry::{Generator, generate};
 
-    fn tom() -> ProgressiveMesh {
+    fn progressive() -> ProgressiveMesh {
         ProgressiveMesh::new(&generate(Generator::Blob, 1, 2000)).unwrap()
     }
 
-    fn drawn(glide: &Glide) -> (u32, f32) {
-        match glide.drawn(0) {
-            (MeshKey::Cut(_, cut) | MeshKey::Glide(_, cut, _), share) => (cut.triangles, share),
+    fn drawn(geomorph: &Geomorph) -> (u32, f32) {
+        match geomorph.drawn(0) {
+            (MeshKey::Cut(_, cut) | MeshKey::Geomorph(_, cut, _), share) => (cut.triangles, share),
             (key, _) => panic!("{key:?}"),
         }
     }
 
     /// The cuts drawn frame by frame while `asked` is constant, with an allowance of `triangles` per frame.
-    fn frames(glide: &mut Glide, tom: &ProgressiveMesh, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
+    fn frames(geomorph: &mut Geomorph, progressive: &ProgressiveMesh, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
         let frame = |_| {
-            glide.advance(tom, asked, &mut Allowance { step: 0.25, triangles });
-            drawn(glide)
+            geomorph.advance(progressive, asked, &mut Allowance { step: 0.25, triangles });
+            drawn(geomorph)
         };
         (0..6).map(frame).collect()
     }
 
     #[test]
-    fn finer_cuts_have_their_triangles_at_once_and_their_shape_after_the_way() {
-        let tom = tom();
-        let (coarse, fine) = (tom.cut(200).triangles, tom.cut(900).triangles);
-        let mut glide = Glide::at(&tom, 200);
-        assert_eq!(drawn(&glide), (coarse, 0.0));
-        let seen = frames(&mut glide, &tom, 900, 0.0);
+    fn a_finer_cut_has_its_triangles_at_once_and_its_shape_after_the_geomorph() {
+        let progressive = progressive();
+        let (coarse, fine) = (progressive.cut(200).triangles, progressive.cut(900).triangles);
+        let mut geomorph = Geomorph::at(&progressive, 200);
+        assert_eq!(drawn(&geomorph), (coarse, 0.0));
+        let seen = frames(&mut geomorph, &progressive, 900, 0.0);
         assert_eq!(seen, [0.75, 0.5, 0.25, 0.0, 0.0, 0.0].map(|share| (fine, share)));
     }
 
     #[test]
     fn coarser_cuts_keep_their_triangles_while_the_allowance_lasts() {
-        let tom = tom();
-        let (coarse, fine) = (tom.cut(200).triangles, tom.cut(900).triangles);
-        let mut glide = Glide::at(&tom, 900);
-        let mut jump = glide;
-        let seen = frames(&mut glide, &tom, 200, f64::from(fine - coarse));
+        let progressive = progressive();
+        let (coarse, fine) = (progressive.cut(200).triangles, progressive.cut(900).triangles);
+        let mut geomorph = Geomorph::at(&progressive, 900);
+        let mut jump = geomorph;
+        let seen = frames(&mut geomorph, &progressive, 200, f64::from(fine - coarse));
         assert_eq!(seen[..3], [0.25, 0.5, 0.75].map(|share| (fine, share)));
         assert_eq!(seen[3..], [(coarse, 0.0); 3]);
-        assert_eq!(frames(&mut jump, &tom, 200, f64::from(fine - coarse - 1)), [(coarse, 0.0); 6]);
+        assert_eq!(frames(&mut jump, &progressive, 200, f64::from(fine - coarse - 1)), [(coarse, 0.0); 6]);
     }
 
     #[test]
-    fn whatever_is_asked_for_on_the_way_no_more_is_drawn_than_asked_for_and_allowed() {
-        let tom = tom();
-        let mut glide = Glide::at(&tom, 300);
+    fn a_geomorph_never_draws_more_than_requested_plus_the_allowance() {
+        let progressive = progressive();
+        let mut geomorph = Geomorph::at(&progressive, 300);
         let mut state = 1_u64;
         for _ in 0..3000 {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let asked = 40 + (state >> 40) as u32 % 1900;
             let mut allowance = Allowance { step: 0.2, triangles: 150.0 };
-            glide.advance(&tom, asked, &mut allowance);
-            let (triangles, share) = drawn(&glide);
+            geomorph.advance(&progressive, asked, &mut allowance);
+            let (triangles, share) = drawn(&geomorph);
             assert!(f64::from(triangles) <= f64::from(asked) + 150.0 - allowance.triangles, "{triangles} of {asked}");
             assert!((0.0..=1.0).contains(&share) && allowance.triangles >= 0.0);
         }
-        frames(&mut glide, &tom, 500, 0.0);
-        assert_eq!(drawn(&glide), (tom.cut(500).triangles, 0.0));
+        frames(&mut geomorph, &progressive, 500, 0.0);
+        assert_eq!(drawn(&geomorph), (progressive.cut(500).triangles, 0.0));
     }
 }

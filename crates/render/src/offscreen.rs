@@ -13,9 +13,9 @@ use std::time::Duration;
 
 /// Whether and why a device was lost.
 #[derive(Debug, Clone, Default)]
-pub struct Lost(Arc<OnceLock<String>>);
+pub struct DeviceLoss(Arc<OnceLock<String>>);
 
-impl Lost {
+impl DeviceLoss {
     /// Watches a device from now on; replaces the watcher set before.
     #[must_use]
     pub fn watch(device: &wgpu::Device) -> Self {
@@ -49,7 +49,7 @@ pub enum GpuError {
         detail: String,
     },
     /// An adapter was found but could not be opened.
-    #[error("the graphics adapter {adapter} would not open: {detail}")]
+    #[error("the graphics adapter {adapter} could not be opened: {detail}")]
     NoDevice {
         /// The adapter's name.
         adapter: String,
@@ -290,7 +290,7 @@ impl Offscreen {
 }
 
 /// Waits until all submitted work is done.
-pub fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
+pub fn wait(device: &wgpu::Device, lost: &DeviceLoss) -> Result<(), GpuError> {
     let polled = device.poll(wgpu::PollType::wait_indefinitely());
     if let Some(reason) = lost.reason() {
         return Err(DrawError::DeviceLost { reason }.into());
@@ -299,7 +299,7 @@ pub fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
 }
 
 /// The pixels of a texture with four bytes per pixel, after all submitted work.
-pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<PictureFile, GpuError> {
+pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Result<PictureFile, GpuError> {
     let (width, height) = (texture.width(), texture.height());
     let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -328,7 +328,7 @@ pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<Pict
     let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
     let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
     let image = RgbaImage::from_raw(width, height, rows.copied().collect());
-    image.ok_or_else(|| GpuError::ReadBack { detail: "fewer bytes than pixels".into() })
+    image.ok_or_else(|| GpuError::ReadBack { detail: "the buffer is shorter than the picture".into() })
 }
 
 /// Writes a picture as PNG.

@@ -52,15 +52,15 @@ impl SceneView {
                     origin: body.rotation.inverse() * (ray.origin - body.position),
                     direction: body.rotation.inverse() * ray.direction,
                 };
-                let distance = self.hit_solid(solid, track.body.given, local)?;
+                let distance = self.hit_solid(solid, track.body.mesh_index, local)?;
                 Some((Anchor::Local(local.origin + local.direction * distance), distance))
             }
             _ => None,
         }
     }
 
-    fn hit_solid(&self, solid: &Solid, given: Option<u32>, ray: Ray) -> Option<f64> {
-        if let Some(number) = given {
+    fn hit_solid(&self, solid: &Solid, mesh_index: Option<u32>, ray: Ray) -> Option<f64> {
+        if let Some(number) = mesh_index {
             let whole = Rounding { extents: Vec3::ONE, radius_m: 0.0 };
             return hit_mesh(self.picture.meshes.get(number as usize)?, whole, ray);
         }
@@ -154,22 +154,25 @@ fn hit_mesh(mesh: &PrimitiveMesh, size: Rounding, ray: Ray) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scene_view::{Actor, Look, Material, States};
+    use super::super::scene_view::{Actor, Appearance, Material, States};
     use super::*;
     use metachron_core::{RigidState, SimTime, Snapshot};
     use std::sync::Arc;
 
-    fn stage(forms: Vec<(Form, Body)>) -> SceneView {
-        let look = Look { colour: [200; 3], material: Material::Plastic };
+    fn scene_view(forms: Vec<(Form, Body)>) -> SceneView {
+        let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
         let ids = 0..forms.len() as u32;
-        let actors =
-            forms.iter().zip(ids).map(|((form, _), id)| Actor { id: AgentId(id), form: form.clone(), look }).collect();
-        let mut stage = SceneView::new(actors, vec![]);
+        let actors = forms
+            .iter()
+            .zip(ids)
+            .map(|((form, _), id)| Actor { id: AgentId(id), form: form.clone(), appearance })
+            .collect();
+        let mut scene_view = SceneView::new(actors, vec![]);
         for (id, (_, body)) in forms.into_iter().enumerate() {
-            stage.see(AgentId(id as u32), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+            scene_view.set_snapshot(AgentId(id as u32), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
         }
-        stage.pose(SimTime::ZERO, States::Latest);
-        stage
+        scene_view.pose(SimTime::ZERO, States::Latest);
+        scene_view
     }
 
     fn ball(x: f64) -> (Form, Body) {
@@ -179,12 +182,12 @@ mod tests {
 
     #[test]
     fn the_nearer_of_two_is_picked_at_its_surface() {
-        let stage = stage(vec![ball(5.0), ball(2.0)]);
-        let hit = stage.pick(Ray { origin: DVec3::ZERO, direction: DVec3::X }).unwrap();
+        let scene_view = scene_view(vec![ball(5.0), ball(2.0)]);
+        let hit = scene_view.pick(Ray { origin: DVec3::ZERO, direction: DVec3::X }).unwrap();
         assert_eq!(hit.object, AgentId(1));
         // a ball of level 3 is within 8 % of a radius of the exact one
         assert!((hit.distance_m - 1.5).abs() < 0.04, "{}", hit.distance_m);
-        assert_eq!(stage.pick(Ray { origin: DVec3::ZERO, direction: DVec3::Y }), None);
+        assert_eq!(scene_view.pick(Ray { origin: DVec3::ZERO, direction: DVec3::Y }), None);
     }
 
     #[test]
@@ -198,8 +201,8 @@ mod tests {
             radii_m: vec![0.05; 11],
             arc_m,
         };
-        let stage = stage(vec![(Form::Tube, Body::Curve(curve))]);
-        let hit = stage.pick(Ray { origin: DVec3::new(0.0, 0.63, 0.0), direction: DVec3::X }).unwrap();
+        let scene_view = scene_view(vec![(Form::Tube, Body::Curve(curve))]);
+        let hit = scene_view.pick(Ray { origin: DVec3::new(0.0, 0.63, 0.0), direction: DVec3::X }).unwrap();
         let Anchor::Arc(arc) = hit.anchor else { panic!("{hit:?}") };
         assert!((arc - 0.63).abs() < 1e-12 && (hit.distance_m - 1.95).abs() < 1e-12, "{hit:?}");
     }

@@ -72,8 +72,8 @@ pub struct SolidInstance {
     pub radius_m: f32,
     /// Half extents of the core, metres; for models their scale.
     pub extents: [f32; 3],
-    /// Morph fraction of a [`MeshKey::Glide`], 0 … 1; else 0.
-    pub glide: f32,
+    /// Morph fraction of a [`MeshKey::Geomorph`], 0 … 1; else 0.
+    pub geomorph: f32,
     /// Colour, sRGB, and material number.
     pub colour: [u8; 4],
     /// Tint over everything (sRGB), and its opacity.
@@ -106,11 +106,11 @@ pub enum MeshKey {
     /// A primitive at a level n.
     Primitive(Primitive, u8),
     /// Index of a mesh in [`Picture::meshes`].
-    Given(u32),
+    Custom(u32),
     /// A cut of the mesh with this index in [`Picture::models`].
     Cut(u32, Cut),
     /// The same, morphing to a coarser cut: model, cut, vertex count of the coarser cut.
-    Glide(u32, Cut, u32),
+    Geomorph(u32, Cut, u32),
     /// The first triangles of a foliage level in [`Picture::models`]: model, rung, triangles.
     Part(u32, u8, u32),
     /// A sharp box whose sides are divided into this many cells along x, y and z, each at least 1.
@@ -249,9 +249,9 @@ impl Picture {
                 let [x, y, z] = [x, y, z].map(u64::from);
                 4 * (x * y + y * z + z * x)
             }
-            MeshKey::Cut(_, cut) | MeshKey::Glide(_, cut, _) => u64::from(cut.triangles),
+            MeshKey::Cut(_, cut) | MeshKey::Geomorph(_, cut, _) => u64::from(cut.triangles),
             MeshKey::Part(_, _, triangles) => u64::from(triangles),
-            MeshKey::Given(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
+            MeshKey::Custom(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
         }
     }
 }

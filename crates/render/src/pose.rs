@@ -126,27 +126,27 @@ fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
     into.velocities.clear();
     into.frames.clear();
     into.radii_m.clear();
-    let mut walk = Walk { curve: a, left: 0 };
+    let mut reader = CurveReader { curve: a, left: 0 };
     for (i, &arc_m) in b.arc_m.iter().enumerate() {
-        let (position, velocity, radius) = walk.node(arc_m);
+        let (position, velocity, radius) = reader.node(arc_m);
         into.positions.push(position.lerp(b.positions[i], w));
         into.velocities.push(velocity.lerp(b.velocities[i], w));
         into.radii_m.push(radius + (b.radii_m[i] - radius) * w);
     }
-    walk.left = 0;
+    reader.left = 0;
     for (i, &frame) in b.frames.iter().enumerate() {
-        let was = walk.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
+        let was = reader.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
         into.frames.push(was.lerp(frame, w)); // normalised, along the shorter arc: frames of one step are close
     }
 }
 
 /// Reads a curve at rising arc lengths in one pass.
-struct Walk<'a> {
+struct CurveReader<'a> {
     curve: &'a CurveState,
     left: usize,
 }
 
-impl Walk<'_> {
+impl CurveReader<'_> {
     fn seek(&mut self, arc_m: f64) {
         let last = self.curve.arc_m.len().saturating_sub(2);
         while self.left < last && self.curve.arc_m[self.left + 1] <= arc_m {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn linear_motion_is_extrapolated_exactly_and_not_for_ever() {
+    fn linear_motion_is_extrapolated_exactly_up_to_a_limit() {
         let newest = at(100, 10, moving(8, 0.1));
         let mut body = Body::Nothing;
         beyond(&newest, SimTime::from_nanos(150_000_000), &mut body);
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_that_was_divided_anew_is_matched_by_its_matter() {
+    fn a_remeshed_curve_is_matched_by_material_points() {
         let (before, newest) = (at(0, 0, moving(5, 0.0)), at(40, 1, moving(12, 0.04)));
         let mut body = Body::Nothing;
         between(&before, &newest, SimTime::from_nanos(50_000_000), &mut body);
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn an_agent_that_is_late_is_held_at_its_newest_state() {
+    fn a_late_agent_keeps_its_newest_state() {
         let (before, newest) = (at(0, 0, moving(4, 0.0)), at(10, 1, moving(4, 0.01)));
         let mut body = Body::Nothing;
         let shown = between(&before, &newest, SimTime::from_nanos(900_000_000), &mut body);

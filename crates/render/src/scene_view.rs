@@ -3,12 +3,12 @@
 //! In: the newest snapshot of each agent and the frame's time. Out: one pose per object, at the time that the choice of [`States`] gives,
 //! and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
-use super::lod_transition::Glide;
+use super::lod_transition::Geomorph;
 use super::picture::Picture;
 use super::pose;
 use super::texturing::Painting;
 use super::view::{Camera, Size};
-use super::visibility::Seen;
+use super::visibility::Visibility;
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use metachron_geometry::SurfaceShape;
@@ -45,7 +45,7 @@ pub enum Material {
 
 /// Appearance of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct Appearance {
     /// Colour, sRGB.
     pub colour: [u8; 3],
     /// Material.
@@ -82,32 +82,32 @@ pub struct Actor {
     /// Its form.
     pub form: Form,
     /// Its colour and material.
-    pub look: Look,
+    pub appearance: Appearance,
 }
 
-/// A visible static solid. The first plane among the props is the floor.
+/// A visible static solid. The first plane among the static solids is the floor.
 #[derive(Debug, Clone)]
 pub struct StaticObject {
     /// Shape and pose.
     pub obstacle: Obstacle,
     /// Its colour and material.
-    pub look: Look,
+    pub appearance: Appearance,
 }
 
 /// All objects that can be drawn, and their states at the time of a frame.
 #[derive(Debug, Default)]
 pub struct SceneView {
     pub(super) tracks: Vec<Track>,
-    pub(super) props: Vec<PropShape>,
+    pub(super) statics: Vec<StaticShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
     /// Results of the last survey, and the camera and picture size of that survey.
-    pub(super) found: Vec<Seen>,
+    pub(super) found: Vec<Visibility>,
     /// The actors that the last survey updated.
-    pub(super) looked: Vec<usize>,
+    pub(super) updated: Vec<usize>,
     pub(super) eye: Option<(Camera, Size)>,
     /// Frames over which meshes change their cut.
-    pub(super) glide_frames: u8,
+    pub(super) geomorph_frames: u8,
 }
 
 /// One agent over time.
@@ -132,7 +132,7 @@ pub(super) struct Track {
     /// ε at which the skeleton was made from the present pose; `None` where it was made from an earlier one.
     pub cut_m: Option<f64>,
     /// The cut at which a mesh is drawn while visible.
-    pub glide: Option<Glide>,
+    pub geomorph: Option<Geomorph>,
     /// The displayed curve of a rope.
     pub rope: CurveState,
     /// Texture of scenery.
@@ -141,9 +141,9 @@ pub(super) struct Track {
 
 /// A static solid with its drawing data.
 #[derive(Debug)]
-pub(super) struct PropShape {
+pub(super) struct StaticShape {
     pub solid: Solid,
-    pub look: Look,
+    pub appearance: Appearance,
     pub position: DVec3,
     pub rotation: DQuat,
     pub body: BodyShape,
@@ -153,7 +153,7 @@ pub(super) struct PropShape {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BodyShape {
     /// Index among the given meshes, or of scenery among the models.
-    pub given: Option<u32>,
+    pub mesh_index: Option<u32>,
     /// Centre of a bounding ball, from the origin in body axes, metres.
     pub middle_m: DVec3,
     /// Radius of that ball, metres.
@@ -186,26 +186,26 @@ impl Bounds {
 }
 
 impl SceneView {
-    /// A stage with these actors and props.
+    /// A view of these actors and static solids.
     #[must_use]
-    pub fn new(actors: Vec<Actor>, props: Vec<StaticObject>) -> Self {
+    pub fn new(actors: Vec<Actor>, statics: Vec<StaticObject>) -> Self {
         let (mut meshes, mut models) = (Vec::new(), Models::default());
-        let props = props.into_iter().map(|prop| PropShape::new(prop, &mut meshes)).collect();
+        let statics = statics.into_iter().map(|prop| StaticShape::new(prop, &mut meshes)).collect();
         let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
         let models = models.0.into_iter().map(|(model, _)| model).collect();
         let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
-        Self { tracks, props, picture, ..Self::default() }
+        Self { tracks, statics, picture, ..Self::default() }
     }
 
     /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
     /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
-    pub fn see(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
+    pub fn set_snapshot(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
         // the index of an actor is mostly its agent's number
         let here = |track: &Track| track.actor.id == id;
         let at = id.0 as usize;
         let at = if self.tracks.get(at).is_some_and(here) { Some(at) } else { self.tracks.iter().position(here) };
         if let Some(track) = at.and_then(|at| self.tracks.get_mut(at)) {
-            track.see(newest, awake);
+            track.set_snapshot(newest, awake);
         }
     }
 
@@ -265,7 +265,7 @@ impl Track {
             seen: true,
             skeleton: Skeleton::default(),
             cut_m: None,
-            glide: None,
+            geomorph: None,
             rope: CurveState::default(),
             painting: None,
         };
@@ -273,7 +273,7 @@ impl Track {
         track
     }
 
-    fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
+    fn set_snapshot(&mut self, newest: &Arc<Snapshot>, awake: bool) {
         (self.awake, self.still) = (awake, false);
         match &self.newest {
             Some(known) if known.moment() == newest.moment() && known.steps == newest.steps => {}
@@ -322,11 +322,11 @@ impl Track {
     }
 }
 
-impl PropShape {
+impl StaticShape {
     fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
-        Self { solid, look: prop.look, position, rotation, body }
+        Self { solid, appearance: prop.appearance, position, rotation, body }
     }
 
     /// Half extents of the axis-aligned bounding box about its position, metres.
@@ -353,7 +353,7 @@ impl Models {
         });
         let extent = self.0[number].1;
         BodyShape {
-            given: Some(number as u32),
+            mesh_index: Some(number as u32),
             middle_m: extent.centre * at.scale,
             radius_m: extent.radius * at.scale,
             mean_area_m2: 0.25 * extent.area * at.scale * at.scale,
@@ -364,7 +364,7 @@ impl Models {
 impl BodyShape {
     fn of(solid: &Solid, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         use std::f64::consts::PI;
-        let given = |mesh: PrimitiveMesh, meshes: &mut Vec<PrimitiveMesh>| {
+        let mesh_index = |mesh: PrimitiveMesh, meshes: &mut Vec<PrimitiveMesh>| {
             let far = mesh.vertices.iter().map(|v| v.core.as_dvec3().length()).fold(0.0, f64::max);
             let area: f64 = mesh
                 .triangles
@@ -375,8 +375,8 @@ impl BodyShape {
                 })
                 .sum();
             meshes.push(mesh);
-            let given = Some(meshes.len() as u32 - 1);
-            Self { given, radius_m: far, mean_area_m2: 0.25 * area, ..Self::default() }
+            let mesh_index = Some(meshes.len() as u32 - 1);
+            Self { mesh_index, radius_m: far, mean_area_m2: 0.25 * area, ..Self::default() }
         };
         let plain = |radius_m: f64, area: f64| Self { radius_m, mean_area_m2: 0.25 * area, ..Self::default() };
         match solid {
@@ -387,8 +387,8 @@ impl BodyShape {
                 plain((r * r + h * h).sqrt(), 2.0 * PI * r * (r + 2.0 * h))
             }
             Solid::Plane => Self::default(),
-            Solid::Hull { points_m } => hull_mesh(points_m).map_or_else(Self::default, |mesh| given(mesh, meshes)),
-            Solid::Mesh { points_m, triangles } => given(creased_mesh(points_m, triangles), meshes),
+            Solid::Hull { points_m } => hull_mesh(points_m).map_or_else(Self::default, |mesh| mesh_index(mesh, meshes)),
+            Solid::Mesh { points_m, triangles } => mesh_index(creased_mesh(points_m, triangles), meshes),
         }
     }
 }

@@ -44,7 +44,7 @@ pub struct SkinRun {
 
 /// Options of adding one skin.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SkinWish {
+pub(super) struct SkinOptions {
     /// The point that positions are relative to, metres.
     pub origin: DVec3,
     /// The instance with its colour.
@@ -77,7 +77,7 @@ struct Face {
 
 /// Reused scratch storage.
 #[derive(Debug, Default)]
-pub(super) struct SkinRoom {
+pub(super) struct SkinScratch {
     normals: Vec<DVec3>,
     faces: Faces,
     /// The sides of a sheet's triangles; after `find_rim` only its border edges, which belong to one triangle.
@@ -94,8 +94,14 @@ impl Skins {
     }
 
     /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
-    pub(super) fn add(&mut self, form: &SurfaceShape, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
-        let SkinWish { origin, instance, shading, edges } = wish;
+    pub(super) fn add(
+        &mut self,
+        form: &SurfaceShape,
+        soft: &SoftState,
+        options: SkinOptions,
+        scratch: &mut SkinScratch,
+    ) {
+        let SkinOptions { origin, instance, shading, edges } = options;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         let corner = |x: &DVec3, n: DVec3| MeshCorner {
             core: (*x - origin).as_vec3().to_array(),
@@ -103,21 +109,21 @@ impl Skins {
             uv: [0.0; 2],
         };
         if form.closed {
-            room.faces.find(form, soft);
+            scratch.faces.find(form, soft);
             let normal = |face: &Face| face.sum.normalize_or(DVec3::Z);
-            let faces = room.faces.all.iter();
+            let faces = scratch.faces.all.iter();
             self.corners.extend(faces.map(|face| corner(&soft.positions[face.vertex as usize], normal(face))));
-            self.triangles.extend(room.faces.triangles.iter().map(|t| t.map(|face| first + face)));
+            self.triangles.extend(scratch.faces.triangles.iter().map(|t| t.map(|face| first + face)));
         } else {
-            room.find_normals(form, soft);
-            let both = || soft.positions.iter().zip(&room.normals);
+            scratch.find_normals(form, soft);
+            let both = || soft.positions.iter().zip(&scratch.normals);
             self.corners.extend(both().map(|(x, n)| corner(x, *n)));
             self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
             let back = first + soft.positions.len() as u32;
             self.corners.extend(both().map(|(x, n)| corner(x, -*n)));
             self.triangles.extend(form.triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
-            room.find_rim(form);
-            for &[a, b] in &room.rim {
+            scratch.find_rim(form);
+            for &[a, b] in &scratch.rim {
                 self.triangles.extend([[first + b, first + a, back + a], [first + b, back + a, back + b]]);
             }
         }
@@ -167,7 +173,7 @@ impl Faces {
     }
 }
 
-impl SkinRoom {
+impl SkinScratch {
     fn find_normals(&mut self, form: &SurfaceShape, soft: &SoftState) {
         self.normals.clear();
         self.normals.resize(soft.positions.len(), DVec3::ZERO);
@@ -248,9 +254,9 @@ mod tests {
     #[test]
     fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
         let (form, soft) = square();
-        let (mut skins, mut room) = (Skins::default(), SkinRoom::default());
-        let wish = SkinWish { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false };
-        skins.add(&form, &soft, wish, &mut room);
+        let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
+        let options = SkinOptions { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false };
+        skins.add(&form, &soft, options, &mut scratch);
         assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
         let thick = |i: u32| {
             let MeshCorner { core, normal, .. } = skins.corners[i as usize];
@@ -288,9 +294,9 @@ mod tests {
     #[test]
     fn a_solid_is_smooth_within_its_sides_and_sharp_at_its_edges() {
         let (form, soft) = cube(0.3);
-        let (mut skins, mut room) = (Skins::default(), SkinRoom::default());
-        let wish = SkinWish { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false };
-        skins.add(&form, &soft, wish, &mut room);
+        let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
+        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false };
+        skins.add(&form, &soft, options, &mut scratch);
         assert_eq!(skins.corners.len(), 24, "three sides meet at each of eight vertices");
         for triangle in &skins.triangles {
             let corners = triangle.map(|corner| &skins.corners[corner as usize]);
@@ -300,7 +306,7 @@ mod tests {
         }
         // no data of the previous body is left in the scratch storage
         skins.clear();
-        skins.add(&form, &soft, wish, &mut room);
+        skins.add(&form, &soft, options, &mut scratch);
         assert_eq!((skins.corners.len(), skins.triangles.len()), (24, 12));
     }
 

@@ -41,7 +41,7 @@ impl SceneView {
 
 impl Painting {
     /// The texture's number and its repeats per metre where the shading draws it; else multiplies the paint's colour by the texture's mean.
-    pub fn lies(&self, paint: &mut Paint, shading: Shading) -> Option<(u32, f32)> {
+    pub fn apply(&self, paint: &mut Paint, shading: Shading) -> Option<(u32, f32)> {
         if shading >= Shading::Textured {
             return Some((self.number, self.wrap));
         }

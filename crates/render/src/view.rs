@@ -86,7 +86,7 @@ impl Camera {
     /// Extrapolates the motion from `before` to this camera by `times` that change, turning about its target as it did.
     /// A camera that jumped (by more than half its distance, or an eighth of a turn) is returned unchanged.
     #[must_use]
-    pub fn carried_on(&self, before: &Self, times: f64) -> Self {
+    pub fn extrapolated(&self, before: &Self, times: f64) -> Self {
         let way = self.target_m - before.target_m;
         let turned = libm::remainder(self.yaw_rad - before.yaw_rad, TAU);
         let tilted = self.pitch_rad - before.pitch_rad;
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_goes_on_as_it_went_is_carried_on_to_where_it_will_be() {
+    fn a_camera_in_steady_motion_is_extrapolated_exactly() {
         // once around in 7 s while the distance shrinks and the target drifts
         let at = |s: f64| Camera {
             target_m: DVec3::new(0.1 * s, 0.0, 1.0),
@@ -287,12 +287,12 @@ mod tests {
             ..camera()
         };
         for s in [0.5, 3.49, 3.51, 6.0] {
-            let seen = at(s).carried_on(&at(s - 0.02), 1.5);
+            let seen = at(s).extrapolated(&at(s - 0.02), 1.5);
             assert!((seen.eye() - at(s + 0.03).eye()).length() < 1e-9, "{s}");
         }
         let cut = Camera { yaw_rad: at(1.0).yaw_rad + 2.0, ..at(1.0) };
-        assert_eq!(cut.carried_on(&at(0.98), 1.5), cut);
-        assert_eq!(at(1.0).carried_on(&at(0.98), f64::NAN), at(1.0));
+        assert_eq!(cut.extrapolated(&at(0.98), 1.5), cut);
+        assert_eq!(at(1.0).extrapolated(&at(0.98), f64::NAN), at(1.0));
     }
 
     #[test]
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_framed_is_seen_and_what_lies_behind_is_not() {
+    fn a_framed_object_is_visible_and_one_behind_the_camera_is_not() {
         let mut camera = camera();
         camera.show(DVec3::ZERO, 0.5, SIZE);
         assert!(camera.frustum(SIZE).sees(DVec3::ZERO, 0.5));
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn no_drag_or_zoom_makes_a_camera_without_numbers() {
+    fn a_camera_stays_finite_under_any_drag_or_zoom() {
         let mut camera = camera();
         for pixels in [1e9, -1e9, 0.0] {
             camera.orbit(DVec2::splat(pixels), SIZE);

@@ -1,6 +1,6 @@
 //! Visibility, screen size and screen speed of every actor: the input of a policy that divides a budget.
 //!
-//! In: posed objects and a camera. Out: one [`Seen`] per actor. Never here: levels.
+//! In: posed objects and a camera. Out: one [`Visibility`] per actor. Never here: levels.
 
 use super::scene_view::{Form, SceneView, Track};
 use super::view::{Camera, Frustum, Size};
@@ -9,7 +9,7 @@ use metachron_core::{AgentId, Body, CurveState};
 
 /// The view of an actor by the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub struct Visibility {
     /// The agent.
     pub id: AgentId,
     /// Whether any part of it may be in the picture.
@@ -33,37 +33,37 @@ pub struct Seen {
 }
 
 impl SceneView {
-    /// Updates [`SceneView::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`SceneView::looked`] lists
+    /// Updates [`SceneView::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`SceneView::updated`] lists
     /// the updated ones). Stores the visibility for [`SceneView::compose`].
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
         self.eye = eye;
         let frustum = camera.frustum(size);
-        self.looked.clear();
+        self.updated.clear();
         for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
-            let view = look(track, camera, (size, &frustum));
+            let view = visibility_of(track, camera, size, &frustum);
             (track.seen, track.fresh) = (view.visible, false);
             if !track.seen {
-                track.glide = None;
+                track.geomorph = None;
             }
             match self.found.get_mut(at) {
                 Some(before) => *before = view,
                 None => self.found.push(view),
             }
-            self.looked.push(at);
+            self.updated.push(at);
         }
     }
 
     /// The indices of the actors that the last [`SceneView::survey`] updated, ascending.
     #[must_use]
-    pub fn looked(&self) -> &[usize] {
-        &self.looked
+    pub fn updated(&self) -> &[usize] {
+        &self.updated
     }
 
     /// Results of the last [`SceneView::survey`], one entry per actor in their order.
     #[must_use]
-    pub fn seen(&self) -> &[Seen] {
+    pub fn seen(&self) -> &[Visibility] {
         &self.found
     }
 
@@ -78,7 +78,7 @@ impl SceneView {
     }
 }
 
-fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Seen {
+fn visibility_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum) -> Visibility {
     let bounds = track.bounds;
     let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
     let visible = !unseen && frustum.sees(bounds.centre, bounds.radius_m);
@@ -89,7 +89,7 @@ fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Se
         Body::Curve(curve) => {
             let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
             let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
-            (curve_pixels(curve, camera, (size, frustum)), speed, tube_measures(curve))
+            (curve_pixels(curve, camera, size, frustum), speed, tube_measures(curve))
         }
         Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
         Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
@@ -102,7 +102,7 @@ fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Se
         }
         Body::Nothing => (0.0, 0.0, None),
     };
-    Seen {
+    Visibility {
         id: track.actor.id,
         visible,
         pixels: if visible { area.clamp(0.0, size.pixels()) } else { 0.0 },
@@ -122,7 +122,7 @@ fn half_diagonal_px(size: Size) -> f64 {
 }
 
 /// Area of a tube on the screen: the sum over segments of projected length times projected width.
-fn curve_pixels(curve: &CurveState, camera: &Camera, (size, frustum): (Size, &Frustum)) -> f64 {
+fn curve_pixels(curve: &CurveState, camera: &Camera, size: Size, frustum: &Frustum) -> f64 {
     let (eye, forward, near_m) = (camera.eye(), camera.forward(), camera.near_m());
     // pixels per metre across the view at a depth of one metre
     let pixels_m = camera.pixels_per_metre(1.0, size);
@@ -150,7 +150,7 @@ fn tube_measures(curve: &CurveState) -> Option<(f64, f64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scene_view::{Actor, Look, Material, States};
+    use super::super::scene_view::{Actor, Appearance, Material, States};
     use super::*;
     use metachron_core::{RigidState, SimTime, Snapshot};
     use metachron_geometry::Solid;
@@ -158,23 +158,23 @@ mod tests {
 
     const SIZE: Size = Size { width: 800, height: 600 };
 
-    fn ball_at(position: DVec3, velocity: DVec3) -> Seen {
-        let look = Look { colour: [200; 3], material: Material::Plastic };
+    fn ball_at(position: DVec3, velocity: DVec3) -> Visibility {
+        let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
-        let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form, look }], vec![]);
+        let mut scene_view = SceneView::new(vec![Actor { id: AgentId(0), form, appearance }], vec![]);
         let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
-        stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
-        stage.pose(SimTime::ZERO, States::Latest);
-        stage.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE);
-        stage.seen()[0]
+        scene_view.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+        scene_view.pose(SimTime::ZERO, States::Latest);
+        scene_view.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE);
+        scene_view.seen()[0]
     }
 
     #[test]
-    fn what_rests_is_posed_and_looked_at_once_and_again_when_the_camera_moves_or_there_is_news() {
-        let look = Look { colour: [200; 3], material: Material::Plastic };
+    fn a_resting_actor_is_posed_once_and_updated_when_the_camera_or_its_state_changes() {
+        let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
-        let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
-        let mut stage = SceneView::new((0..1010).map(actor).collect(), vec![]);
+        let actor = |id| Actor { id: AgentId(id), form: form.clone(), appearance };
+        let mut scene_view = SceneView::new((0..1010).map(actor).collect(), vec![]);
         let state = |id: u32, ms: u64| {
             let position = DVec3::new(f64::from(id), 1e-3 * ms as f64, 0.0);
             let body = Body::Rigid(RigidState { position, ..RigidState::default() });
@@ -183,19 +183,19 @@ mod tests {
         };
         let camera = |x: f64| Camera::looking(DVec3::new(x, -4.0, 0.0), DVec3::new(x, 0.0, 0.0), 0.8);
         let mut plain = SceneView::new((0..1010).map(actor).collect(), vec![]);
-        (0..1010).for_each(|id| plain.see(AgentId(id), &state(id, 0), true));
+        (0..1010).for_each(|id| plain.set_snapshot(AgentId(id), &state(id, 0), true));
         plain.pose(SimTime::ZERO, States::Latest);
         // ten keep moving, a thousand have come to rest
         let mut frame = |ms: u64, news: &[u32], x: f64| {
-            (0..10).for_each(|id| stage.see(AgentId(id), &state(id, ms), true));
-            news.iter().for_each(|id| stage.see(AgentId(*id), &state(*id, ms), false));
-            let posed = stage.pose(SimTime::from_nanos(ms * 1_000_000), States::Interpolate);
-            stage.survey(&camera(x), SIZE);
-            let looks = stage.looked().len();
+            (0..10).for_each(|id| scene_view.set_snapshot(AgentId(id), &state(id, ms), true));
+            news.iter().for_each(|id| scene_view.set_snapshot(AgentId(*id), &state(*id, ms), false));
+            let posed = scene_view.pose(SimTime::from_nanos(ms * 1_000_000), States::Interpolate);
+            scene_view.survey(&camera(x), SIZE);
+            let looks = scene_view.updated().len();
             plain.survey(&camera(x), SIZE);
-            let same = |(a, b): (&Seen, &Seen)| a.id.0 < 10 || a.id.0 == 700 || a == b;
-            assert!(stage.seen().len() == 1010 && stage.seen().iter().zip(plain.seen()).all(same));
-            (posed, looks, (1e3 * stage.seen()[700].centre_m.y).round())
+            let same = |(a, b): (&Visibility, &Visibility)| a.id.0 < 10 || a.id.0 == 700 || a == b;
+            assert!(scene_view.seen().len() == 1010 && scene_view.seen().iter().zip(plain.seen()).all(same));
+            (posed, looks, (1e3 * scene_view.seen()[700].centre_m.y).round())
         };
         let all: Vec<u32> = (10..1010).collect();
         assert_eq!(frame(0, &all, 0.0), (1010, 1010, 0.0));
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_sight_covers_nothing() {
+    fn an_actor_out_of_view_covers_no_pixels() {
         let behind = ball_at(DVec3::new(9.0, 0.0, 0.0), DVec3::ZERO);
         assert!(!behind.visible && behind.pixels == 0.0);
     }

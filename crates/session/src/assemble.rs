@@ -1,6 +1,6 @@
-//! Converts a scene into agents for the runtime and into what the compositor draws.
+//! Converts a scene into agents for the runtime and into what the renderer draws.
 //!
-//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
+//! In: a [`Scene`]. Out: spawns for the runtime, actors and static solids for the renderer, views for control, the declared machine.
 //! Never here: time passing.
 
 use super::cpu_budget::AgentBudget;
@@ -18,7 +18,9 @@ use metachron_lod::control::{
 };
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftShape, SoftSpec};
-use metachron_render::{Actor, Camera, Form, Level, Look, Material, ROPE_LEVEL, SceneView, Seen, StaticObject};
+use metachron_render::{
+    Actor, Appearance, Camera, Form, Level, Material, ROPE_LEVEL, SceneView, StaticObject, Visibility,
+};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
 use metachron_world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
@@ -29,29 +31,29 @@ use std::sync::Arc;
 pub(super) struct Governors {
     share: f64,
     /// The shared data so far.
-    pub steered: Steered,
+    pub controlled: ControlledAgents,
 }
 
 impl Governors {
     /// Of the agents of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let share = fair_share(machine(scene).cores, scene.agents.len());
-        Self { share, steered: Steered::default() }
+        Self { share, controlled: ControlledAgents::default() }
     }
 
     /// The governor of one agent; none where the scene fixes its step and its resolution.
     pub fn governor(&mut self, member: &Member) -> Option<Box<dyn Governor>> {
-        governor(member, self.share, &mut self.steered)
+        governor(member, self.share, &mut self.controlled)
     }
 }
 
 /// Data that the agents' controllers share with the frame loop.
 #[derive(Debug, Default)]
-pub(super) struct Steered {
+pub(super) struct ControlledAgents {
     /// Controllers that keep a rate.
-    pub tallies: Vec<Arc<AgentBudget>>,
+    pub budgets: Vec<Arc<AgentBudget>>,
     /// Controllers that hold an error.
-    pub holdings: Vec<Arc<ErrorStatus>>,
+    pub error_statuses: Vec<Arc<ErrorStatus>>,
 }
 
 /// The share of its period that one agent's work may take, so that all agents fit on `cores` next to the frame loop.
@@ -65,10 +67,10 @@ pub(super) const ROOM: f64 = 0.75;
 const SHARE_MAX: f64 = 0.6;
 
 /// The governor of the agent's dt and ε; none where the scene fixes both.
-fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
+fn governor(member: &Member, share: f64, controlled: &mut ControlledAgents) -> Option<Box<dyn Governor>> {
     let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
     if let Some(tolerance_m) = member.tolerance_m {
-        return error_governor(member, (tolerance_m, meshed), steered);
+        return error_governor(member, tolerance_m, meshed, controlled);
     }
     let limits = RateLimits {
         dt_wanted_s: member.pace.dt.as_secs_f64(),
@@ -80,17 +82,18 @@ fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dy
     if !control.steers() {
         return None;
     }
-    let limits = (control.least_part(), control.share());
-    let tally = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, limits));
-    steered.tallies.push(Arc::clone(&tally));
-    Some(Box::new(RateGovernor(control, tally)))
+    let (least, fair) = (control.least_part(), control.share());
+    let budget = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, least, fair));
+    controlled.budgets.push(Arc::clone(&budget));
+    Some(Box::new(RateGovernor(control, budget)))
 }
 
 /// The governor of an agent with an error tolerance.
 fn error_governor(
     member: &Member,
-    (tolerance_m, meshed): (f64, bool),
-    steered: &mut Steered,
+    tolerance_m: f64,
+    meshed: bool,
+    controlled: &mut ControlledAgents,
 ) -> Option<Box<dyn Governor>> {
     let (least, greatest) = member.pace.dt_range;
     let dt_s = (least.as_secs_f64(), greatest.as_secs_f64());
@@ -100,29 +103,32 @@ fn error_governor(
     if !control.steers() {
         return None;
     }
-    let holding = ErrorStatus::new(member.id, tolerance_m);
-    steered.holdings.push(Arc::clone(&holding));
-    Some(Box::new(ErrorGovernor(control, holding)))
+    let error_status = ErrorStatus::new(member.id, tolerance_m);
+    controlled.error_statuses.push(Arc::clone(&error_status));
+    Some(Box::new(ErrorGovernor(control, error_status)))
 }
 
 /// All drawable objects: agents, then scenery, then the proxies of groups.
-pub fn stage(scene: &Scene) -> SceneView {
-    let agents =
-        scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
+pub fn scene_view(scene: &Scene) -> SceneView {
+    let agents = scene.agents.iter().map(|member| Actor {
+        id: member.id,
+        form: form(&member.spec),
+        appearance: appearance(&member.look),
+    });
     let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
         let form = Form::Scenery(it.model.clone(), it.at);
-        Actor { id: AgentId(id), form, look: look(&it.look) }
+        Actor { id: AgentId(id), form, appearance: appearance(&it.look) }
     });
     let actors = agents.chain(still);
     let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
-    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), look: look(wish) });
-    let mut stage = SceneView::new(actors.collect(), props.collect());
+    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
+    let mut scene_view = SceneView::new(actors.collect(), props.collect());
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
-            stage.paint(AgentId(id), texture);
+            scene_view.paint(AgentId(id), texture);
         }
     }
-    stage
+    scene_view
 }
 
 /// All scenery in the order of its actors.
@@ -152,14 +158,14 @@ fn soft_form(spec: &SoftSpec) -> Form {
     }
 }
 
-const fn look(wish: &metachron_world::Look) -> Look {
+const fn appearance(wish: &metachron_world::Look) -> Appearance {
     let material = match wish.material {
         kinds::Material::Tissue => Material::Tissue,
         kinds::Material::Metal => Material::Metal,
         kinds::Material::Plastic => Material::Plastic,
         kinds::Material::Skin => Material::Skin,
     };
-    Look { colour: wish.colour, material }
+    Appearance { colour: wish.colour, material }
 }
 
 /// The picture controller configured by `scene`.
@@ -228,20 +234,20 @@ pub fn law(target: &metachron_world::Target) -> Law {
     }
 }
 
-/// Updates `views`, control's description of every object on the stage in the order of its actors, for the objects in `looked`.
-pub fn renew(views: &mut Vec<ObjectView>, seen: &[Seen], looked: &[usize], scene: &Scene) {
+/// Updates `views`, control's description of every object of the scene view in the order of its actors, for the objects in `updated`.
+pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], scene: &Scene) {
     if views.len() != seen.len() {
         views.clear();
         views.extend((0..seen.len()).map(|at| view_at(at, &seen[at], scene)));
         return;
     }
-    for &at in looked {
+    for &at in updated {
         views[at] = view_at(at, &seen[at], scene);
     }
 }
 
 /// Actors are agents, then scenery, then groups.
-fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
+fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
     let (agents, members) = (scene.agents.len(), scene.scenery.len());
     if let Some(member) = scene.agents.get(at) {
         return view(seen, member);
@@ -256,9 +262,9 @@ fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
     still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, impostors })
 }
 
-fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
+fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-    let view = view_of(seen, (kind, range), &it.look);
+    let view = view_of(seen, kind, range, &it.look);
     match (it.look.shading, &it.texture) {
         (ShadingKind::Any, Some(_)) => ObjectView { shading: (view.shading.0, control::Shading::Textured), ..view },
         _ => view,
@@ -277,15 +283,15 @@ const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
     }
 }
 
-fn view(seen: &Seen, member: &Member) -> ObjectView {
+fn view(seen: &Visibility, member: &Member) -> ObjectView {
     let kind = match seen.tube_m {
         Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
         None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
     };
-    view_of(seen, (kind, member.picture), &member.look)
+    view_of(seen, kind, member.picture, &member.look)
 }
 
-fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &metachron_world::Look) -> ObjectView {
+fn view_of(seen: &Visibility, kind: Kind, range: ResolutionRange, look: &metachron_world::Look) -> ObjectView {
     ObjectView {
         id: seen.id,
         kind,
@@ -301,8 +307,8 @@ fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &metachron
     }
 }
 
-/// Converts control's demand to the compositor's type.
-pub fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
+/// Converts control's demand to the renderer's type.
+pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
     let shading = match demand.shading {
         control::Shading::Flat => metachron_render::Shading::Flat,
         control::Shading::Gouraud => metachron_render::Shading::Gouraud,
@@ -350,21 +356,21 @@ fn solid_triangles(solid: &Solid, n: u8) -> u32 {
 }
 
 /// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
-pub fn camera(scene: &Scene, stage: &SceneView, seconds: f64) -> Camera {
+pub fn camera(scene: &Scene, scene_view: &SceneView, seconds: f64) -> Camera {
     match &scene.camera {
         Some(camera) => {
             let view = camera.view_at(seconds);
             Camera::looking(view.eye_m, view.look_at_m, view.fov_deg.to_radians())
         }
-        None => overview(stage),
+        None => overview(scene_view),
     }
 }
 
 /// Vertical angle of view of the default camera, radians.
 const OVERVIEW_FOV_RAD: f64 = 0.7;
 
-fn overview(stage: &SceneView) -> Camera {
-    let (centre, radius_m) = stage.bounds(None).unwrap_or((DVec3::ZERO, 1.0));
+fn overview(scene_view: &SceneView) -> Camera {
+    let (centre, radius_m) = scene_view.bounds(None).unwrap_or((DVec3::ZERO, 1.0));
     let distance = 1.1 * radius_m / libm::sin(0.5 * OVERVIEW_FOV_RAD);
     let towards = DVec3::new(0.35, -1.0, 0.55).normalize();
     Camera::looking(centre + towards * distance, centre, OVERVIEW_FOV_RAD)

@@ -1,6 +1,6 @@
 //! Drawing costs on this adapter: measured once and stored in the user's cache.
 //!
-//! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the compositor has it).
+//! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the renderer has it).
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
 use metachron_lod::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};
@@ -14,11 +14,11 @@ const VERSION: u32 = 4;
 
 /// Kinds of cache files: finished prices, and measured pictures that are still too few for prices.
 const DRAWING: &str = "drawing";
-const BEGUN: &str = "begun";
+const PARTIAL: &str = "begun";
 
 /// A file of the cache.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Kept {
+struct CachedPrices {
     version: u32,
     adapter: String,
     frame_s: f64,
@@ -31,7 +31,7 @@ struct Kept {
 
 /// Measured pictures that are still too few for prices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Begun {
+struct PartialBenchmark {
     version: u32,
     adapter: String,
     /// Pixels of the picture, objects, polygons, pixels, number of the shading, seconds.
@@ -39,28 +39,28 @@ struct Begun {
 }
 
 /// Prices of the adapter of this name: from the cache, else measured on the device that `open` returns, and stored; `None` if there is no
-/// such device or it cannot be measured. If a slow adapter leaves too few measurements for prices, the next run continues from them. `tell`
+/// such device or it cannot be measured. If a slow adapter leaves too few measurements for prices, the next run continues from them. `report`
 /// receives a line if anything is measured.
-pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, tell: fn(&str)) -> Option<Prices> {
+pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: fn(&str)) -> Option<Prices> {
     let folder = folder();
     if let Some(known) = folder.as_deref().and_then(|folder| read(folder, adapter)) {
         return Some(known);
     }
     let gpu = &open().filter(|gpu| gpu.describe() == adapter)?;
-    let mut pictures = folder.as_deref().map_or_else(Vec::new, |folder| read_begun(folder, adapter));
+    let mut pictures = folder.as_deref().map_or_else(Vec::new, |folder| read_partial(folder, adapter));
     let left_s = LONGEST_S * metachron_render::benchmark_left(&AREAS_PX, pictures.len());
-    tell(&format!("measuring once what drawing costs here (about {:.0} s)", left_s.max(1.0)));
+    report(&format!("measuring the drawing costs of this adapter, once (about {:.0} s)", left_s.max(1.0)));
     let options = RendererOptions::for_adapter(&gpu.info);
     let drawn = metachron_render::benchmark(gpu, options, &AREAS_PX, pictures.len()).ok()?;
     pictures.extend(drawn.iter().map(measured));
     let prices = Prices::fitted(&pictures);
     match (folder, &prices) {
         (Some(folder), Some(prices)) => {
-            keep(&folder, adapter, prices);
+            store(&folder, adapter, prices);
             // the partial measurement is no longer needed
-            let _ = std::fs::remove_file(file(&folder, adapter, BEGUN));
+            let _ = std::fs::remove_file(file(&folder, adapter, PARTIAL));
         }
-        (Some(folder), None) => keep_begun(&folder, adapter, &pictures),
+        (Some(folder), None) => store_partial(&folder, adapter, &pictures),
         (None, _) => {}
     }
     prices
@@ -95,43 +95,47 @@ fn file(folder: &Path, adapter: &str, what: &str) -> PathBuf {
 }
 
 fn read(folder: &Path, adapter: &str) -> Option<Prices> {
-    let kept: Kept = serde_json::from_slice(&std::fs::read(file(folder, adapter, DRAWING)).ok()?).ok()?;
-    let all = [kept.frame_s, kept.pixel_s].into_iter().chain(kept.shading.into_iter().flatten());
+    let cached: CachedPrices = serde_json::from_slice(&std::fs::read(file(folder, adapter, DRAWING)).ok()?).ok()?;
+    let all = [cached.frame_s, cached.pixel_s].into_iter().chain(cached.shading.into_iter().flatten());
     let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
     let stages = |[setup, polygon, vertex, pixel]: [f64; 4]| Stages { setup, polygon, vertex, pixel };
-    let areas = kept.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
+    let areas = cached.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
     let sound = sound && areas.iter().flatten().all(Areas::is_sound);
-    let prices = Prices { frame_s: kept.frame_s, pixel_s: kept.pixel_s, shading: kept.shading.map(stages), areas };
-    (sound && kept.version == VERSION && kept.adapter == adapter).then_some(prices)
+    let prices =
+        Prices { frame_s: cached.frame_s, pixel_s: cached.pixel_s, shading: cached.shading.map(stages), areas };
+    (sound && cached.version == VERSION && cached.adapter == adapter).then_some(prices)
 }
 
 /// Stores the prices; if that fails they are measured again in the next run.
-fn keep(folder: &Path, adapter: &str, prices: &Prices) {
+fn store(folder: &Path, adapter: &str, prices: &Prices) {
     let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel];
     let Prices { frame_s, pixel_s, shading, areas } = *prices;
     let (adapter_name, shading) = (adapter.to_owned(), shading.map(stages));
     let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
-    let kept = Kept { version: VERSION, adapter: adapter_name, frame_s, pixel_s, shading, areas };
-    write(&file(folder, adapter, DRAWING), &kept);
+    let cached = CachedPrices { version: VERSION, adapter: adapter_name, frame_s, pixel_s, shading, areas };
+    write(&file(folder, adapter, DRAWING), &cached);
 }
 
 /// The pictures measured so far, up to the first invalid one.
-fn read_begun(folder: &Path, adapter: &str) -> Vec<Measured> {
-    let text = std::fs::read(file(folder, adapter, BEGUN)).unwrap_or_default();
-    let Ok(begun) = serde_json::from_slice::<Begun>(&text) else { return Vec::new() };
+fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
+    let text = std::fs::read(file(folder, adapter, PARTIAL)).unwrap_or_default();
+    let Ok(partial) = serde_json::from_slice::<PartialBenchmark>(&text) else { return Vec::new() };
     let picture = |[picture_px, objects, polygons, pixels, shading, seconds]: [f64; 6]| {
         let sound = [picture_px, objects, polygons, pixels, seconds].iter().all(|x| x.is_finite() && *x >= 0.0);
         let shading = Shading::ALL.into_iter().find(|known| f64::from(*known as u8) == shading).filter(|_| sound)?;
         Some(Measured { picture_px, objects, polygons, pixels, shading, seconds })
     };
-    let ours = begun.version == VERSION && begun.adapter == adapter;
-    begun.pictures.into_iter().map_while(picture).filter(|_| ours).collect()
+    let ours = partial.version == VERSION && partial.adapter == adapter;
+    partial.pictures.into_iter().map_while(picture).filter(|_| ours).collect()
 }
 
-fn keep_begun(folder: &Path, adapter: &str, pictures: &[Measured]) {
+fn store_partial(folder: &Path, adapter: &str, pictures: &[Measured]) {
     let row = |p: &Measured| [p.picture_px, p.objects, p.polygons, p.pixels, f64::from(p.shading as u8), p.seconds];
     let pictures = pictures.iter().map(row).collect();
-    write(&file(folder, adapter, BEGUN), &Begun { version: VERSION, adapter: adapter.to_owned(), pictures });
+    write(
+        &file(folder, adapter, PARTIAL),
+        &PartialBenchmark { version: VERSION, adapter: adapter.to_owned(), pictures },
+    );
 }
 
 /// Writes a file atomically, so that no reader sees half of it.
@@ -147,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_too_little_for_prices_is_gone_on_with() {
+    fn a_partial_benchmark_is_continued() {
         let folder = tempfile::tempdir().unwrap();
         let at = |seconds| Measured {
             picture_px: 57_600.0,
@@ -158,25 +162,25 @@ mod tests {
             seconds,
         };
         let pictures = [at(1e-3), Measured { shading: Shading::Textured, objects: 0.0, ..at(2e-3) }];
-        assert_eq!(read_begun(folder.path(), "one"), []);
-        keep_begun(folder.path(), "one", &pictures);
-        assert_eq!(read_begun(folder.path(), "one"), pictures);
-        assert_eq!(read_begun(folder.path(), "two"), []);
+        assert_eq!(read_partial(folder.path(), "one"), []);
+        store_partial(folder.path(), "one", &pictures);
+        assert_eq!(read_partial(folder.path(), "one"), pictures);
+        assert_eq!(read_partial(folder.path(), "two"), []);
         // pictures after an invalid one are measured anew
-        keep_begun(folder.path(), "one", &[at(1e-3), at(-1.0), at(3e-3)]);
-        assert_eq!(read_begun(folder.path(), "one"), [at(1e-3)]);
-        std::fs::write(file(folder.path(), "one", BEGUN), "{").unwrap();
-        assert_eq!(read_begun(folder.path(), "one"), []);
+        store_partial(folder.path(), "one", &[at(1e-3), at(-1.0), at(3e-3)]);
+        assert_eq!(read_partial(folder.path(), "one"), [at(1e-3)]);
+        std::fs::write(file(folder.path(), "one", PARTIAL), "{").unwrap();
+        assert_eq!(read_partial(folder.path(), "one"), []);
     }
 
     #[test]
-    fn prices_come_back_as_they_were_kept_and_nothing_else_does() {
+    fn cached_prices_are_read_back_and_invalid_files_are_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let mut prices = Prices::default();
         prices.shading[1].vertex = 1.25e-7;
         prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
         assert_eq!(read(folder.path(), "one"), None);
-        keep(folder.path(), "one", &prices);
+        store(folder.path(), "one", &prices);
         assert_eq!(read(folder.path(), "one"), Some(prices));
         assert_eq!(read(folder.path(), "two"), None);
         // another adapter's file under this one's name
@@ -186,10 +190,10 @@ mod tests {
             std::fs::write(file(folder.path(), "one", DRAWING), text).unwrap();
             assert_eq!(read(folder.path(), "one"), None, "{text}");
         }
-        keep(folder.path(), "one", &Prices { frame_s: -1.0, ..prices });
+        store(folder.path(), "one", &Prices { frame_s: -1.0, ..prices });
         assert_eq!(read(folder.path(), "one"), None, "a price below nothing");
         let areas = prices.areas.map(|areas| areas.map(|a| Areas { setup: -1.0, ..a }));
-        keep(folder.path(), "one", &Prices { areas, ..prices });
+        store(folder.path(), "one", &Prices { areas, ..prices });
         assert_eq!(read(folder.path(), "one"), None, "one by area below nothing");
     }
 }

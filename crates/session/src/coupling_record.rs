@@ -39,7 +39,7 @@ pub struct Coupling {
     /// to compare.
     pub momentum_error: Option<f64>,
     /// Whether both ledgers were ever seen at the same revision.
-    pub(super) met: bool,
+    pub(super) compared: bool,
     /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
     /// other; `None` where no contact was solved between the two: in an island, which is one solve, and for links, penalties and lines.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
@@ -61,8 +61,8 @@ pub(super) struct Couplings {
     /// Indices of each agent's couplings.
     of: Vec<Vec<usize>>,
     /// Agents with a new state, each once, and the agents coupled to them.
-    heard: Vec<AgentId>,
-    is_heard: Vec<bool>,
+    changed: Vec<AgentId>,
+    is_changed: Vec<bool>,
 }
 
 /// Rigid bodies that share a clock.
@@ -82,7 +82,7 @@ impl Coupling {
             impulse_n_s: 0.0,
             in_flight_n_s: 0.0,
             momentum_error: None,
-            met: false,
+            compared: false,
             inverse_mass_per_kg: None,
             tank_j: None,
             parasitic_kg: 0.0,
@@ -95,7 +95,7 @@ impl Coupling {
         self.kind == ISLAND
     }
 
-    fn see(&mut self, state: &PairState) {
+    fn update(&mut self, state: &PairState) {
         self.contacts = state.contacts;
         self.force_n = state.force_n;
         self.force_max_n = self.force_max_n.max(state.force_n);
@@ -108,9 +108,9 @@ impl Coupling {
         self.parasitic_kg = state.parasitic_kg;
     }
 
-    fn differ(&mut self, error: f64) {
-        self.momentum_error = Some(self.momentum_error.filter(|_| self.met).unwrap_or(0.0).max(error));
-        self.met = true;
+    fn record_error(&mut self, error: f64) {
+        self.momentum_error = Some(self.momentum_error.filter(|_| self.compared).unwrap_or(0.0).max(error));
+        self.compared = true;
     }
 
     /// Compares the ledgers of both sides, which differ by `apart_n_s`.
@@ -119,8 +119,8 @@ impl Coupling {
             return;
         }
         if same_reading {
-            self.differ(apart_n_s / self.impulse_n_s);
-        } else if !self.met {
+            self.record_error(apart_n_s / self.impulse_n_s);
+        } else if !self.compared {
             self.momentum_error = Some((apart_n_s - self.in_flight_n_s).max(0.0) / self.impulse_n_s);
         }
     }
@@ -144,23 +144,23 @@ impl Couplings {
     }
 
     /// Reports a new state of `id`.
-    pub(super) fn hear(&mut self, id: AgentId) {
+    pub(super) fn mark_changed(&mut self, id: AgentId) {
         let at = id.0 as usize;
-        if self.is_heard.len() <= at {
-            self.is_heard.resize(at + 1, false);
+        if self.is_changed.len() <= at {
+            self.is_changed.resize(at + 1, false);
         }
-        if !std::mem::replace(&mut self.is_heard[at], true) {
-            self.heard.push(id);
+        if !std::mem::replace(&mut self.is_changed[at], true) {
+            self.changed.push(id);
         }
     }
 
-    /// Updates the couplings of the agents reported by [`Self::hear`] from the `newest` states; `leader` gives the leader of an agent's
+    /// Updates the couplings of the agents reported by [`Self::mark_changed`] from the `newest` states; `leader` gives the leader of an agent's
     /// island.
     pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
-        self.open_anew();
+        self.reset_changed();
         self.note_resting(&leader);
-        let heard = std::mem::take(&mut self.heard);
-        for &id in &heard {
+        let changed = std::mem::take(&mut self.changed);
+        for &id in &changed {
             let Some(snapshot) = newest.get(id.0 as usize) else { continue };
             self.note_grasp(id, snapshot);
             for state in &snapshot.pairs {
@@ -172,22 +172,22 @@ impl Couplings {
                 coupling.contacts = coupling.contacts.max(1);
             }
         }
-        heard.iter().for_each(|id| self.note_led(*id, leader(*id)));
-        heard.iter().for_each(|id| self.is_heard[id.0 as usize] = false);
-        self.heard = heard;
-        self.heard.clear();
+        changed.iter().for_each(|id| self.note_island_member(*id, leader(*id)));
+        changed.iter().for_each(|id| self.is_changed[id.0 as usize] = false);
+        self.changed = changed;
+        self.changed.clear();
     }
 
     /// Clears the current contacts, force and overlap of the couplings of all reported agents, and adds their peers to the list.
-    fn open_anew(&mut self) {
+    fn reset_changed(&mut self) {
         let of = std::mem::take(&mut self.of);
-        for k in 0..self.heard.len() {
-            for &at in of.get(self.heard[k].0 as usize).into_iter().flatten() {
+        for k in 0..self.changed.len() {
+            for &at in of.get(self.changed[k].0 as usize).into_iter().flatten() {
                 let coupling = &mut self.all[at];
                 (coupling.contacts, coupling.force_n, coupling.penetration_m) = (self.joints[at], 0.0, 0.0);
                 let (a, b) = (coupling.a, coupling.b);
-                self.hear(a);
-                self.hear(b);
+                self.mark_changed(a);
+                self.mark_changed(b);
             }
         }
         self.of = of;
@@ -196,7 +196,7 @@ impl Couplings {
     fn note_resting(&mut self, leader: &impl Fn(AgentId) -> AgentId) {
         let mut resting = std::mem::take(&mut self.resting);
         resting.retain(|&(a, b)| {
-            if ![a, b].iter().any(|id| self.is_heard.get(id.0 as usize) == Some(&true)) {
+            if ![a, b].iter().any(|id| self.is_changed.get(id.0 as usize) == Some(&true)) {
                 return true;
             }
             let together = leader(a) == leader(b);
@@ -211,9 +211,9 @@ impl Couplings {
 
     /// Records an agent that shares an island without having published a bond (it joined before it touched any body) as coupled to its
     /// leader.
-    fn note_led(&mut self, id: AgentId, leader: AgentId) {
-        let told = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
-        if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(told)) {
+    fn note_island_member(&mut self, id: AgentId, leader: AgentId) {
+        let is_recorded = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
+        if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(is_recorded)) {
             self.at(leader, id, ISLAND).contacts = 1;
         }
     }
@@ -239,19 +239,19 @@ impl Couplings {
             let (a, b) = (a.min(b), a.max(b));
             let coupling = self.at(a, b, state.kind.name());
             if owner == a {
-                coupling.see(state);
+                coupling.update(state);
             }
             if greatest > 0.0 {
-                coupling.differ((state.impulse_n_s - back.impulse_n_s).abs() / greatest);
+                coupling.record_error((state.impulse_n_s - back.impulse_n_s).abs() / greatest);
             }
             return;
         }
         let coupling = self.at(a, b, state.kind.name());
-        coupling.see(state);
+        coupling.update(state);
         if held_by_tool {
             coupling.inverse_mass_per_kg = state.inverse_mass_per_kg.map(|[mine, its]| [its, mine]);
         }
-        if let Some((apart_n_s, same_reading)) = difference_n_s((mine, owner), (theirs, other)) {
+        if let Some((apart_n_s, same_reading)) = difference_n_s(mine, owner, theirs, other) {
             coupling.compare(apart_n_s, same_reading);
         }
     }
@@ -286,7 +286,7 @@ fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Op
 }
 
 /// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
-fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<(f64, bool)> {
+fn difference_n_s(mine: &Snapshot, owner: AgentId, theirs: &Snapshot, other: AgentId) -> Option<(f64, bool)> {
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
     let mut apart = DVec3::ZERO;
@@ -310,7 +310,7 @@ mod tests {
 
     /// Reports all `states`, of agents without a shared island.
     fn note(couplings: &mut Couplings, states: &[Arc<Snapshot>]) {
-        (0..).map(AgentId).take(states.len()).for_each(|id| couplings.hear(id));
+        (0..).map(AgentId).take(states.len()).for_each(|id| couplings.mark_changed(id));
         couplings.note(states, |id| id);
     }
 
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn accounts_of_the_same_reading_are_compared_and_others_are_on_their_way() {
+    fn ledgers_of_equal_revision_are_compared_and_others_count_as_in_flight() {
         let mut given = Ledger::new(AgentId(1));
         given.give(Site::Whole, SimTime::ZERO, 0.0, pushed(2.0));
         let early = given.clone();
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn the_two_sides_of_a_penalty_are_one_coupling_with_what_they_differ_by() {
+    fn the_two_sides_of_a_penalty_are_one_coupling_with_their_difference() {
         for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
             let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
             let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_contact_weighs_is_told_in_the_order_of_the_two_names() {
+    fn inverse_masses_are_in_the_order_of_the_two_agents() {
         let scene = two_balls();
         let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
         let still = DVec3::ZERO;
@@ -396,8 +396,8 @@ mod tests {
             let owner = Snapshot { pairs: vec![pair], ..Snapshot::default() };
             let mut couplings = Couplings::of(&scene);
             note(&mut couplings, &[Arc::new(owner), Arc::new(Snapshot { body, ..Snapshot::default() })]);
-            let told = &couplings.all()[0];
-            assert_eq!((told.a.0, told.b.0, told.inverse_mass_per_kg.unwrap()), want, "{kind:?}");
+            let rows = &couplings.all()[0];
+            assert_eq!((rows.a.0, rows.b.0, rows.inverse_mass_per_kg.unwrap()), want, "{kind:?}");
         }
     }
 
@@ -417,19 +417,19 @@ mod tests {
     }
 
     #[test]
-    fn who_shares_a_world_without_having_touched_is_an_island_with_its_leader() {
+    fn an_island_member_without_contact_is_coupled_to_its_leader() {
         let mut couplings = Couplings::of(&two_balls());
         let states = [Arc::default(), Arc::default()];
-        (0..2).for_each(|id| couplings.hear(AgentId(id)));
+        (0..2).for_each(|id| couplings.mark_changed(AgentId(id)));
         couplings.note(&states, |_| AgentId(0));
-        let told = |c: &Couplings| c.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>();
-        assert_eq!(told(&couplings), [(0, 1, "island", 1)]);
+        let rows = |c: &Couplings| c.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>();
+        assert_eq!(rows(&couplings), [(0, 1, "island", 1)]);
         note(&mut couplings, &states);
-        assert_eq!(told(&couplings), [(0, 1, "island", 0)], "it has gone home");
+        assert_eq!(rows(&couplings), [(0, 1, "island", 0)], "the body has left the island");
     }
 
     #[test]
-    fn what_nobody_has_news_of_stays_and_either_side_opens_it_anew() {
+    fn a_coupling_without_new_states_is_kept_and_either_agent_resets_it() {
         let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
         let state = |pairs: Vec<PairState>| Arc::new(Snapshot { pairs, ..Snapshot::default() });
         let mut couplings = Couplings::of(&two_balls());
@@ -439,10 +439,10 @@ mod tests {
         couplings.note(&[], |id| id);
         assert_eq!(couplings.all()[0].contacts, 3);
         // the peer has a new state: the owner is read again
-        couplings.hear(AgentId(1));
+        couplings.mark_changed(AgentId(1));
         couplings.note(&touching, |id| id);
         assert_eq!(couplings.all()[0].contacts, 3);
-        couplings.hear(AgentId(0));
+        couplings.mark_changed(AgentId(0));
         couplings.note(&[Arc::default(), Arc::default()], |id| id);
         assert_eq!((couplings.all().len(), couplings.all()[0].contacts), (1, 0));
     }

@@ -27,14 +27,14 @@ pub(super) struct AgentBudget {
     full: AtomicU64,
     share: AtomicU64,
     /// The finest ε that makes a visible difference, metres, +∞ out of view; bits of f64.
-    plain: AtomicU64,
+    visible_eps: AtomicU64,
 }
 
 impl AgentBudget {
     /// Nothing is reported yet.
-    pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
-        let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
-        Self { id, rate_hz, least, fair, full, share, plain }
+    pub fn new(id: AgentId, rate_hz: f64, least: f64, fair: f64) -> Self {
+        let [full, share, visible_eps] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
+        Self { id, rate_hz, least, fair, full, share, visible_eps }
     }
 
     /// The agent.
@@ -43,17 +43,17 @@ impl AgentBudget {
     }
 
     /// The frame loop sets the finest ε that makes a visible difference, metres.
-    pub fn show(&self, plain_m: f64) {
-        self.plain.store(plain_m.to_bits(), Ordering::Relaxed);
+    pub fn set_visible_eps(&self, visible_eps_m: f64) {
+        self.visible_eps.store(visible_eps_m.to_bits(), Ordering::Relaxed);
     }
 
     /// The finest ε that makes a visible difference, metres, +∞ out of view; 0 until it is set.
-    pub fn plain_m(&self) -> f64 {
-        f64::from_bits(self.plain.load(Ordering::Relaxed))
+    pub fn visible_eps_m(&self) -> f64 {
+        f64::from_bits(self.visible_eps.load(Ordering::Relaxed))
     }
 
     /// The agent reports its load at its finest, as a share of one core.
-    pub fn tell(&self, full: f64) {
+    pub fn report_load(&self, full: f64) {
         self.full.store(full.to_bits(), Ordering::Relaxed);
     }
 
@@ -66,15 +66,24 @@ impl AgentBudget {
         f64::from_bits(self.full.load(Ordering::Relaxed))
     }
 
-    fn allow(&self, share: f64) {
+    fn set_share(&self, share: f64) {
         self.share.store(share.to_bits(), Ordering::Relaxed);
     }
+}
+
+/// The processor time of one frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FramePeriod {
+    /// Cores that agents and the picture share.
+    pub cores: u32,
+    /// Time until the next frame is due, seconds.
+    pub period_s: f64,
 }
 
 /// The processor shared by agents and pictures.
 #[derive(Debug, Default)]
 pub(super) struct CpuBudget {
-    tallies: Vec<Arc<AgentBudget>>,
+    agents: Vec<Arc<AgentBudget>>,
     workers: Vec<Worker>,
     market: Market,
     open: bool,
@@ -87,32 +96,33 @@ const ERROR_LEAST: f64 = 0.01;
 
 impl CpuBudget {
     /// The CPU budget of these agents.
-    pub fn new(tallies: Vec<Arc<AgentBudget>>) -> Self {
-        Self { tallies, ..Self::default() }
+    pub fn new(agents: Vec<Arc<AgentBudget>>) -> Self {
+        Self { agents, ..Self::default() }
     }
 
-    /// Shares the processor for the next frame of `period_s` on so many cores; returns the seconds that the picture may take, `None` if
-    /// there is enough for all. `weight` is the weight of an object in view in the picture's value, pixels.
+    /// Shares the processor for the next frame; returns the seconds that the picture may take, `None` if there is enough for all.
+    /// `weight` is the weight of an object in view in the picture's value, pixels.
     pub fn settle(
         &mut self,
-        (cores, period_s): (u32, f64),
+        frame: FramePeriod,
         drawing: Drawing,
         views: &[ObjectView],
         weight: impl Fn(usize) -> f64,
     ) -> Option<f64> {
+        let FramePeriod { cores, period_s } = frame;
         self.workers.clear();
-        self.workers.extend(self.tallies.iter().map(|tally| {
-            let at = tally.id.0 as usize;
-            let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), tally.rate_hz));
-            Worker { full: period_s * tally.full(), least: tally.least, loss }
+        self.workers.extend(self.agents.iter().map(|agent| {
+            let at = agent.id.0 as usize;
+            let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), agent.rate_hz));
+            Worker { full: period_s * agent.full(), least: agent.least, loss }
         }));
         // the agents' reported work includes waiting for a core: the picture's own core comes on top of their share
         let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
         let settled = self.market.settle(&self.workers, capacity, drawing);
         if settled.is_some() || self.open {
-            for (tally, worker) in self.tallies.iter().zip(&self.workers) {
-                let bought = settled.map(|(lambda, _)| tally.full() * worker.part(lambda));
-                tally.allow(bought.filter(|share| *share > 0.0).unwrap_or(tally.fair));
+            for (agent, worker) in self.agents.iter().zip(&self.workers) {
+                let bought = settled.map(|(lambda, _)| agent.full() * worker.part(lambda));
+                agent.set_share(bought.filter(|share| *share > 0.0).unwrap_or(agent.fair));
             }
         }
         self.open = settled.is_some();
@@ -122,7 +132,7 @@ impl CpuBudget {
     /// Ends the sharing: every agent returns to its fair share.
     pub fn close(&mut self) {
         if std::mem::take(&mut self.open) {
-            self.tallies.iter().for_each(|tally| tally.allow(tally.fair));
+            self.agents.iter().for_each(|agent| agent.set_share(agent.fair));
         }
         self.market = Market::default();
     }

@@ -1,6 +1,6 @@
 //! Agents with an error tolerance: the final state of their controllers, for the report of a run.
 //!
-//! In: the range end at which a controller rests. Out: a [`Held`] per agent, which shows where the tolerance cannot be met. Never here: the
+//! In: the range end at which a controller rests. Out: a [`ToleranceStatus`] per agent, which shows where the tolerance cannot be met. Never here: the
 //! law ([`metachron_lod::control::ErrorControl`]).
 
 use metachron_core::AgentId;
@@ -18,7 +18,7 @@ pub(super) struct ErrorStatus {
 
 /// Whether an agent meets its error tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct ToleranceStatus {
     /// The tolerance, metres.
     pub tolerance_m: f64,
     /// The end of its ranges at which the controller rested; `None` between the ends.
@@ -32,7 +32,7 @@ impl ErrorStatus {
     }
 
     /// Publishes where the controller rests.
-    pub fn tell(&self, rests: Option<Bound>) {
+    pub fn publish(&self, rests: Option<Bound>) {
         let number = match rests {
             None => 0,
             Some(Bound::Finest) => 1,
@@ -41,17 +41,17 @@ impl ErrorStatus {
         self.rests.store(number, Ordering::Relaxed);
     }
 
-    fn held(&self) -> Held {
+    fn tolerance_status(&self) -> ToleranceStatus {
         let rests = match self.rests.load(Ordering::Relaxed) {
             1 => Some(Bound::Finest),
             2 => Some(Bound::Coarsest),
             _ => None,
         };
-        Held { tolerance_m: self.tolerance_m, rests }
+        ToleranceStatus { tolerance_m: self.tolerance_m, rests }
     }
 }
 
 /// Whether this agent meets its tolerance; `None` for an agent without one.
-pub(super) fn held(all: &[Arc<ErrorStatus>], agent: AgentId) -> Option<Held> {
-    all.iter().find(|one| one.agent == agent).map(|one| one.held())
+pub(super) fn tolerance_status(all: &[Arc<ErrorStatus>], agent: AgentId) -> Option<ToleranceStatus> {
+    all.iter().find(|one| one.agent == agent).map(|one| one.tolerance_status())
 }

@@ -7,7 +7,7 @@
 //! be separated from a drift of the scene.
 
 use super::error::SessionError;
-use super::headless::{Drawing, one_frame};
+use super::headless::{Drawing, PictureFormat, one_frame};
 use super::session::Session;
 use metachron_lod::control::{Law, PictureControl, Policy};
 use metachron_lod::tune::Observed;
@@ -25,7 +25,7 @@ pub struct Experiment {
 }
 
 /// Result of an experiment.
-pub struct Experimented {
+pub struct ExperimentResult {
     /// Its frames, without those of the warm-up.
     pub observed: Vec<Observed>,
     /// The adapter that drew; `None` where costs were declared.
@@ -52,7 +52,7 @@ pub fn experiment(
     mut session: Session,
     mut plan: Experiment,
     go_on: &mut dyn FnMut(f64) -> bool,
-) -> Result<Experimented, SessionError> {
+) -> Result<ExperimentResult, SessionError> {
     session.begin();
     let period = session.period();
     let mut design = Design::begin(session.control(), plan.frames);
@@ -60,14 +60,19 @@ pub fn experiment(
     while design.done() < 1.0 && !interrupted {
         session.wait_until(due);
         design.choose(session.control());
-        let record = one_frame(&mut session, (plan.size, Style::default()), &mut plan.drawing, true)?;
+        let record = one_frame(
+            &mut session,
+            PictureFormat { size: plan.size, style: Style::default() },
+            &mut plan.drawing,
+            true,
+        )?;
         design.note(&mut session, 1e-3 * record.frame_ms);
         interrupted = !go_on(design.done());
         due = (due + period).max(session.now());
     }
     let finished = design.done() >= 1.0;
     let adapter = plan.drawing.adapter();
-    Ok(Experimented { observed: design.observed, adapter, interrupted: interrupted && !finished })
+    Ok(ExperimentResult { observed: design.observed, adapter, interrupted: interrupted && !finished })
 }
 
 /// The experiment, frame by frame.

@@ -5,7 +5,7 @@
 //! In lockstep a frame takes its declared time, and only the requested pictures are drawn.
 
 use super::error::SessionError;
-use super::headless::{Drawing, frame_seen_by};
+use super::headless::{Drawing, PictureFormat, frame_seen_by};
 use super::outcome::FrameRecord;
 use super::session::Session;
 use metachron_render::{Camera, PictureFile, Size, Style};
@@ -13,7 +13,7 @@ use metachron_runtime::Drive;
 use metachron_world::Scene;
 
 /// A walk through a scene.
-pub struct Walk {
+pub struct FlyThrough {
     session: Session,
     drawing: Drawing,
     size: Size,
@@ -22,7 +22,7 @@ pub struct Walk {
     camera: Camera,
 }
 
-impl Walk {
+impl FlyThrough {
     /// Opens `scene` for pictures of `size`, with the prices of the adapter that draws every frame.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ impl Walk {
         session.drive(Drive::Pause);
         if let Drawing::Every(screen) = &drawing {
             let gpu = screen.gpu();
-            session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu.clone()));
+            session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
         }
         let camera = session.camera_at(0.0);
         Ok(Self { session, drawing, size, length_s, camera })
@@ -50,8 +50,8 @@ impl Walk {
     /// [`SessionError::Draw`] where the adapter fails.
     pub fn step(&mut self, part: f64) -> Result<FrameRecord, SessionError> {
         self.camera = self.session.camera_at(part * self.length_s);
-        let view = (self.size, Style::default());
-        frame_seen_by(&mut self.session, &self.camera, view, (&mut self.drawing, false))
+        let format = PictureFormat { size: self.size, style: Style::default() };
+        frame_seen_by(&mut self.session, &self.camera, format, &mut self.drawing, false)
     }
 
     /// The picture of the last frame; `None` where nothing draws.

@@ -15,9 +15,9 @@ pub(super) struct RateGovernor(pub RateControl, pub Arc<AgentBudget>);
 
 impl Governor for RateGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
-        let Self(control, tally) = self;
-        control.set_share(tally.share());
-        control.set_plain(tally.plain_m());
+        let Self(control, budget) = self;
+        control.set_share(budget.share());
+        control.set_plain(budget.visible_eps_m());
         let turn = control::TurnMeasure {
             work_s: measure.work_s,
             wanted_period_s: measure.wanted_period_s,
@@ -26,7 +26,7 @@ impl Governor for RateGovernor {
         };
         let demand = control.after_turn(&turn);
         if let Some(load) = control.full_load() {
-            tally.tell(load);
+            budget.report_load(load);
         }
         demanded(demand, measure)
     }
@@ -37,12 +37,12 @@ pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<ErrorStatus>);
 
 impl Governor for ErrorGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
-        let Self(control, holding) = self;
+        let Self(control, status) = self;
         let TurnMeasure { residual_m, drift_m, .. } = *measure;
         let space_m = (residual_m - drift_m).max(0.0);
         let turn = ErrorMeasure { space_m, time_m: drift_m, dt_s: measure.dt.as_secs_f64() };
         let demand = control.after_turn(&turn);
-        holding.tell(control.rest());
+        status.publish(control.rest());
         demanded(demand, measure)
     }
 }

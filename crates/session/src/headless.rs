@@ -43,6 +43,15 @@ impl Drawing {
     }
 }
 
+/// Size and style of the pictures of a run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PictureFormat {
+    /// Size in pixels.
+    pub size: Size,
+    /// How they are drawn.
+    pub style: Style,
+}
+
 /// A run without a window.
 pub struct Headless {
     /// When it ends.
@@ -80,7 +89,8 @@ pub fn play_headless(
         if done >= 1.0 || interrupted {
             break;
         }
-        let record = one_frame(&mut session, (plan.size, plan.style), &mut plan.drawing, false)?;
+        let format = PictureFormat { size: plan.size, style: plan.style };
+        let record = one_frame(&mut session, format, &mut plan.drawing, false)?;
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
     }
@@ -98,7 +108,7 @@ pub fn play_headless(
 fn warm_up(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
     if let Drawing::Every(screen) = &mut plan.drawing {
         let gpu = screen.gpu().clone();
-        session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu));
+        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu));
         let camera = session.scene_camera();
         session.compose(&camera, plan.size, plan.style, None);
         screen.render(session.picture(), &camera).map_err(SessionError::Draw)?;
@@ -117,22 +127,24 @@ fn share_done(session: &Session, end: End) -> f64 {
 /// Gathers, chooses, draws and updates the controller, unless it must not learn from this frame (`skip`).
 pub(super) fn one_frame(
     session: &mut Session,
-    (size, style): (Size, Style),
+    format: PictureFormat,
     drawing: &mut Drawing,
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
     let camera = session.scene_camera();
-    let camera = session.ahead(camera);
-    frame_seen_by(session, &camera, (size, style), (drawing, skip))
+    let camera = session.predict_camera(camera);
+    frame_seen_by(session, &camera, format, drawing, skip)
 }
 
 /// As [`one_frame`], seen by `camera` instead of the scene's camera.
 pub(super) fn frame_seen_by(
     session: &mut Session,
     camera: &Camera,
-    (size, style): (Size, Style),
-    (drawing, skip): (&mut Drawing, bool),
+    format: PictureFormat,
+    drawing: &mut Drawing,
+    skip: bool,
 ) -> Result<FrameRecord, SessionError> {
+    let PictureFormat { size, style } = format;
     let started = session.now();
     session.compose(camera, size, style, None);
     let (draw, gpu) = match drawing {
@@ -140,12 +152,12 @@ pub(super) fn frame_seen_by(
         Drawing::Every(screen) => {
             let composed = session.now();
             screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
-            session.choose_beside(camera, size);
+            session.choose_next_frame(camera, size);
             let gpu = screen.wait().map_err(SessionError::Draw)?;
             (session.now().saturating_sub(composed), gpu)
         }
         _ => {
-            session.choose_beside(camera, size);
+            session.choose_next_frame(camera, size);
             (session.spend_declared(size), None)
         }
     };

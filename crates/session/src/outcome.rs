@@ -3,7 +3,7 @@
 //! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
 
 use super::coupling_record::Coupling;
-use super::error_control::Held;
+use super::error_control::ToleranceStatus;
 use super::trace::Trace;
 use glam::DVec3;
 use metachron_core::Resolution;
@@ -76,7 +76,7 @@ pub struct AgentOutcome {
     /// The resolution it was last drawn at; `None` where it has no picture.
     pub picture: Option<Resolution>,
     /// How it meets its error tolerance; `None` without one.
-    pub held: Option<Held>,
+    pub tolerance: Option<ToleranceStatus>,
 }
 
 /// A run that has ended.

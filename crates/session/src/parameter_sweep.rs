@@ -88,7 +88,7 @@ pub fn apply(scene: &mut Scene, agent: AgentId, setting: &Setting) {
             tube.integrator = Integrator::ALL[setting.method];
             (member.simulation, member.start) = (range, tube.resolution);
         }
-        Spec::Soft(soft) if setting.pieces > 0 => divide(&mut soft.shape, setting.pieces),
+        Spec::Soft(soft) if setting.pieces > 0 => set_cells(&mut soft.shape, setting.pieces),
         _ => {}
     }
 }
@@ -102,7 +102,7 @@ pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
     if !plain || !member.links.is_empty() {
         return false;
     }
-    let Some(path_m) = course(tube) else { return false };
+    let Some(path_m) = centre_line(tube) else { return false };
     let radius_m = tube.section.radius_m;
     let area_m2 = PI * radius_m * radius_m;
     let held = [Side::Left, Side::Right].into_iter().zip([0, 1]);
@@ -131,7 +131,7 @@ pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
 }
 
 /// The points of a tube's smooth centre line at rest.
-fn course(tube: &TubeSpec) -> Option<Vec<glam::DVec3>> {
+fn centre_line(tube: &TubeSpec) -> Option<Vec<glam::DVec3>> {
     let mut snapshot = Snapshot::default();
     Tube::new(tube.clone()).ok()?.write_snapshot(&mut snapshot);
     if let Body::Curve(curve) = snapshot.body { Some(curve.positions) } else { None }
@@ -154,7 +154,7 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
 }
 
 /// Divides a body into `most` cells along its most divided axis, and in proportion along the others.
-fn divide(shape: &mut SoftShape, most: u32) {
+fn set_cells(shape: &mut SoftShape, most: u32) {
     let greatest = cells(shape).into_iter().max().unwrap_or(1).max(1);
     let scaled = |count: u32| (f64::from(count * most) / f64::from(greatest)).round().max(1.0) as u32;
     match shape {
@@ -185,7 +185,7 @@ pub fn play_points(
     let looks = (seconds / LOOK_S).ceil().max(1.0);
     for look in 1..=looks as u32 {
         session.wait_until(Duration::from_secs_f64(seconds * f64::from(look) / looks));
-        session.look();
+        session.read_states();
         if !go_on() {
             return Ok(None);
         }

@@ -1,6 +1,6 @@
 //! The coupling error of a run: the same scene once more on one very short common step, and the differences.
 //!
-//! In: a scene and the [`Trace`] of its run. Out: an [`Oracle`]. Never here: arguments, progress bars.
+//! In: a scene and the [`Trace`] of its run. Out: an [`ReferenceComparison`]. Never here: arguments, progress bars.
 //!
 //! In the second run every agent makes the same steps, a quarter of the shortest requested by any agent, in virtual time at no cost,
 //! without faults and without control of rates and resolutions. The difference of both runs is the error of different clocks, of longer
@@ -10,7 +10,7 @@ use super::coupling_record::Coupling;
 use super::error::SessionError;
 use super::outcome::Outcome;
 use super::session::Session;
-use super::trace::{Trace, Traced, mass_kg, momentum, points};
+use super::trace::{Trace, TracedState, mass_kg, momentum, points};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_scene::format::MODELS;
 use metachron_world::Scene;
@@ -28,7 +28,7 @@ const STEP_MAX_S: f64 = 2e-3;
 
 /// Effect of different clocks.
 #[derive(Debug, Clone)]
-pub struct Oracle {
+pub struct ReferenceComparison {
     /// Step of the common clock, seconds.
     pub dt_s: f64,
     /// Simulated seconds that both runs have played: the whole run, unless the comparison was ended early.
@@ -74,50 +74,50 @@ struct Distance {
 ///
 /// # Errors
 /// As [`Session::open`].
-pub fn consult_oracle(
+pub fn compare_with_reference(
     scene: &Scene,
     outcome: &Outcome,
     go_on: &mut dyn FnMut(f64) -> bool,
-) -> Result<Oracle, SessionError> {
-    consult(scene, outcome, &mut Vec::new(), go_on)
+) -> Result<ReferenceComparison, SessionError> {
+    compare_runs(scene, outcome, &mut Vec::new(), go_on)
 }
 
-fn consult(
+fn compare_runs(
     scene: &Scene,
     outcome: &Outcome,
     distances: &mut Vec<Distance>,
     go_on: &mut dyn FnMut(f64) -> bool,
-) -> Result<Oracle, SessionError> {
+) -> Result<ReferenceComparison, SessionError> {
     let common = common_clock(scene);
     let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
     let mut session = Session::open(common)?;
     let empty = Trace::default();
     let trace = outcome.trace.as_ref().unwrap_or(&empty);
-    let mut states: Vec<&Traced> = trace.states.iter().collect();
+    let mut states: Vec<&TracedState> = trace.states.iter().collect();
     states.sort_by_key(|state| (state.moment, state.agent));
     distances.resize(scene.agents.len(), Distance::default());
     let mut cut = None;
-    let mut looked = Duration::ZERO;
+    let mut updated = Duration::ZERO;
     for (at, state) in states.iter().enumerate() {
         session.wait_until(Duration::from_nanos(state.moment.as_nanos()));
         compare(&session, state, distances);
         // couplings are published for a second after they end: reading every frame misses none
-        if session.now() >= looked {
-            session.look();
-            looked = session.now() + session.period();
+        if session.now() >= updated {
+            session.read_states();
+            updated = session.now() + session.period();
             if !go_on(at as f64 / states.len() as f64) {
                 cut = Some(state.moment);
                 break;
             }
         }
     }
-    session.look();
+    session.read_states();
     // a shorter run has exchanged less: compare up to the same time
     let run = cut.map(|time| trace.couplings_by(time, &outcome.couplings));
     let pairs = pairs(run.as_ref().unwrap_or(&outcome.couplings), session.couplings(), distances);
     let sim_s = cut.map_or(outcome.sim_s, SimTime::as_secs_f64);
     let states = distances.iter().map(|d| d.points).sum();
-    Ok(Oracle { dt_s, sim_s, states, pairs, interrupted: cut.is_some() })
+    Ok(ReferenceComparison { dt_s, sim_s, states, pairs, interrupted: cut.is_some() })
 }
 
 /// The same scene with one clock for all agents, free steps and no faults.
@@ -143,7 +143,7 @@ fn common_clock(scene: &Scene) -> Scene {
 }
 
 /// Adds the distance of an agent on the common clock from its position in the run at the same time.
-fn compare(session: &Session, state: &Traced, distances: &mut [Distance]) {
+fn compare(session: &Session, state: &TracedState, distances: &mut [Distance]) {
     let at = state.agent.0 as usize;
     let (Some(agent), Some(distance)) = (session.agents().get(at), distances.get_mut(at)) else { return };
     let snapshot: &Snapshot = &agent.latest();
@@ -245,11 +245,11 @@ mod tests {
     }
 
     #[test]
-    fn a_comparison_that_is_cut_short_is_of_what_both_runs_have_played() {
+    fn an_interrupted_comparison_covers_the_time_that_both_runs_played() {
         let scene = two_blows();
         let outcome = played(&scene, 60);
         let until = |share: f64| {
-            consult_oracle(&scene, &outcome, &mut |done| done < share)
+            compare_with_reference(&scene, &outcome, &mut |done| done < share)
                 .map(|o| (o.sim_s, o.interrupted, o.pairs))
                 .unwrap()
         };
@@ -273,7 +273,7 @@ mod tests {
         session.begin();
         for frame in 0..frames {
             session.wait_until(session.period() * frame);
-            session.look();
+            session.read_states();
         }
         session.end(None, false)
     }
@@ -282,15 +282,15 @@ mod tests {
     fn states_of_free_fall_are_compared_at_their_own_times() {
         let scene = falling();
         let outcome = played(&scene, 30);
-        let mut told = 0;
+        let mut calls = 0;
         let mut distances = Vec::new();
-        let oracle = consult(&scene, &outcome, &mut distances, &mut |_| {
-            told += 1;
+        let oracle = compare_runs(&scene, &outcome, &mut distances, &mut |_| {
+            calls += 1;
             true
         });
         // free flight is exact at any step; between ticks of 0.5 ms it is interpolated linearly: g dt²/2 = 1.2 µm
         let states = oracle.unwrap().states;
-        assert!(states > 40 && told > 5 && !distances.is_empty(), "{states} states, told {told} times");
+        assert!(states > 40 && calls > 5 && !distances.is_empty(), "{states} states, told {calls} times");
         for distance in distances {
             assert!(distance.max_m < 2e-6 && distance.momentum_max_n_s < 1e-6, "{distance:?}");
         }

@@ -1,4 +1,4 @@
-//! A running scene: the runtime, the controller and the stage of one run, connected.
+//! A running scene: the runtime, the controller and the scene view of one run, connected.
 //!
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by the caller, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
@@ -37,13 +37,13 @@ pub struct Session {
     /// Drawing costs on the declared machine.
     declared: Prices,
     world: World,
-    stage: SceneView,
+    scene_view: SceneView,
     control: PictureControl,
     /// Whether pictures are drawn on the processor that agents step on.
     shares_processor: bool,
-    purse: CpuBudget,
-    holdings: Vec<Arc<ErrorStatus>>,
-    sight: VisibleResolution,
+    cpu_budget: CpuBudget,
+    error_statuses: Vec<Arc<ErrorStatus>>,
+    visible_resolution: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
     levels: Vec<Level>,
@@ -53,9 +53,9 @@ pub struct Session {
     chosen: Chosen,
     last_start: Option<Duration>,
     /// Time and position of the camera at its last reading.
-    lens: Option<(Duration, Camera)>,
+    last_camera: Option<(Duration, Camera)>,
     /// Predicted camera of the next frame at the time when its picture is finished.
-    next_eye: Option<Camera>,
+    next_camera: Option<Camera>,
     /// Time from reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
     /// When real time began to pass.
@@ -66,7 +66,7 @@ pub struct Session {
     /// Whether default drawing prices replace those of the adapter.
     unpriced: bool,
     /// Receives a line if start-up takes long.
-    tell: fn(&str),
+    report_progress: fn(&str),
 }
 
 /// Times of a finished frame.
@@ -93,7 +93,7 @@ struct Chosen {
     /// Choosing levels before the picture is made.
     select: Duration,
     /// Choosing those of the next frame during the drawing of this one.
-    beside: Option<Duration>,
+    select_next: Option<Duration>,
     /// Making the picture at these levels.
     build: Duration,
     /// Triangles without a chosen level: fixed solids, the floor, the caps of tubes.
@@ -112,7 +112,7 @@ const WARM_UP_FRAMES: u64 = 3;
 const LAG_NEWS: f64 = 0.2;
 
 /// Frames over which meshes blend to a new level.
-const GLIDE_FRAMES: u8 = 6;
+const GEOMORPH_FRAMES: u8 = 6;
 
 impl Session {
     /// Creates the agents of `scene`; real time is held until [`Session::begin`].
@@ -124,17 +124,17 @@ impl Session {
         let mut governors = assemble::Governors::of(&scene);
         let world = World::start_governed(&scene, scene.executor, &mut |member| governors.governor(member))?;
         scene.executor = world.executor();
-        let steered = governors.steered;
-        let mut stage = assemble::stage(&scene);
-        stage.glide_over(GLIDE_FRAMES);
+        let controlled = governors.controlled;
+        let mut scene_view = assemble::scene_view(&scene);
+        scene_view.set_geomorph_frames(GEOMORPH_FRAMES);
         Ok(Self {
             control: assemble::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep,
-            sight: VisibleResolution::new(&steered.tallies),
-            purse: CpuBudget::new(steered.tallies),
-            holdings: steered.holdings,
+            visible_resolution: VisibleResolution::new(&controlled.budgets),
+            cpu_budget: CpuBudget::new(controlled.budgets),
+            error_statuses: controlled.error_statuses,
             reader: Reader::new(world.agents()),
-            stage,
+            scene_view,
             declared: assemble::prices(&machine.draw),
             machine,
             world,
@@ -145,15 +145,15 @@ impl Session {
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
-            lens: None,
-            next_eye: None,
+            last_camera: None,
+            next_camera: None,
             lag_s: 0.0,
             begun: Duration::ZERO,
             warm_up: 0,
             finished: 0,
             keep: usize::MAX,
             unpriced: false,
-            tell: |_| {},
+            report_progress: |_| {},
             scene,
         })
     }
@@ -221,18 +221,18 @@ impl Session {
         &mut self.control
     }
 
-    /// Reports a long start-up through `tell`; without it nothing is reported.
-    pub fn tell_by(&mut self, tell: fn(&str)) {
-        self.tell = tell;
+    /// Reports a long start-up through `report`; without it nothing is reported.
+    pub fn report_start_up(&mut self, report: fn(&str)) {
+        self.report_progress = report;
     }
 
     #[cfg(feature = "picture")]
     /// Applies the prices of the adapter that draws, if they are known or can be measured; declared costs stay as they are. `on_processor`:
     /// the adapter draws on the processor.
-    pub fn calibrate(&mut self, (adapter, on_processor): (&str, bool), open: impl FnOnce() -> Option<Gpu>) {
+    pub fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
         self.shares_processor |= on_processor;
         if self.control.policy().predicts() && !self.is_virtual() {
-            let prices = calibrate::prices(adapter, open, self.tell);
+            let prices = calibrate::prices(adapter, open, self.report_progress);
             self.unpriced = prices.is_none();
             prices.into_iter().for_each(|prices| self.control.set_prices(prices));
         }
@@ -280,14 +280,14 @@ impl Session {
 
     /// All drawable objects.
     #[must_use]
-    pub const fn stage(&self) -> &SceneView {
-        &self.stage
+    pub const fn scene_view(&self) -> &SceneView {
+        &self.scene_view
     }
 
     /// The picture composed last.
     #[must_use]
     pub fn picture(&self) -> &Picture {
-        self.stage.picture()
+        self.scene_view.picture()
     }
 
     /// The objects last reported to control.
@@ -311,7 +311,7 @@ impl Session {
     /// The scene's own camera so many seconds after the start.
     #[must_use]
     pub fn camera_at(&self, seconds: f64) -> Camera {
-        assemble::camera(&self.scene, &self.stage, seconds)
+        assemble::camera(&self.scene, &self.scene_view, seconds)
     }
 
     /// Waits until the wall time `until`, while the agents run.
@@ -355,7 +355,7 @@ impl Session {
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
         self.warm_up += usize::from(cold);
-        self.remember(record);
+        self.store(record);
         self.control.observe(FrameWork { work, draw, skip: skip || cold });
         record
     }
@@ -365,7 +365,7 @@ impl Session {
         self.last_start = None;
     }
 
-    fn remember(&mut self, record: FrameRecord) {
+    fn store(&mut self, record: FrameRecord) {
         self.records.push(record);
         if self.records.len() >= self.keep.saturating_mul(2) {
             let old = self.records.len() - self.keep;
@@ -384,7 +384,7 @@ impl Session {
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
-        let held = |at: usize| error_control::held(&self.holdings, AgentId(at as u32));
+        let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
         Outcome {
             scene,
@@ -405,7 +405,7 @@ impl Session {
             agents: stats
                 .into_iter()
                 .enumerate()
-                .map(|(at, stats)| AgentOutcome { picture: drawn(at), held: held(at), stats })
+                .map(|(at, stats)| AgentOutcome { picture: drawn(at), tolerance: tolerance(at), stats })
                 .collect(),
             couplings: self.couplings.all().to_vec(),
             trace: self.trace,
@@ -416,7 +416,7 @@ impl Session {
     }
 
     /// Reads the newest states without a frame: for their couplings.
-    pub fn look(&mut self) {
+    pub fn read_states(&mut self) {
         self.gather();
     }
 
@@ -433,12 +433,12 @@ impl Session {
 
     fn gather(&mut self) {
         let now = self.world.time();
-        let (stage, couplings) = (&mut self.stage, &mut self.couplings);
+        let (scene_view, couplings) = (&mut self.scene_view, &mut self.couplings);
         self.reader.read(self.world.agents(), now, |agent, newest, awake| {
-            stage.see(agent.id(), newest, awake);
-            couplings.hear(agent.id());
+            scene_view.set_snapshot(agent.id(), newest, awake);
+            couplings.mark_changed(agent.id());
         });
-        self.stage.pose(now, states(self.scene.states));
+        self.scene_view.pose(now, states(self.scene.states));
         self.chosen.sim = now;
         let agents = self.world.agents();
         let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);

@@ -4,7 +4,7 @@
 //! repetitions. Never here: their prediction ([`metachron_lod::tune`] does that).
 
 use super::error::SessionError;
-use super::headless::{Drawing, one_frame};
+use super::headless::{Drawing, PictureFormat, one_frame};
 use super::session::Session;
 use metachron_lod::control::{Law, Policy};
 use metachron_render::{Size, Style};
@@ -66,7 +66,12 @@ fn watch(session: &mut Session, pushes: &mut Pushes) -> Result<Vec<After>, Sessi
     let mut frames = Vec::new();
     while (session.now() - start).as_secs_f64() < pushes.watch_s {
         session.wait_until(due);
-        let record = one_frame(session, (pushes.size, Style::default()), &mut pushes.drawing, false)?;
+        let record = one_frame(
+            session,
+            PictureFormat { size: pushes.size, style: Style::default() },
+            &mut pushes.drawing,
+            false,
+        )?;
         frames.push(((session.now() - start).as_secs_f64(), 1e-3 * record.frame_ms));
         due = (due + session.period()).max(session.now());
     }

@@ -15,7 +15,7 @@ const TUBE_POINTS: u32 = 9;
 /// States of the agents in a run.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
-    pub(super) states: Vec<Traced>,
+    pub(super) states: Vec<TracedState>,
     last: Vec<Option<SimTime>>,
     /// Total impulses exchanged, with the time of the run and the index of the coupling, whenever one has grown.
     exchanged: Vec<(SimTime, usize, f64)>,
@@ -25,7 +25,7 @@ pub struct Trace {
 
 /// One state of one agent.
 #[derive(Debug, Clone)]
-pub(super) struct Traced {
+pub(super) struct TracedState {
     pub(super) agent: AgentId,
     /// Its moment in scene time: the agent's own time plus the time it was put off.
     pub(super) moment: SimTime,
@@ -47,7 +47,7 @@ impl Trace {
             *last = Some(moment);
             let points_m = points(&snapshot.body).map(|(at, _)| at).collect();
             let momentum = momentum(&member.spec, &snapshot.body);
-            self.states.push(Traced { agent: member.id, moment, points_m, momentum });
+            self.states.push(TracedState { agent: member.id, moment, points_m, momentum });
         }
     }
 
@@ -81,7 +81,7 @@ pub(super) fn points(body: &Body) -> impl Iterator<Item = (DVec3, DVec3)> {
 pub(super) fn momentum(spec: &Spec, body: &Body) -> DVec3 {
     match (spec, body) {
         (Spec::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
-        (Spec::Tube(spec), Body::Curve(curve)) => flow(curve) * spec.section.mass_per_length_kg_m,
+        (Spec::Tube(spec), Body::Curve(curve)) => velocity_integral(curve) * spec.section.mass_per_length_kg_m,
         _ => DVec3::ZERO,
     }
 }
@@ -98,7 +98,7 @@ pub(super) fn mass_kg(spec: &Spec, body: &Body) -> f64 {
 }
 
 /// Velocity summed along the rest length, m²/s: exact for a velocity that is linear between nodes.
-fn flow(curve: &CurveState) -> DVec3 {
+fn velocity_integral(curve: &CurveState) -> DVec3 {
     let pairs = curve.arc_m.windows(2).zip(curve.velocities.windows(2));
     pairs.map(|(arc, velocity)| 0.5 * (arc[1] - arc[0]) * (velocity[0] + velocity[1])).sum()
 }
@@ -110,7 +110,7 @@ mod tests {
     use metachron_scene::{Source, load};
 
     #[test]
-    fn who_takes_another_time_for_its_own_is_traced_on_by_the_scenes() {
+    fn a_trace_follows_scene_time_when_an_agents_clock_jumps() {
         let text = "format = 1\nobject = [{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 }]\n";
         let scene = Source::memory("ball", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
         let at = |ms: u64| SimTime::ZERO + SimSpan::from_nanos(ms * 1_000_000);
@@ -130,10 +130,10 @@ mod tests {
     }
 
     #[test]
-    fn the_flow_of_a_turning_line_is_its_middles() {
+    fn the_flow_of_a_turning_line_is_length_times_mean_velocity() {
         let arc_m = vec![0.0, 0.1, 0.3, 1.0];
         let velocities = arc_m.iter().map(|s| DVec3::Y * (2.0 * s)).collect();
-        let flow = flow(&CurveState { arc_m, velocities, ..CurveState::default() });
+        let flow = velocity_integral(&CurveState { arc_m, velocities, ..CurveState::default() });
         assert!((flow - DVec3::Y).length() < 1e-15, "{flow}"); // 1 m at a mean of 1 m/s
     }
 }

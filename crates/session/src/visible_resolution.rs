@@ -4,20 +4,20 @@
 //! agent's reaction to it ([`metachron_lod::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
 
 use super::cpu_budget::AgentBudget;
-use metachron_render::{Camera, Seen, Size};
+use metachron_render::{Camera, Size, Visibility};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Visibility of the steered agents.
 #[derive(Debug)]
 pub(super) struct VisibleResolution {
-    watched: Vec<Watched>,
+    tracked: Vec<TrackedAgent>,
 }
 
 /// A steered agent, and when it was last in view.
 #[derive(Debug)]
-struct Watched {
-    tally: Arc<AgentBudget>,
+struct TrackedAgent {
+    budget: Arc<AgentBudget>,
     seen_at: Duration,
 }
 
@@ -26,31 +26,31 @@ const GONE: Duration = Duration::from_secs(1);
 
 impl VisibleResolution {
     /// No agent has been in view yet.
-    pub fn new(tallies: &[Arc<AgentBudget>]) -> Self {
-        let watch = |tally: &Arc<AgentBudget>| Watched { tally: Arc::clone(tally), seen_at: Duration::ZERO };
-        Self { watched: tallies.iter().map(watch).collect() }
+    pub fn new(budgets: &[Arc<AgentBudget>]) -> Self {
+        let track = |budget: &Arc<AgentBudget>| TrackedAgent { budget: Arc::clone(budget), seen_at: Duration::ZERO };
+        Self { tracked: budgets.iter().map(track).collect() }
     }
 
     /// Takes the actors as `camera` sees them at the time `now`.
-    pub fn look(&mut self, now: Duration, seen: &[Seen], camera: &Camera, size: Size) {
+    pub fn update(&mut self, now: Duration, seen: &[Visibility], camera: &Camera, size: Size) {
         if size.is_empty() {
             return;
         }
-        for Watched { tally, seen_at } in &mut self.watched {
+        for TrackedAgent { budget, seen_at } in &mut self.tracked {
             // an agent without a shape is never drawn, so it is not out of view either
-            let Some(seen) = seen.get(tally.id().0 as usize).filter(|seen| seen.radius_m > 0.0) else { continue };
+            let Some(seen) = seen.get(budget.id().0 as usize).filter(|seen| seen.radius_m > 0.0) else { continue };
             if seen.visible {
                 *seen_at = now;
-                tally.show(pixel_m(seen, camera, size));
+                budget.set_visible_eps(pixel_m(seen, camera, size));
             } else if now.saturating_sub(*seen_at) >= GONE {
-                tally.show(f64::INFINITY);
+                budget.set_visible_eps(f64::INFINITY);
             }
         }
     }
 }
 
 /// Width of a pixel at the nearest point of an actor, metres.
-fn pixel_m(seen: &Seen, camera: &Camera, size: Size) -> f64 {
+fn pixel_m(seen: &Visibility, camera: &Camera, size: Size) -> f64 {
     let depth_m = (seen.centre_m - camera.eye()).dot(camera.forward()) - seen.radius_m;
     1.0 / camera.pixels_per_metre(depth_m, size)
 }

@@ -36,16 +36,16 @@ enum Stage {
 
 /// A search on its thread.
 struct Searching {
-    hand: JoinHandle<Result<Verdict, String>>,
-    news: Arc<News>,
+    thread: JoinHandle<Result<Verdict, String>>,
+    shared: Arc<SearchState>,
 }
 
 /// Data shared by the search and the window.
 #[derive(Default)]
-struct News {
+struct SearchState {
     stopped: AtomicBool,
     /// The share that is done, and the best so far in words.
-    told: Mutex<(f64, String)>,
+    progress: Mutex<(f64, String)>,
 }
 
 /// Result of a tuning.
@@ -102,63 +102,67 @@ impl Tuning {
         match &self.stage {
             Stage::Drawing(_) => self.restore(control),
             // the search ends by itself after its present candidate
-            Stage::Searching(searching) => searching.news.stopped.store(true, Ordering::Relaxed),
+            Stage::Searching(searching) => searching.shared.stopped.store(true, Ordering::Relaxed),
         }
     }
 
     /// The share that is done, and a description.
     pub fn progress(&self) -> (f64, String) {
         match &self.stage {
-            Stage::Drawing(design) => (EXPERIMENT * design.done(), "drawing at many resolutions".to_owned()),
+            Stage::Drawing(design) => (EXPERIMENT * design.done(), "drawing frames at many resolutions".to_owned()),
             Stage::Searching(searching) => {
-                let told = searching.news.told.lock().unwrap_or_else(PoisonError::into_inner);
-                (EXPERIMENT + (1.0 - EXPERIMENT) * told.0, told.1.clone())
+                let progress = searching.shared.progress.lock().unwrap_or_else(PoisonError::into_inner);
+                (EXPERIMENT + (1.0 - EXPERIMENT) * progress.0, progress.1.clone())
             }
         }
     }
 
     /// Whether the search has ended.
     pub fn is_over(&self) -> bool {
-        matches!(&self.stage, Stage::Searching(searching) if searching.hand.is_finished())
+        matches!(&self.stage, Stage::Searching(searching) if searching.thread.is_finished())
     }
 
     /// The result; waits for a search that has not ended.
     pub fn end(self) -> Tuned {
-        let Stage::Searching(searching) = self.stage else { return Tuned::Refused("it was not over".to_owned()) };
-        match searching.hand.join() {
+        let Stage::Searching(searching) = self.stage else {
+            return Tuned::Refused("the search had not ended".to_owned());
+        };
+        match searching.thread.join() {
             Ok(Ok(verdict)) => Tuned::Found(verdict),
             Ok(Err(why)) => Tuned::Refused(why),
-            Err(_) => Tuned::Refused("the search has failed, which is a bug".to_owned()),
+            Err(_) => Tuned::Refused("the search failed; please report this bug".to_owned()),
         }
     }
 }
 
 impl Searching {
     fn start(observed: Vec<Observed>, target_hz: f64) -> std::io::Result<Self> {
-        let news = Arc::new(News::default());
-        let theirs = Arc::clone(&news);
-        let look = move || find(&observed, target_hz, &theirs);
-        let hand = std::thread::Builder::new().name("tuning".to_owned()).spawn(look)?;
-        Ok(Self { hand, news })
+        let shared = Arc::new(SearchState::default());
+        let theirs = Arc::clone(&shared);
+        let run = move || find(&observed, target_hz, &theirs);
+        let thread = std::thread::Builder::new().name("tuning".to_owned()).spawn(run)?;
+        Ok(Self { thread, shared })
     }
 }
 
 /// The best gains of the corrected law for the observed frames.
-fn find(observed: &[Observed], target_hz: f64, news: &News) -> Result<Verdict, String> {
+fn find(observed: &[Observed], target_hz: f64, shared: &SearchState) -> Result<Verdict, String> {
     let plant = Plant::identify(observed).map_err(|why| why.to_string())?;
     if let Some(why) = refusal(&plant, target_hz) {
         return Err(why);
     }
     let mut go_on = |share: f64, best: &Verdict| {
-        *news.told.lock().unwrap_or_else(PoisonError::into_inner) = (share, told(best));
-        !news.stopped.load(Ordering::Relaxed)
+        *shared.progress.lock().unwrap_or_else(PoisonError::into_inner) = (share, verdict_text(best));
+        !shared.stopped.load(Ordering::Relaxed)
     };
     let mut setting = Search { plant: &plant, target_hz, extent: EXTENT, go_on: &mut go_on };
-    search(&mut setting, Family::Corrected).map(|found| found.best).ok_or_else(|| "nothing could be judged".to_owned())
+    search(&mut setting, Family::Corrected)
+        .map(|found| found.best)
+        .ok_or_else(|| "no candidate could be evaluated".to_owned())
 }
 
 /// Gains and their performance, in one line.
-pub(super) fn told(verdict: &Verdict) -> String {
+pub(super) fn verdict_text(verdict: &Verdict) -> String {
     let settles = verdict.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
     let late = 100.0 * verdict.miss_share;
     match verdict.contender {

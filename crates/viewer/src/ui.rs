@@ -1,6 +1,6 @@
 //! The window: panels around the picture, keys and mouse, and the shell that survives a lost device.
 //!
-//! In: a [`Show`] (picture, numbers, picking). Out: [`Action`]s. Never here: the runtime, scenes, controllers.
+//! In: a [`Simulation`] (picture, numbers, picking). Out: [`Action`]s. Never here: the runtime, scenes, controllers.
 //! [`Viewer`] is the whole user interface without a window, so that tests can drive it; [`run_window`] opens a window around it.
 
 mod bar;
@@ -26,8 +26,8 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Shares, Show, Skip, Status,
-    Tuning, ViewRequest, Weight,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, HandStatus, Law, Message, Severity, Shares,
+    Simulation, Skip, Status, Tuning, ViewRequest,
 };
 
 use egui::{Frame, Margin, Panel, Rect, Sense, Ui};
@@ -38,9 +38,9 @@ use std::time::{Duration, Instant};
 
 /// The source of a frame's picture: the window's device, or a test.
 pub trait Screen {
-    /// Draws the picture that `show` composes for this request, or returns the last picture if the next is not due yet.
+    /// Draws the picture that `simulation` composes for this request, or returns the last picture if the next is not due yet.
     /// The shape covers `over`.
-    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<egui::Shape>;
+    fn draw(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest, over: Rect) -> Option<egui::Shape>;
 
     /// The adapter's name, for the information panel.
     fn adapter(&self) -> &str;
@@ -48,7 +48,7 @@ pub trait Screen {
 
 /// Requests to the window after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Wishes {
+pub struct WindowRequests {
     /// Write the picture to a file.
     pub screenshot: bool,
     /// Close the window.
@@ -59,7 +59,7 @@ pub struct Wishes {
 /// Drawing options of the picture, stored between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
-pub struct Looks {
+pub struct DrawingOptions {
     /// Colour objects by their resolution.
     pub colours: bool,
     /// Colour objects by the age of their state; not together with `colours`.
@@ -70,7 +70,7 @@ pub struct Looks {
     pub wireframe: bool,
 }
 
-impl Looks {
+impl DrawingOptions {
     fn style(self) -> Style {
         let colouring = match self {
             Self { colours: true, .. } => Colouring::Resolution,
@@ -87,7 +87,7 @@ impl Looks {
 #[serde(default)]
 pub struct Layout {
     /// Drawing options of the picture.
-    pub looks: Looks,
+    pub looks: DrawingOptions,
     /// Whether the panels are shown.
     pub panels: bool,
     /// Whether the run's numbers are shown over the picture.
@@ -100,7 +100,7 @@ pub struct Layout {
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { looks: Looks::default(), panels: true, info: false, costs: false, histories: false }
+        Self { looks: DrawingOptions::default(), panels: true, info: false, costs: false, histories: false }
     }
 }
 
@@ -114,7 +114,7 @@ pub struct Viewer {
     help: bool,
     finder: Option<Finder>,
     size: Size,
-    /// The window's own messages, in addition to the show's.
+    /// The window's own messages, in addition to the simulation's.
     notes: Vec<(f64, Message)>,
 }
 
@@ -148,27 +148,32 @@ impl Viewer {
     /// Draws one frame of the interface and applies the user's input.
     ///
     /// Returns the requests to the window, and the time that `screen` took.
-    pub fn ui(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> (Wishes, Duration) {
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        simulation: &mut dyn Simulation,
+        screen: &mut dyn Screen,
+    ) -> (WindowRequests, Duration) {
         let now = ui.ctx().time();
-        self.history.sample(now, show.status());
+        self.history.sample(now, simulation.status());
         self.notes.retain(|(until, _)| now < *until);
         let mut commands = commands::pressed(ui.ctx());
         let mut actions = dropped_scenes(ui);
         if self.layout.panels {
-            self.panels(ui, show, &mut commands, &mut actions);
+            self.panels(ui, simulation, &mut commands, &mut actions);
         }
-        self.overlays(ui, show, &mut commands);
-        let mut wishes = Wishes::default();
+        self.overlays(ui, simulation, &mut commands);
+        let mut requests = WindowRequests::default();
         for command in commands {
-            self.execute(command, show, &mut actions, &mut wishes);
+            self.execute(command, simulation, &mut actions, &mut requests);
         }
-        if wishes.theme {
+        if requests.theme {
             let other = if ui.ctx().theme() == egui::Theme::Dark { egui::Theme::Light } else { egui::Theme::Dark };
             ui.ctx().set_theme(other);
         }
-        actions.drain(..).for_each(|action| show.apply(action));
-        let drawing = self.stage(ui, show, screen);
-        (wishes, drawing)
+        actions.drain(..).for_each(|action| simulation.apply(action));
+        let drawing = self.central_panel(ui, simulation, screen);
+        (requests, drawing)
     }
 
     /// Stores the times of a finished frame for the plots.
@@ -181,8 +186,14 @@ impl Viewer {
         self.notes.push((now_s + NOTE_S, message));
     }
 
-    fn panels(&mut self, ui: &mut Ui, show: &dyn Show, commands: &mut Vec<Command>, actions: &mut Vec<Action>) {
-        let status = show.status();
+    fn panels(
+        &mut self,
+        ui: &mut Ui,
+        simulation: &dyn Simulation,
+        commands: &mut Vec<Command>,
+        actions: &mut Vec<Action>,
+    ) {
+        let status = simulation.status();
         let summary = self.history.summary(status.target_hz);
         // the window is cleared to the panels' colour, so they need not be filled again
         let frame = |x, y| Frame::new().inner_margin(Margin::symmetric(x, y));
@@ -198,7 +209,7 @@ impl Viewer {
                 Some(table::Press::Select(id)) => actions.push(Action::Select(Some(id))),
                 Some(table::Press::Frame(id)) => {
                     actions.push(Action::Select(Some(id)));
-                    self.frame_object(show, Some(id));
+                    self.frame_object(simulation, Some(id));
                 }
                 None => {}
             }
@@ -211,7 +222,7 @@ impl Viewer {
         });
     }
 
-    fn overlays(&mut self, ui: &Ui, show: &dyn Show, commands: &mut Vec<Command>) {
+    fn overlays(&mut self, ui: &Ui, simulation: &dyn Simulation, commands: &mut Vec<Command>) {
         let ctx = ui.ctx();
         if self.help {
             self.help = overlays::help(ctx);
@@ -223,7 +234,7 @@ impl Viewer {
                 self.finder = None;
             }
         }
-        let status = show.status();
+        let status = simulation.status();
         let right = ui.ctx().content_rect().right() - if self.layout.panels { 340.0 } else { 16.0 };
         let window = |title: &'static str| {
             let place = egui::pos2(right, 60.0);
@@ -238,28 +249,28 @@ impl Viewer {
         histories.show(ctx, |ui| plots::histories(ui, status, &self.history));
     }
 
-    fn stage(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> Duration {
-        egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui, show, screen)).inner
+    fn central_panel(&mut self, ui: &mut Ui, simulation: &mut dyn Simulation, screen: &mut dyn Screen) -> Duration {
+        egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui, simulation, screen)).inner
     }
 
-    fn picture(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> Duration {
+    fn picture(&mut self, ui: &mut Ui, simulation: &mut dyn Simulation, screen: &mut dyn Screen) -> Duration {
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
-        for action in self.hand.input(ui, &response, show) {
-            show.apply(action);
+        for action in self.hand.input(ui, &response, simulation) {
+            simulation.apply(action);
         }
         let size = mouse::size_of(rect, ui.ctx().pixels_per_point());
         self.size = size;
-        let camera = self.hand.camera(show);
-        let view = ViewRequest { size, camera: show.ahead(camera), style: self.layout.looks.style() };
+        let camera = self.hand.camera(simulation);
+        let view = ViewRequest { size, camera: simulation.predict_camera(camera), style: self.layout.looks.style() };
         let start = Instant::now();
-        let shape = screen.draw(show, &view, rect);
+        let shape = screen.draw(simulation, &view, rect);
         let drawing = start.elapsed();
         let nothing = || egui::Shape::rect_filled(rect, 0.0, theme::palette(ui).ground);
         ui.painter().add(shape.unwrap_or_else(nothing));
-        self.hand.draw(ui, &response, show);
-        let status = show.status();
+        self.hand.draw(ui, &response, simulation);
+        let status = simulation.status();
         if self.layout.info {
             overlays::info(ui, rect, status, &self.history.summary(status.target_hz), screen.adapter());
         }
@@ -269,8 +280,14 @@ impl Viewer {
         drawing
     }
 
-    fn execute(&mut self, command: Command, show: &dyn Show, actions: &mut Vec<Action>, wishes: &mut Wishes) {
-        let status = show.status();
+    fn execute(
+        &mut self,
+        command: Command,
+        simulation: &dyn Simulation,
+        actions: &mut Vec<Action>,
+        requests: &mut WindowRequests,
+    ) {
+        let status = simulation.status();
         let looks = &mut self.layout.looks;
         match command {
             Command::PauseOrRun => actions.push(if status.running { Action::Pause } else { Action::Run }),
@@ -280,37 +297,39 @@ impl Viewer {
             Command::Faster => actions.push(Action::Speed(commands::next_speed(status.speed, true))),
             Command::Slower => actions.push(Action::Speed(commands::next_speed(status.speed, false))),
             Command::RealTime => actions.push(Action::Speed(1.0)),
-            Command::Frame => self.frame_object(show, status.selected),
+            Command::Frame => self.frame_object(simulation, status.selected),
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
             Command::SceneCamera => self.hand.follow_scene(),
-            Command::Free => self.leave(show, actions),
-            Command::Colours => *looks = Looks { colours: !looks.colours, ages: false, details: false, ..*looks },
+            Command::Free => self.close_or_deselect(simulation, actions),
+            Command::Colours => {
+                *looks = DrawingOptions { colours: !looks.colours, ages: false, details: false, ..*looks }
+            }
             Command::Wireframe => looks.wireframe = !looks.wireframe,
-            Command::Ages => *looks = Looks { ages: !looks.ages, colours: false, details: false, ..*looks },
+            Command::Ages => *looks = DrawingOptions { ages: !looks.ages, colours: false, details: false, ..*looks },
             Command::HideUi => self.layout.panels = !self.layout.panels,
-            Command::Theme => wishes.theme = true,
-            Command::Screenshot => wishes.screenshot = true,
+            Command::Theme => requests.theme = true,
+            Command::Screenshot => requests.screenshot = true,
             Command::Help => self.help = !self.help,
             Command::Info => self.layout.info = !self.layout.info,
             Command::Costs => self.layout.costs = !self.layout.costs,
             Command::Histories => self.layout.histories = !self.layout.histories,
             Command::Palette => self.finder = if self.finder.is_some() { None } else { Some(Finder::default()) },
-            Command::Quit => wishes.quit = true,
+            Command::Quit => requests.quit = true,
         }
     }
 
-    fn leave(&mut self, show: &dyn Show, actions: &mut Vec<Action>) {
+    fn close_or_deselect(&mut self, simulation: &dyn Simulation, actions: &mut Vec<Action>) {
         if self.help || self.finder.is_some() {
             (self.help, self.finder) = (false, None);
         } else {
             actions.push(Action::Select(None));
-            self.hand.free(show);
+            self.hand.free(simulation);
         }
     }
 
-    fn frame_object(&mut self, show: &dyn Show, object: Option<metachron_core::AgentId>) {
-        if let Some(bounds) = show.bounds(object) {
-            self.hand.frame(show, &bounds, self.size);
+    fn frame_object(&mut self, simulation: &dyn Simulation, object: Option<metachron_core::AgentId>) {
+        if let Some(bounds) = simulation.bounds(object) {
+            self.hand.frame(simulation, &bounds, self.size);
         }
     }
 }

@@ -21,7 +21,7 @@ const SHARES_FRAMES: usize = 30;
 const STRETCH_MASS_KG: f64 = 0.1;
 
 /// The panels of a session that has just begun.
-pub(super) fn first(session: &Session) -> Status {
+pub(super) fn initial_status(session: &Session) -> Status {
     let scene = session.scene();
     let own = viewer_law(metachron_session::law(&scene.target));
     let others = [control::Law::CORRECTED, control::Law::PRINTED].map(viewer_law).into_iter();
@@ -88,7 +88,7 @@ impl Meter {
 pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
     meter.read(session);
     status.real_time_factor = meter.real_time;
-    let mut news = Vec::new();
+    let mut messages = Vec::new();
     let control = session.control();
     status.target_hz = control.target_hz();
     let policy = control.policy();
@@ -113,13 +113,13 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
         if let AgentState::Parked(reason) = &row.state
             && !was_parked
         {
-            news.push(format!("{} is parked: {reason}", row.name));
+            messages.push(format!("{} is parked: {reason}", row.name));
         }
         row.picture = session.levels().get(at).map(|level| level.resolution);
-        row.age_s = session.stage().age_s(agent.id()).unwrap_or(0.0);
+        row.age_s = session.scene_view().age_s(agent.id()).unwrap_or(0.0);
         status.energy_j += stats.energy_j;
     }
-    news
+    messages
 }
 
 /// Shares of the frame time over the newest frames.

@@ -8,8 +8,8 @@ use super::view_model;
 use super::view_model::Meter;
 use crate::ui;
 use crate::ui::{
-    Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
-    run_window,
+    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Simulation, Skip, Status, ViewRequest, WindowError,
+    WindowOptions, run_window,
 };
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
@@ -61,13 +61,13 @@ pub enum WindowFailure {
 /// [`WindowFailure::NoWindow`] returns the session with its time paused, [`WindowFailure::Gone`] the outcome.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
-    let mut show = WindowShow::new(session, plan, go_on);
-    match run_window(&mut show, &options) {
-        Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
+    let mut simulation = WindowSimulation::new(session, plan, go_on);
+    match run_window(&mut simulation, &options) {
+        Ok(_) => Ok(simulation.session.end(simulation.adapter, simulation.stopped)),
         Err(error @ WindowError::Gone(_)) => {
-            Err(WindowFailure::Gone(Box::new(show.session.end(show.adapter, true)), error))
+            Err(WindowFailure::Gone(Box::new(simulation.session.end(simulation.adapter, true)), error))
         }
-        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
+        Err(error) => Err(WindowFailure::NoWindow(Box::new(simulation.session), error)),
     }
 }
 
@@ -75,7 +75,7 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
 pub type GoOn<'a> = &'a mut dyn FnMut(&FrameRecord, Option<f64>) -> bool;
 
 /// A session as the viewer sees it.
-struct WindowShow<'a> {
+struct WindowSimulation<'a> {
     go_on: GoOn<'a>,
     adapter: Option<String>,
     stopped: bool,
@@ -107,16 +107,16 @@ const HAND_RAD_S: f64 = 25.0;
 /// Fraction of critical damping of the user spring.
 const HAND_DAMPING: f64 = 0.7;
 
-impl<'a> WindowShow<'a> {
+impl<'a> WindowSimulation<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
-        session.keep_frames(kept(&plan));
+        session.keep_frames(frames_kept(&plan));
         // time is paused until the window shows the scene
         session.drive(Drive::Pause);
-        let mut show = Self {
+        let mut simulation = Self {
             go_on,
             adapter: None,
             stopped: false,
-            status: view_model::first(&session),
+            status: view_model::initial_status(&session),
             meter: Meter::new(&session),
             notices: Vec::new(),
             session,
@@ -131,21 +131,21 @@ impl<'a> WindowShow<'a> {
             speed: 1.0,
             running: true,
         };
-        show.refresh();
-        show
+        simulation.refresh();
+        simulation
     }
 
     /// Restarts with `scene`; speed and pause are kept.
     fn restart(&mut self, scene: Scene) {
         match Session::open(scene) {
             Ok(session) => self.replace(session),
-            Err(error) => self.say(Weight::Failure, error.to_string()),
+            Err(error) => self.show_message(Severity::Failure, error.to_string()),
         }
     }
 
     fn replace(&mut self, mut session: Session) {
         self.stop_tuning();
-        session.keep_frames(kept(&self.plan));
+        session.keep_frames(frames_kept(&self.plan));
         session.drive(Drive::Speed(self.speed));
         if self.running {
             session.begin();
@@ -158,7 +158,7 @@ impl<'a> WindowShow<'a> {
         }
         let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
         drop(std::mem::replace(&mut self.session, session));
-        self.status = Status { selected, ..view_model::first(&self.session) };
+        self.status = Status { selected, ..view_model::initial_status(&self.session) };
         self.meter = Meter::new(&self.session);
         self.notices.clear();
         (self.hand, self.refreshed) = (None, None);
@@ -192,7 +192,9 @@ impl<'a> WindowShow<'a> {
     fn reload(&mut self) {
         match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not reloaded: {}", first_problem(&error))),
+            Err(error) => {
+                self.show_message(Severity::Failure, format!("scene not reloaded: {}", first_problem(&error)))
+            }
         }
     }
 
@@ -200,7 +202,7 @@ impl<'a> WindowShow<'a> {
         self.plan.overrides.clear();
         match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not opened: {}", first_problem(&error))),
+            Err(error) => self.show_message(Severity::Failure, format!("scene not opened: {}", first_problem(&error))),
         }
     }
 
@@ -210,8 +212,8 @@ impl<'a> WindowShow<'a> {
         Ok(scene)
     }
 
-    fn say(&mut self, weight: Weight, text: String) {
-        let message = Message { weight, text };
+    fn show_message(&mut self, severity: Severity, text: String) {
+        let message = Message { severity, text };
         self.notices.retain(|(_, old)| *old != message);
         self.notices.push((Instant::now() + MESSAGE_STAYS, message));
     }
@@ -227,7 +229,7 @@ impl<'a> WindowShow<'a> {
 
     fn pull(&mut self, hand: Option<Hand>) {
         if let Some(left) = self.hand.filter(|old| hand.is_none_or(|new| new.object != old.object)) {
-            self.tell(left.object, None);
+            self.send_spring(left.object, None);
         }
         self.hand = hand;
         if let Some(hand) = hand {
@@ -240,13 +242,13 @@ impl<'a> WindowShow<'a> {
                 stiffness_n_m: mass_kg * HAND_RAD_S * HAND_RAD_S,
                 damping_n_s_m: 2.0 * HAND_DAMPING * mass_kg * HAND_RAD_S,
             };
-            self.tell(hand.object, Some(pull));
+            self.send_spring(hand.object, Some(pull));
         }
     }
 
-    fn tell(&mut self, to: AgentId, pull: Option<AnchorSpring>) {
+    fn send_spring(&mut self, to: AgentId, pull: Option<AnchorSpring>) {
         if let Err(error) = self.session.hand(to, pull) {
-            self.say(Weight::Warning, error.to_string());
+            self.show_message(Severity::Warning, error.to_string());
         }
     }
 
@@ -271,9 +273,9 @@ impl<'a> WindowShow<'a> {
                     self.session.control().set_policy(Policy::Feedback);
                     self.session.control().set_law(law);
                 }
-                self.say(Weight::Note, format!("tuned: {}", live_tuning::told(&verdict)));
+                self.show_message(Severity::Note, format!("tuned: {}", live_tuning::verdict_text(&verdict)));
             }
-            Tuned::Refused(why) => self.say(Weight::Warning, format!("not tuned: {why}")),
+            Tuned::Refused(why) => self.show_message(Severity::Warning, format!("not tuned: {why}")),
         }
     }
 
@@ -282,7 +284,7 @@ impl<'a> WindowShow<'a> {
         let Some(tuning) = &mut self.tuning else { return };
         if let Err(error) = tuning.note(&mut self.session, 1e-3 * self.last.frame_ms) {
             self.stop_tuning();
-            self.say(Weight::Failure, format!("not tuned: {error}"));
+            self.show_message(Severity::Failure, format!("not tuned: {error}"));
         }
     }
 
@@ -299,8 +301,8 @@ impl<'a> WindowShow<'a> {
         if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
             return;
         }
-        let news = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
-        news.into_iter().for_each(|text| self.say(Weight::Failure, text));
+        let messages = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
+        messages.into_iter().for_each(|text| self.show_message(Severity::Failure, text));
         self.refreshed = Some(now);
     }
 
@@ -325,11 +327,11 @@ fn first_problem(error: &SceneError) -> String {
 }
 
 /// Frames stored in a run of this plan: all if it ends by itself.
-const fn kept(plan: &WindowPlan) -> usize {
+const fn frames_kept(plan: &WindowPlan) -> usize {
     if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
 }
 
-impl Show for WindowShow<'_> {
+impl Simulation for WindowSimulation<'_> {
     fn apply(&mut self, action: Action) {
         if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
             self.stop_tuning();
@@ -376,7 +378,7 @@ impl Show for WindowShow<'_> {
         self.status.sim_time = self.session.sim_now();
         (self.status.running, self.status.speed) = (self.running, self.speed);
         self.status.held =
-            self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
+            self.hand.map(|hand| HandStatus { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
         self.status.tuning = self.tuning.as_ref().map(|tuning| {
             let (done, words) = tuning.progress();
             ui::Tuning { done, words }
@@ -386,7 +388,7 @@ impl Show for WindowShow<'_> {
         }
         self.session.compose(&view.camera, view.size, view.style, self.hand);
         if self.session.is_virtual() {
-            self.session.choose_beside(&view.camera, view.size);
+            self.session.choose_next_frame(&view.camera, view.size);
             self.declared_draw = self.session.spend_declared(view.size);
         }
         self.session.picture()
@@ -394,7 +396,7 @@ impl Show for WindowShow<'_> {
 
     fn while_drawn(&mut self, view: &ViewRequest) {
         if !self.session.is_virtual() {
-            self.session.choose_beside(&view.camera, view.size);
+            self.session.choose_next_frame(&view.camera, view.size);
         }
     }
 
@@ -420,11 +422,11 @@ impl Show for WindowShow<'_> {
     fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
         self.adapter = Some(adapter.to_owned());
         // the same adapter without a window: the benchmark needs a device of its own
-        self.session.calibrate((adapter, on_processor), || Gpu::headless().ok());
+        self.session.calibrate(adapter, on_processor, || Gpu::headless().ok());
     }
 
-    fn ahead(&mut self, camera: Camera) -> Camera {
-        self.session.ahead(camera)
+    fn predict_camera(&mut self, camera: Camera) -> Camera {
+        self.session.predict_camera(camera)
     }
 
     fn scene_camera(&self) -> Camera {
@@ -432,11 +434,11 @@ impl Show for WindowShow<'_> {
     }
 
     fn pick(&self, ray: Ray) -> Option<Hit> {
-        self.session.stage().pick(ray)
+        self.session.scene_view().pick(ray)
     }
 
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds> {
-        self.session.stage().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
+        self.session.scene_view().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
     }
 
     fn wants_close(&mut self) -> bool {

@@ -130,12 +130,12 @@ pub fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     };
     run.drive(Drive::Run);
     let start_ms = millis(started.elapsed());
-    let watched = watch(&mut *run, case.executor == Executor::Lockstep, span);
+    let observed = observe(&mut *run, case.executor == Executor::Lockstep, span);
     let after = resident_bytes();
     let started = Instant::now();
     let stats = run.shutdown();
     let shutdown_ms = millis(started.elapsed());
-    let cpu_us_per_step = watched.per_step(watched.cpu.as_secs_f64() * 1e6);
+    let cpu_us_per_step = observed.per_step(observed.cpu.as_secs_f64() * 1e6);
     Ok(Row {
         executor: case.executor,
         model: case.model,
@@ -143,29 +143,29 @@ pub fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
         agents: case.agents,
         rate_hz: case.rate_hz,
         cpu_us_per_step,
-        cores: watched.cpu.as_secs_f64() / watched.wall.as_secs_f64(),
+        cores: observed.cpu.as_secs_f64() / observed.wall.as_secs_f64(),
         bare_us_per_step: bare.free_us,
         sleeping_us_per_step: bare.paced_us,
         thread_us_per_step,
         over_thread: thread_us_per_step.map(|floor| cpu_us_per_step / floor),
-        steps_per_s: watched.steps / watched.wall.as_secs_f64(),
+        steps_per_s: observed.steps / observed.wall.as_secs_f64(),
         wanted_steps_per_s: stats.iter().map(|s| s.wanted_hz).sum(),
-        age_ms_p50: 1e3 * among(&stats, 0.5, |s| s.age.p50_s),
-        age_ms_p99: 1e3 * among(&stats, 0.99, |s| s.age.p99_s),
-        late_ms_p50: 1e3 * among(&stats, 0.5, |s| s.late.p50_s),
-        late_ms_p99: 1e3 * among(&stats, 0.99, |s| s.late.p99_s),
+        age_ms_p50: 1e3 * quantile_over(&stats, 0.5, |s| s.age.p50_s),
+        age_ms_p99: 1e3 * quantile_over(&stats, 0.99, |s| s.age.p99_s),
+        late_ms_p50: 1e3 * quantile_over(&stats, 0.5, |s| s.late.p50_s),
+        late_ms_p99: 1e3 * quantile_over(&stats, 0.99, |s| s.late.p99_s),
         dropped_ms: 1e3 * stats.iter().map(|s| s.dropped.as_secs_f64()).sum::<f64>() / stats.len().max(1) as f64,
         bytes_per_agent: before.zip(after).map(|(from, to)| (to - from).max(0.0) / case.agents as f64),
-        switches_per_step: watched.switches_per_step,
-        frame_late_ms_p99: 1e3 * share(watched.late_s, 0.99),
-        read_ns_per_agent: 1e9 * share(watched.read_s, 0.5) / case.agents as f64,
+        switches_per_step: observed.switches_per_step,
+        frame_late_ms_p99: 1e3 * share(observed.late_s, 0.99),
+        read_ns_per_agent: 1e9 * share(observed.read_s, 0.5) / case.agents as f64,
         start_ms,
         shutdown_ms,
     })
 }
 
 /// Measurements of a run from outside.
-struct Watched {
+struct ObservedRun {
     wall: Duration,
     cpu: Duration,
     steps: f64,
@@ -174,14 +174,14 @@ struct Watched {
     read_s: Vec<f64>,
 }
 
-impl Watched {
+impl ObservedRun {
     fn per_step(&self, total: f64) -> f64 {
         if self.steps > 0.0 { total / self.steps } else { f64::NAN }
     }
 }
 
 /// Lets `run` go on for `span` and reads all states at 60 Hz; a run in virtual time is stepped by this thread itself.
-fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
+fn observe(run: &mut dyn Run, is_virtual: bool, span: Duration) -> ObservedRun {
     let cpu = || if is_virtual { own_cpu() } else { others_cpu() };
     let mut reader = Reader::new(run.agents());
     read(run, &mut reader, is_virtual, span / 4);
@@ -198,11 +198,18 @@ fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
     reader.finish(run.agents());
     let (wall, cpu, made) = (from.elapsed(), (cpu() - from_cpu).saturating_sub(reading), steps(run) - from_steps);
     let switched = (switches(), steps(run));
-    Watched { wall, cpu, steps: made, switches_per_step: rise(from_switched, switched), late_s, read_s }
+    ObservedRun {
+        wall,
+        cpu,
+        steps: made,
+        switches_per_step: increase_per_step(from_switched, switched),
+        late_s,
+        read_s,
+    }
 }
 
 /// Rise of a count per step from one moment to another; each is a count and the number of steps made by then.
-fn rise(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
+fn increase_per_step(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
     let count = to.0.zip(from.0).map(|(to, from)| (to - from).max(0.0))?;
     let steps = to.1 - from.1;
     Some(if steps > 0.0 { count / steps } else { f64::NAN })
@@ -231,7 +238,7 @@ fn steps(run: &dyn Run) -> f64 {
 }
 
 /// The value that a share `part` of the agents does not exceed.
-fn among(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
+fn quantile_over(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
     share(stats.iter().map(of).collect(), part)
 }
 

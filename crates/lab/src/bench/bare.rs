@@ -31,7 +31,7 @@ pub(super) fn measure(model: Model, count: usize, mean_hz: f64, span: Duration) 
     for (agent, dt) in agents.iter_mut().zip(&spans) {
         step(&mut **agent, *dt)?;
     }
-    Ok(Bare { free_us: free(&mut agents, &spans, span)?, paced_us: paced(&mut agents, &spans, span)? })
+    Ok(Bare { free_us: free(&mut agents, &spans, span)?, paced_us: run_paced(&mut agents, &spans, span)? })
 }
 
 fn free(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
@@ -45,7 +45,7 @@ fn free(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> any
     Ok(micros(own_cpu() - cpu) / steps as f64)
 }
 
-fn paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
+fn run_paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
     let mut due: BinaryHeap<_> = (0..agents.len()).map(|k| Reverse((Duration::ZERO, k))).collect();
     let (cpu, start, mut steps) = (own_cpu(), Instant::now(), 0_u64);
     let mut now = start.elapsed();
@@ -69,10 +69,10 @@ pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duratio
     let start = Instant::now();
     let spent = thread::scope(|scope| {
         let lives = agents.into_iter().enumerate().map(|(k, mut agent)| {
-            let life = move || alone(&mut *agent, period(k, mean_hz), start, span);
+            let life = move || run_alone(&mut *agent, period(k, mean_hz), start, span);
             thread::Builder::new().name(format!("bare:{k}")).spawn_scoped(scope, life)
         });
-        let lives = lives.collect::<Result<Vec<_>, _>>().context("no thread to be had")?;
+        let lives = lives.collect::<Result<Vec<_>, _>>().context("no thread could be started")?;
         let ended = lives.into_iter().map(|life| life.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         ended.collect::<anyhow::Result<Vec<_>>>()
     })?;
@@ -81,7 +81,7 @@ pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duratio
 }
 
 /// Steps one agent at its due times until `span` after `start`; returns the CPU time of this thread and the number of steps.
-fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> anyhow::Result<(Duration, u64)> {
+fn run_alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> anyhow::Result<(Duration, u64)> {
     step(agent, dt)?;
     let (cpu, mut due, mut steps) = (own_cpu(), start.elapsed(), 0);
     while start.elapsed() < span {
@@ -95,8 +95,8 @@ fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> 
 
 /// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let around = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
-    agent.step(dt, &around)?;
+    let context = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    agent.step(dt, &context)?;
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //!
 //! In: a model and a number. Out: agents that step and touch nothing. Never here: time passing.
 
+use super::super::chart::GRAVITY;
 use anyhow::Context;
 use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
@@ -44,7 +45,7 @@ impl Model {
 const SYNTHETIC_US: f64 = 0.85;
 
 /// An agent that takes part in no contact: the benchmark measures agents, not contacts.
-struct Aloof {
+struct IsolatedAgent {
     agent: Box<dyn Agent>,
     rests: bool,
 }
@@ -58,7 +59,7 @@ pub(super) fn agent(model: Model, k: usize) -> anyhow::Result<Box<dyn Agent>> {
         Model::Rod => Box::new(rod(place, ROD_SEGMENTS, false)?),
         Model::Rigid => Box::new(ball(place)?),
     };
-    Ok(Box::new(Aloof { agent, rests: model == Model::Asleep }))
+    Ok(Box::new(IsolatedAgent { agent, rests: model == Model::Asleep }))
 }
 
 fn synthetic() -> anyhow::Result<Synthetic> {
@@ -83,7 +84,7 @@ pub(super) fn rod(place: DVec3, segments: usize, self_contact: bool) -> anyhow::
         damping_per_s: 6.0,
         clamp: [true, false],
         self_contact,
-        gravity: DVec3::NEG_Z * 9.81,
+        gravity: DVec3::NEG_Z * GRAVITY,
         ..free
     };
     Tube::new(spec).context("the rod")
@@ -106,13 +107,13 @@ pub(super) fn spawn(agent: Box<dyn Agent>, k: usize, mean_hz: f64) -> AgentSpawn
     AgentSpawn::alone(format!("agent {k}"), agent, rate_hz(k, mean_hz))
 }
 
-impl Agent for Aloof {
+impl Agent for IsolatedAgent {
     fn model(&self) -> &'static str {
         self.agent.model()
     }
 
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let report = self.agent.step(dt, around)?;
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        let report = self.agent.step(dt, context)?;
         Ok(StepReport { at_rest: self.rests || report.at_rest, ..report })
     }
 

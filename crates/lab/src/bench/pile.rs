@@ -10,7 +10,7 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
 use super::machine::{others_cpu, own_cpu};
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use anyhow::{Context, bail};
 use glam::{DQuat, DVec3};
 use metachron_geometry::Solid;
@@ -63,7 +63,7 @@ impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
         let mut spent = Spent::new();
@@ -75,8 +75,9 @@ impl Subject for Pile {
             ("agents in virtual time", &mut || agents(&scene, ExecutorKind::Lockstep, sim_s)),
             ("agents in a pool", &mut || agents(&scene, ExecutorKind::Pool, sim_s)),
         ];
-        let told = cases.into_iter().zip(0_u32..);
-        let wanted = told.take_while(|((words, _), at)| watch.goes_on(0.2 * f64::from(*at), (*words).to_owned()));
+        let cases_in_order = cases.into_iter().zip(0_u32..);
+        let wanted =
+            cases_in_order.take_while(|((words, _), at)| progress.continues(0.2 * f64::from(*at), (*words).to_owned()));
         let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
         let Some(plain) = rows.first().cloned() else { return Ok(rows) };
         let others = OTHERS.map(|(who, steps)| Row {
@@ -120,7 +121,7 @@ impl Subject for Pile {
         let panel = Panel {
             title: String::new(),
             x: Axis::linear("", 0.0, rows.len().max(1) as f64),
-            y: Axis::linear("whole steps a second of CPU time", 0.0, 1.1 * most),
+            y: Axis::linear("whole steps per second of CPU time", 0.0, 1.1 * most),
             layers: rows.iter().enumerate().map(bar).collect(),
         };
         Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
@@ -202,7 +203,7 @@ fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> 
     }
     let mut boxes = 0;
     for member in &scene.agents {
-        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is no rigid body", member.name) };
+        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
         insert(&mut world, spec, settings)?;
         boxes += 1;
     }
@@ -240,7 +241,7 @@ fn shape(solid: &Solid) -> anyhow::Result<ColliderBuilder> {
     match solid {
         Solid::Box { half_extents_m: half } => Ok(ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)),
         Solid::Plane => Ok(ColliderBuilder::new(SharedShape::halfspace(Vec3::Z))),
-        _ => None.context("the plain world knows boxes and planes alone"),
+        _ => None.context("the single rapier3d world supports boxes and planes only"),
     }
 }
 
@@ -267,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn who_made_fewer_steps_is_held_against_as_many_first_ones() {
+    fn fewer_steps_are_compared_with_as_many_first_ones() {
         let spent = [1.0, 2.0, 4.0, 8.0];
         let shares = [0.0, 1.0, 2.2, 4.0, 9.0, f64::INFINITY].map(|steps| first_steps_per_s(&spent, steps));
         assert_eq!(shares, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);

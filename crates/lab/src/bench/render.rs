@@ -5,7 +5,7 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::table::Table;
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use anyhow::Context;
 use metachron_lod::control::AREAS_PX;
 use metachron_render::{Drawn, Gpu, RendererOptions, Shading, benchmark};
@@ -33,9 +33,9 @@ impl Subject for Render {
     type Row = Row;
     const NAME: &'static str = "render";
 
-    fn measure(_args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
-        let gpu = Gpu::headless().context("there is no adapter to measure")?;
-        if !watch.goes_on(0.0, gpu.describe()) {
+    fn measure(_args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
+        let gpu = Gpu::headless().context("no graphics adapter was found to measure")?;
+        if !progress.continues(0.0, gpu.describe()) {
             return Ok(Vec::new());
         }
         let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX, 0)?;
@@ -68,10 +68,10 @@ impl Subject for Render {
             let points = here.map(|row| (row.triangles, row.picture_ms)).collect();
             Layer { label: name(shading).to_owned(), colour, mark: Mark::Dots(points) }
         });
-        let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms a picture", least, most));
+        let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms per picture", least, most));
         let title = rows.first().map_or_else(String::new, |row| row.adapter.clone());
         let panel = Panel { title, x, y, layers: layers.collect() };
-        Figure { title: "What pictures take".to_owned(), panels: vec![panel], columns: 1 }
+        Figure { title: "Drawing time of pictures".to_owned(), panels: vec![panel], columns: 1 }
     }
 }
 

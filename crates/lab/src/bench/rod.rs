@@ -9,7 +9,7 @@ use super::super::chart::table::Table;
 use super::bare::step;
 use super::cast::{ROD_SEGMENTS, rod};
 use super::machine::own_cpu;
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use glam::DVec3;
 use metachron_core::SimSpan;
 use serde::{Deserialize, Serialize};
@@ -43,14 +43,15 @@ impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));
         let cases = [false, true].into_iter().flat_map(|contact| SEGMENTS.map(|segments| (segments, contact)));
         let cases: Vec<_> = cases.collect();
         let total = cases.len() as f64;
-        let told = cases.into_iter().enumerate();
-        let wanted = told.take_while(|(at, case)| watch.goes_on(*at as f64 / total, format!("{} segments", case.0)));
-        wanted.map(|(_, case)| measure(case, span)).collect()
+        let cases_in_order = cases.into_iter().enumerate();
+        let wanted = cases_in_order
+            .take_while(|(at, case)| progress.continues(*at as f64 / total, format!("{} segments", case.0)));
+        wanted.map(|(_, (segments, self_contact))| measure(segments, self_contact, span)).collect()
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -74,19 +75,20 @@ impl Subject for Rod {
         };
         let (low, high) = span(rows.iter().map(|row| row.segments as f64), true);
         let (least, most) = span(rows.iter().map(|row| row.us_per_step), true);
-        let lines = [("without self-contact", false), ("with the search for it", true)].into_iter().zip(Colour::LINES);
+        let lines =
+            [("without self-contact", false), ("with self-contact search", true)].into_iter().zip(Colour::LINES);
         let layers = lines.map(|((label, contact), colour)| {
             let points = points(contact);
             let label = format!("{label}: segments^{:.2}", exponent(&points).unwrap_or(f64::NAN));
             Layer { label, colour, mark: Mark::Line(points) }
         });
-        let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU a step, µs", least, most));
+        let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU time per step, µs", least, most));
         let panel = Panel { title: String::new(), x, y, layers: layers.collect() };
-        Figure { title: "What a step of a tube costs".to_owned(), panels: vec![panel], columns: 1 }
+        Figure { title: "Cost of a tube's step".to_owned(), panels: vec![panel], columns: 1 }
     }
 }
 
-fn measure((segments, self_contact): (usize, bool), span: Duration) -> anyhow::Result<Row> {
+fn measure(segments: usize, self_contact: bool, span: Duration) -> anyhow::Result<Row> {
     let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
     // fills caches and sizes buffers
     (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
@@ -106,7 +108,7 @@ mod tests {
 
     #[test]
     fn twice_the_segments_take_more_and_every_row_is_a_number() {
-        let [few, many] = [16, 512].map(|segments| measure((segments, false), Duration::from_millis(20)).unwrap());
+        let [few, many] = [16, 512].map(|segments| measure(segments, false, Duration::from_millis(20)).unwrap());
         assert!(many.us_per_step > few.us_per_step && few.steps_per_s > 0.0 && few.ns_per_segment > 0.0);
     }
 }

@@ -6,7 +6,7 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::Figure;
 use super::super::chart::table::Table;
 use super::super::chart::{Experiment, Selection};
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 
 /// The subject.
 pub(super) struct Select;
@@ -15,10 +15,11 @@ impl Subject for Select {
     type Row = <Selection as Experiment>::Row;
     const NAME: &'static str = "select";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Self::Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>> {
         let cases = Selection::cases(args.quick);
         let total = cases.len() as f64;
-        let wanted = cases.iter().enumerate().take_while(|(at, _)| watch.goes_on(*at as f64 / total, String::new()));
+        let wanted =
+            cases.iter().enumerate().take_while(|(at, _)| progress.continues(*at as f64 / total, String::new()));
         Ok(wanted.map(|(_, case)| Selection::measure(case)).collect())
     }
 

@@ -8,7 +8,7 @@ use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::cast::Model;
-use super::subject::{Subject, Watch};
+use super::subject::{Progress, Subject};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;
 use std::time::Duration;
@@ -23,21 +23,20 @@ impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
 
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
-        let chosen: Vec<_> = all.filter(|case| wanted(args, case) && possible(case)).collect();
+        let chosen: Vec<_> = all.filter(|case| is_selected(args, case) && possible(case)).collect();
         if chosen.is_empty() {
-            let why =
-                "no case is of that executor, that model and so few agents: the least have 1 agent, with --quick 10";
+            let why = "no case has this executor, this model and so few agents: the smallest case has 1 agent, with --quick 10";
             return Err(BadInput(why.to_owned()).into());
         }
         let span = args.seconds.map_or(SPANS[usize::from(args.quick)], Duration::from_secs_f64);
         let mut rows = Vec::with_capacity(chosen.len());
         for (at, case) in chosen.iter().enumerate() {
             let words = format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
-            if !watch.goes_on(at as f64 / chosen.len() as f64, words) {
+            if !progress.continues(at as f64 / chosen.len() as f64, words) {
                 break;
             }
             rows.push(measure(case, span)?);
@@ -45,7 +44,7 @@ impl Subject for Agents {
         if let Err(refused) = granted
             && !args.quiet
         {
-            message(&format!("note: {refused}; nothing was measured of it"));
+            message(&format!("note: {refused}; the case was skipped"));
         }
         Ok(rows)
     }
@@ -55,11 +54,11 @@ impl Subject for Agents {
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        drawn(rows)
+        figure_of(rows)
     }
 }
 
-fn wanted(args: &BenchArgs, case: &Case) -> bool {
+fn is_selected(args: &BenchArgs, case: &Case) -> bool {
     let named = |names: &[String], name: &str| names.is_empty() || names.iter().any(|n| n == name);
     named(&args.executor, case.executor.name())
         && named(&args.model, case.model.name())
@@ -122,7 +121,7 @@ fn table(rows: &[Row]) -> Table {
 }
 
 /// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
-fn drawn(all: &[Row]) -> Figure {
+fn figure_of(all: &[Row]) -> Figure {
     let of_a_kind = |row: &&Row| row.model == Model::Synthetic && ![1000.0, TENTH_HZ].contains(&row.rate_hz);
     let (free, rows): (Vec<&Row>, Vec<&Row>) = all.iter().filter(of_a_kind).partition(|row| row.rate_hz == UNPACED_HZ);
     let of = |executor: Executor, y: fn(&Row) -> f64| -> Vec<(f64, f64)> {
@@ -149,11 +148,11 @@ fn drawn(all: &[Row]) -> Figure {
         Panel { title: title.to_owned(), x: Axis::log("agents", low, high), y: Axis::log(label, least, most), layers }
     };
     let mut panels = vec![
-        panel("CPU a step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
-        panel("lateness, 99 in 100", "ms", |row| row.late_ms_p99.max(1e-3), None),
+        panel("CPU time per step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
+        panel("lateness, 99th percentile", "ms", |row| row.late_ms_p99.max(1e-3), None),
     ];
     panels.extend((free.len() > 1).then(|| growth(&free)));
-    Figure { title: "What being an agent costs".to_owned(), panels, columns: 2 }
+    Figure { title: "Overhead per agent".to_owned(), panels, columns: 2 }
 }
 
 /// CPU time of a round (one step of every agent), where agents step as fast as they can.
@@ -162,12 +161,12 @@ fn growth(rows: &[&Row]) -> Panel {
     let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));
     let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
     let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
-    let title = format!("as fast as they can: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
+    let title = format!("unpaced: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
     let layers = vec![
         Layer { label: "pool".to_owned(), colour: Colour::LINES[1], mark: Mark::Line(ours) },
         Layer { label: "bare loop".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(bare) },
     ];
-    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs a round", least, most), layers }
+    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs per round", least, most), layers }
 }
 
 #[cfg(test)]

@@ -23,8 +23,8 @@ pub(super) trait Subject {
     /// Its name on the command line; the files are called after it.
     const NAME: &'static str;
 
-    /// Measures the requested cases one by one while `watch` says to go on; returns the finished rows.
-    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Self::Row>>;
+    /// Measures the requested cases one by one while `progress` says to go on; returns the finished rows.
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>>;
 
     /// The table that is printed.
     fn table(rows: &[Self::Row]) -> Table;
@@ -34,14 +34,14 @@ pub(super) trait Subject {
 }
 
 /// Follows a benchmark: receives its progress and says whether to go on.
-pub(super) struct Watch {
+pub(super) struct Progress {
     bar: Bar,
     stopped: Arc<AtomicBool>,
 }
 
-impl Watch {
+impl Progress {
     /// Reports a case that is about to be measured: the share that is done, and its description. `false`: measure no more.
-    pub(super) fn goes_on(&self, done: f64, words: String) -> bool {
+    pub(super) fn continues(&self, done: f64, words: String) -> bool {
         self.bar.tell(done, words);
         !self.stopped.load(Ordering::Relaxed)
     }
@@ -51,9 +51,9 @@ impl Watch {
 pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
     let stopped = stopper()?;
     let folder = prepared(&args.out)?;
-    let watch = Watch { bar: Bar::new(S::NAME, args.quiet), stopped: Arc::clone(&stopped) };
-    let rows = S::measure(args, &watch)?;
-    drop(watch);
+    let progress = Progress { bar: Bar::new(S::NAME, args.quiet), stopped: Arc::clone(&stopped) };
+    let rows = S::measure(args, &progress)?;
+    drop(progress);
     let interrupted = stopped.load(Ordering::Relaxed);
     if interrupted && rows.is_empty() {
         message("interrupted before a row was finished: nothing was written");

@@ -25,14 +25,14 @@ pub(super) struct Faults {
 }
 
 /// Agents that see each other.
-pub(super) struct Stage {
+pub(super) struct StepHarness {
     actors: Vec<Actor>,
     law: Law,
     faults: Faults,
     noise: u64,
 }
 
-/// An agent on the stage.
+/// An agent in the harness.
 struct Actor {
     agent: Box<dyn Agent>,
     form: Option<Arc<CollisionShape>>,
@@ -50,8 +50,8 @@ struct Actor {
     last_s: f64,
 }
 
-impl Stage {
-    /// An empty stage whose pairs all touch by `law`.
+impl StepHarness {
+    /// An empty harness whose pairs all touch by `law`.
     pub(super) fn new(law: Law, faults: Faults) -> Self {
         Self { actors: Vec::new(), law, faults, noise: faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1 }
     }
@@ -77,7 +77,7 @@ impl Stage {
     }
 
     /// Attaches fixed springs to an agent.
-    pub(super) fn hold(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
+    pub(super) fn attach_springs(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
         self.actors[id.0 as usize].hands = hands;
     }
 
@@ -122,10 +122,10 @@ impl Stage {
     }
 
     /// Lets every agent look around before the first step.
-    pub(super) fn look(&mut self) {
+    pub(super) fn start(&mut self) {
         for i in 0..self.actors.len() {
             let me = AgentId(i as u32);
-            let neighbours = self.sights(i);
+            let neighbours = self.neighbours_of(i);
             let actor = &mut self.actors[i];
             let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
             let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
@@ -144,14 +144,14 @@ impl Stage {
         let i = me.0 as usize;
         let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
         let lost = self.random() < self.faults.loss;
-        let neighbours = self.sights(i);
+        let neighbours = self.neighbours_of(i);
         let actor = &mut self.actors[i];
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let around = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        let context = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
         let wanted = dt;
-        let dt = actor.agent.longest_step(wanted, &around);
-        actor.agent.step(dt, &around)?;
+        let dt = actor.agent.longest_step(wanted, &context);
+        actor.agent.step(dt, &context)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);
         (actor.own.time, actor.own.shortened_step) = (time + dt, (dt < wanted).then_some(dt));
@@ -163,12 +163,12 @@ impl Stage {
     }
 
     /// All other agents as neighbours of one.
-    fn sights(&self, me: usize) -> Vec<Neighbour> {
-        (0..self.actors.len()).filter(|&other| other != me).map(|other| self.sight(me, other)).collect()
+    fn neighbours_of(&self, me: usize) -> Vec<Neighbour> {
+        (0..self.actors.len()).filter(|&other| other != me).map(|other| self.neighbour_of(me, other)).collect()
     }
 
     /// Another agent as a neighbour of one.
-    fn sight(&self, me: usize, other: usize) -> Neighbour {
+    fn neighbour_of(&self, me: usize, other: usize) -> Neighbour {
         let standing = |i: usize| {
             let actor = &self.actors[i];
             OwnershipTraits::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())

@@ -1,9 +1,9 @@
-//! A stage with energy sums: agents, their springs, and the sums over them.
+//! A step harness with energy sums: agents, their springs, and the sums over them.
 //!
 //! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent reports it at its
 //! own time, and energy and momentum at a common time. Never here: which bodies, which claims.
 
-use super::bench::{Faults, Stage};
+use super::bench::{Faults, StepHarness};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
 use metachron_contact::audit::{Audit, audit, in_flight, settled};
@@ -19,7 +19,7 @@ use metachron_models::rod::TubeSpec;
 /// Agents, and the data for sums over them.
 pub(super) struct Play {
     /// The agents.
-    pub(super) stage: Stage,
+    pub(super) stage: StepHarness,
     solids: Vec<Solid>,
     links: Vec<(AgentId, Link)>,
 }
@@ -35,14 +35,14 @@ struct Solid {
 impl Play {
     /// An empty stage; all pairs touch by `law`.
     pub(super) fn new(law: Law, faults: Faults) -> Self {
-        Self { stage: Stage::new(law, faults), solids: Vec::new(), links: Vec::new() }
+        Self { stage: StepHarness::new(law, faults), solids: Vec::new(), links: Vec::new() }
     }
 
     /// Adds a rigid body that fixed springs pull; `None` where the body cannot be built.
     pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<AnchorSpring>) -> Option<AgentId> {
         let (mass_kg, gravity) = (spec.mass_kg, spec.gravity);
         let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz, [0.0; 2]);
-        self.stage.hold(id, springs.clone());
+        self.stage.attach_springs(id, springs.clone());
         self.solids.push(Solid { mass_kg, gravity, springs });
         Some(id)
     }
@@ -62,11 +62,11 @@ impl Play {
         self.links.push((of, link));
     }
 
-    /// Plays up to `seconds` and calls `look` with the agent after every step; `false` ends the run, and so does a failed step.
-    pub(super) fn run(mut self, seconds: f64, mut look: impl FnMut(&Self, AgentId) -> bool) -> Self {
-        self.stage.look();
-        while let Some(who) = self.stage.next(seconds) {
-            if self.stage.step(who).is_err() || !look(&self, who) {
+    /// Plays up to `seconds` and calls `go_on` with the agent after every step; `false` ends the run, and so does a failed step.
+    pub(super) fn run(mut self, seconds: f64, mut go_on: impl FnMut(&Self, AgentId) -> bool) -> Self {
+        self.stage.start();
+        while let Some(id) = self.stage.next(seconds) {
+            if self.stage.step(id).is_err() || !go_on(&self, id) {
                 break;
             }
         }
@@ -157,7 +157,7 @@ fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
 
 /// The impulse of contacts on a rigid body, step by step: the change of its momentum minus the parts of gravity and its springs.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Given {
+pub(super) struct ContactImpulse {
     momentum: Option<DVec3>,
     /// The sum, N·s.
     pub(super) sum: DVec3,
@@ -165,9 +165,9 @@ pub(super) struct Given {
     pub(super) size: f64,
 }
 
-impl Given {
-    /// Takes in the state after a step of `dt_s` seconds of a body of this mass under `gravity`.
-    pub(super) fn look(&mut self, snapshot: &Snapshot, (mass_kg, gravity): (f64, DVec3), dt_s: f64) {
+impl ContactImpulse {
+    /// Adds the impulse up to the state after a step of `dt_s` seconds of a body of this mass under `gravity`.
+    pub(super) fn add(&mut self, snapshot: &Snapshot, mass_kg: f64, gravity: DVec3, dt_s: f64) {
         let Body::Rigid(state) = &snapshot.body else { return };
         let momentum = state.velocity * mass_kg;
         if let Some(before) = self.momentum.replace(momentum) {

@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_that_is_none_keeps_no_claim() {
+    fn nan_fulfils_no_claim() {
         assert!(worst([1.0, f64::NAN, 2.0]).is_nan() && worst([]).is_nan());
         let bounded = |numbers: [f64; 2]| Finding::at_most("bounded", worst(numbers), 2.0).holds;
         assert_eq!((bounded([1.0, f64::NAN]), bounded([1.0, 2.0])), (Some(false), Some(true)));

@@ -12,7 +12,7 @@ use std::time::Duration;
 pub(super) struct LockstepRun(Lockstep);
 
 /// A machine on which every step takes no time.
-fn tireless() -> Machine {
+fn free_machine() -> Machine {
     let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
     Machine {
         cores: 64,
@@ -28,7 +28,7 @@ impl LockstepRun {
     /// # Errors
     /// The runtime's refusal.
     pub(super) fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
-        Ok(Self(Lockstep::start(spawns, tireless())?))
+        Ok(Self(Lockstep::start(spawns, free_machine())?))
     }
 
     /// Goes on until all agents have reached `seconds`.

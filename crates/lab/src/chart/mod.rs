@@ -19,6 +19,8 @@ mod sweep;
 pub(super) mod table;
 mod timing;
 
+pub(crate) use stability::common::GRAVITY;
+
 use super::args::{ChartArgs, Subject};
 use accuracy::diagram::Diagram;
 use anyhow::Context;
@@ -145,7 +147,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
         (Subject::Coupling, false) => ("coupling", COUPLING),
         (Subject::Policies, false) => ("policies", POLICIES),
         (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
-        _ => return Err(BadInput("--live is for policies: nothing else is drawn".to_owned()).into()),
+        _ => return Err(BadInput("--live applies to `chart policies` only".to_owned()).into()),
     };
     if args.live {
         // fails here rather than in the rows of the first experiment
@@ -160,7 +162,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     for entry in chosen {
         let one = (entry.run)(&setting)?;
         if !quiet {
-            data(&told(&one))?;
+            data(&summary(&one))?;
         }
         done.push(one);
         if stopped.load(Ordering::Relaxed) {
@@ -173,7 +175,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
         data(&format!("{}\n", serde_json::to_string_pretty(&whole)?))?;
     }
     if interrupted {
-        message("interrupted: the finished rows are kept, and the same command takes them up");
+        message("interrupted: the finished rows are kept; run the same command again to continue");
     }
     Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
 }
@@ -219,9 +221,9 @@ pub(super) fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
 fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     let stem = format!("{}-{}", setting.subject, E::NAME);
     let cases = E::cases(setting.quick);
-    let file = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
+    let (file, kept) = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
     let bar = Bar::new(E::NAME, setting.quiet);
-    let swept = sweep::sweep::<E>(&cases, file, setting.stopped, &mut |done, all| {
+    let swept = sweep::sweep::<E>(&cases, file, kept, setting.stopped, &mut |done, all| {
         bar.tell(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
     })?;
     drop(bar);
@@ -271,7 +273,7 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
 }
 
 /// An experiment's table, findings and files as text.
-fn told(done: &Done) -> String {
+fn summary(done: &Done) -> String {
     let mut findings = Table::new(&["", "claim", "measured", "limit"]);
     let (so_far, state) = if done.complete { ("", "") } else { (" so far", " (unfinished)") };
     for Finding { claim, measured, limit, holds } in &done.findings {

@@ -4,7 +4,7 @@
 
 use super::bench::Faults;
 use super::energy_bench::Play;
-use super::stability::common::{GRAVITY, plain_body, plain_tube};
+use super::stability::common::{GRAVITY, TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_contact::Law;
@@ -24,8 +24,6 @@ pub(super) struct Scene {
 
 /// The scenes with tubes.
 pub(super) const WITH_TUBES: [&str; 3] = ["tube-on-bar", "gripper", "crossing"];
-
-const TUBE_RADIUS_M: f64 = 0.015;
 
 /// The scene with a name.
 pub(super) fn scene(name: &str, rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {

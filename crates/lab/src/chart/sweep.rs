@@ -19,16 +19,17 @@ pub(super) struct Swept<R> {
     pub(super) complete: bool,
 }
 
-/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `told` is called for every
+/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `progress` is called for every
 /// row with the number of rows done and of all rows.
 ///
 /// # Errors
 /// Errors of the file system; a case that panicked.
 pub(super) fn sweep<E: Experiment>(
     cases: &[E::Case],
-    (mut file, kept): (RowFile, Vec<E::Row>),
+    mut file: RowFile,
+    kept: Vec<E::Row>,
     stopped: &AtomicBool,
-    told: &mut dyn FnMut(usize, usize),
+    progress: &mut dyn FnMut(usize, usize),
 ) -> anyhow::Result<Swept<E::Row>> {
     let mut rows: Vec<Option<E::Row>> = cases.iter().map(|_| None).collect();
     for row in kept {
@@ -39,7 +40,7 @@ pub(super) fn sweep<E: Experiment>(
     }
     let open: Vec<usize> = (0..cases.len()).filter(|&k| rows[k].is_none()).collect();
     let mut done = cases.len() - open.len();
-    told(done, cases.len());
+    progress(done, cases.len());
     let next = AtomicUsize::new(0);
     let work = |out: mpsc::Sender<(usize, Option<E::Row>)>| {
         while !stopped.load(Ordering::Relaxed) {
@@ -56,7 +57,10 @@ pub(super) fn sweep<E: Experiment>(
         for number in 0..workers.min(open.len()) {
             let (out, work) = (out.clone(), &work);
             let name = format!("sweep-{number}");
-            thread::Builder::new().name(name).spawn_scoped(scope, move || work(out)).context("no thread to be had")?;
+            thread::Builder::new()
+                .name(name)
+                .spawn_scoped(scope, move || work(out))
+                .context("no thread could be started")?;
         }
         drop(out);
         for (k, row) in rows_in {
@@ -64,7 +68,7 @@ pub(super) fn sweep<E: Experiment>(
             file.add::<E>(&row)?;
             rows[k] = Some(row);
             done += 1;
-            told(done, cases.len());
+            progress(done, cases.len());
         }
         Ok(())
     })?;

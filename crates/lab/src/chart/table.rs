@@ -84,8 +84,8 @@ impl From<String> for Cell {
 }
 
 impl From<(f64, usize)> for Cell {
-    fn from((value, digits): (f64, usize)) -> Self {
-        Self::Number(value, digits)
+    fn from(rounded: (f64, usize)) -> Self {
+        Self::Number(rounded.0, rounded.1)
     }
 }
 
@@ -133,12 +133,12 @@ mod tests {
     }
 
     #[test]
-    fn words_stand_left_and_numbers_right() {
+    fn text_is_left_aligned_and_numbers_right() {
         assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
     }
 
     #[test]
-    fn programs_get_numbers_under_the_columns_names() {
+    fn json_has_numbers_under_the_column_names() {
         let json = serde_json::to_value(table()).unwrap();
         assert_eq!(json[0]["law"], "ledger");
         assert_eq!(json[1]["peak"], 2e9);

@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_half_as_fast_is_not_blamed_for_it() {
+    fn calibration_cancels_the_speed_of_the_machine() {
         let pace = pace_for_goals([None, Some(9.0 * GOALS_US), Some(2.0 * GOALS_US)].into_iter());
         assert!((pace - 0.5).abs() < 1e-12, "{pace}");
         assert!(pace_for_goals([None].into_iter()).is_nan() && calibration_us().is_some_and(|us| us > 0.0));

@@ -10,13 +10,16 @@ use metachron_session::fit::{Converged, Setting};
 const FALLS: f64 = 0.8;
 
 /// One sentence on the best error reached and its limit, for a tolerance and the least error of all runs, metres.
-pub(super) fn told(task: &mut Task<'_>, answer: &Converged, (tolerance_m, best_m): (f64, f64)) -> String {
-    let said =
-        format!("{} cannot be held: the best reached is {}", length(tolerance_m), length(best_m + answer.error_m));
+pub(super) fn explain(task: &mut Task<'_>, answer: &Converged, tolerance_m: f64, best_m: f64) -> String {
+    let said = format!(
+        "a tolerance of {} cannot be met: the least error reached is {}",
+        length(tolerance_m),
+        length(best_m + answer.error_m)
+    );
     if answer.error_m > 0.5 * tolerance_m {
         let finest = describe(&task.refined(answer.level, true));
         return format!(
-            "{said}; what limits it is the converged answer itself, which is known to {} only, at {finest}: start the scene finer, or fit a shorter time (`--seconds`) of a motion that never settles",
+            "{said}; the limit is the converged answer, which is known only to {} at {finest}: use finer settings in the scene, or fit a shorter time (`--seconds`) of a motion that does not settle",
             length(answer.error_m)
         );
     }
@@ -29,12 +32,12 @@ pub(super) fn told(task: &mut Task<'_>, answer: &Converged, (tolerance_m, best_m
         .map(|settings| task.attempt(settings, &answer.paths).map_or(f64::INFINITY, |trial| trial.error_m));
     let [before, by_steps, by_pieces] = errors;
     let what = match (by_steps < FALLS * before, by_pieces < FALLS * before) {
-        (true, false) => "the steps: take shorter ones",
-        (false, true) => "the division: take more segments",
-        (true, true) => "steps and division alike: take both finer",
-        (false, false) => "neither steps nor division, but contact or a motion that never repeats",
+        (true, false) => "the time step: use shorter steps",
+        (false, true) => "the spatial discretization: use more segments",
+        (true, true) => "time step and spatial discretization: refine both",
+        (false, false) => "neither time step nor spatial discretization, but contact or chaotic motion",
     };
-    format!("{said}; what limits it are {what} than {}", describe(&fine))
+    format!("{said}; the limit is {what} (finest tried: {})", describe(&fine))
 }
 
 /// The finest of all settings, as text.

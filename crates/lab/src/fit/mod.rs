@@ -52,7 +52,7 @@ struct Fitted {
 /// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     if !(args.tolerance.is_finite() && args.tolerance > 0.0) {
-        let what = format!("the tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);
+        let what = format!("--tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);
         return Err(BadInput(what).into());
     }
     if args.write {
@@ -65,7 +65,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     let bar = Bar::new("fit", args.common.quiet || args.common.json);
-    let mut task = Task::new(args, scene, objects, (&stopped, bar))?;
+    let mut task = Task::new(args, scene, objects, &stopped, bar)?;
     let fitted = fit(&mut task, args)?;
     task.clear_bar();
     let fitted = match fitted {
@@ -75,7 +75,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
             return Ok(Exit::Failed);
         }
         Outcome::Interrupted => {
-            message("interrupted before anything was found to hold: nothing was written");
+            message("interrupted before any settings within the tolerance were found: nothing was written");
             return Ok(Exit::Interrupted);
         }
     };
@@ -89,7 +89,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
         message(&format!("{}: {changes} keys were changed", args.scene));
     }
     if stopped.load(Ordering::Relaxed) {
-        message("interrupted: this is the best that was found so far");
+        message("interrupted: these are the best settings found so far");
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Ok)
@@ -101,7 +101,7 @@ fn refuse_built_in(name: &str) -> anyhow::Result<()> {
         return Ok(());
     }
     let what = format!(
-        "`{name}` comes with the program and is not overwritten: `--write` changes scene files; save it as one, such as {name}.toml, and fit that"
+        "`{name}` is a built-in scene and cannot be overwritten: `--write` changes scene files; save it to a file such as {name}.toml and fit that"
     );
     Err(BadInput(what).into())
 }
@@ -121,20 +121,20 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let found = converge(LEVELS_MAX, KNOWN * tolerance_m, &mut |level| task.reference(level));
     task.failure()?;
     let Some(answer) = found else {
-        return Ok(if task.left() <= 1 { too_few(task, args) } else { ended(task, |task| task.lost()) });
+        return Ok(if task.left() <= 1 { too_few_runs(task, args) } else { ended(task, |task| task.lost()) });
     };
     let room_m = tolerance_m - answer.error_m;
     let present = task.attempt(&now, &answer.paths);
     task.failure()?;
-    let Some(present) = present else { return Ok(too_few(task, args)) };
+    let Some(present) = present else { return Ok(too_few_runs(task, args)) };
     let mut best = f64::INFINITY;
     let start = start(task, &answer, room_m, &mut best);
     task.failure()?;
     if task.left() < AFTER_SEARCH {
-        return Ok(too_few(task, args));
+        return Ok(too_few_runs(task, args));
     }
     let Some((settings, trial)) = start else {
-        return Ok(ended(task, |task| limits::told(task, &answer, (tolerance_m, best))));
+        return Ok(ended(task, |task| limits::explain(task, &answer, tolerance_m, best)));
     };
     let choices = task.choices();
     let trials_max = task.left() - AFTER_SEARCH;
@@ -150,13 +150,14 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
 }
 
 /// The outcome without an answer: the reason, unless the user interrupted.
-fn ended<'a>(task: &mut Task<'a>, told: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
-    if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(told(task)) }
+fn ended<'a>(task: &mut Task<'a>, explain: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
+    if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(explain(task)) }
 }
 
 /// The outcome where the runs were used up before anything was found.
-fn too_few(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
-    let what = "runs are too few to find the converged answer and settings that hold: give more with --runs";
+fn too_few_runs(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
+    let what =
+        "runs are too few to find the converged answer and settings within the tolerance: allow more with --runs";
     ended(task, |_| format!("{} {what}", args.runs))
 }
 

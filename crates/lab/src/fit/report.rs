@@ -17,13 +17,13 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
     for object in 0..task.objects.len() {
         let name = task.objects[object].name.as_str();
         let [pays, needs] = models(task, object);
-        table.rows.push(row(task, fitted, (object, 0), [name, pays, "pays"]));
-        table.rows.push(row(task, fitted, (object, 1), ["", if needs == pays { "" } else { needs }, "needs"]));
+        table.rows.push(row(task, fitted, object, 0, [name, pays, "pays"]));
+        table.rows.push(row(task, fitted, object, 1, ["", if needs == pays { "" } else { needs }, "needs"]));
     }
     let Fitted { now, need, known_m, .. } = fitted;
-    let held = if now.1.error_m + known_m <= args.tolerance { "holds" } else { "does not hold" };
+    let held = if now.1.error_m + known_m <= args.tolerance { "met" } else { "not met" };
     let mut out = format!(
-        "{}: {} points within {} over {} s, against an answer known to {}\n  as it is it {held} it: {} off, {:.3} ms a simulated second\n  needed are {:.3} ms: {} off ({} runs)\n\n{}",
+        "{}: {} points within {} over {} s, against a converged answer known to {}\n  present settings: tolerance {held}, error {}, {:.3} ms per simulated second\n  needed settings: {:.3} ms, error {} ({} runs)\n\n{}",
         args.scene,
         task.held,
         length(args.tolerance),
@@ -36,17 +36,17 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
         task.runs.get(),
         table.text()
     );
-    out.push_str("ms_per_s: by the declared machine, milliseconds of one core a simulated second; cpu_ms_per_s: as measured here\n");
-    out.push_str(&format!("a solve as measured here, beside one of implicit-euler: {}\n", prices(task)));
+    out.push_str("ms_per_s: milliseconds of one core per simulated second on the declared machine; cpu_ms_per_s: measured on this machine\n");
+    out.push_str(&format!("cost of a solve on this machine, relative to implicit-euler: {}\n", prices(task)));
     notes(fitted).for_each(|note| out.push_str(&format!("note  {note}\n")));
     if need.cut_short {
-        out.push_str("note  the search ended before its end: there may be something cheaper\n");
+        out.push_str("note  the search was cut short: cheaper settings may exist\n");
     }
     out
 }
 
-fn row(task: &Task<'_>, fitted: &Fitted, (object, which): (usize, usize), head: [&str; 3]) -> Vec<Cell> {
-    let (setting, cost_s) = picked(fitted, object, which);
+fn row(task: &Task<'_>, fitted: &Fitted, object: usize, which: usize, head: [&str; 3]) -> Vec<Cell> {
+    let (setting, cost_s) = setting_and_cost(fitted, object, which);
     let pieces: Cell = if setting.pieces > 0 { Cell::Number(f64::from(setting.pieces), 0) } else { "-".into() };
     let mut cells: Vec<Cell> = head.iter().map(|text| (*text).into()).collect();
     cells.extend([
@@ -55,7 +55,7 @@ fn row(task: &Task<'_>, fitted: &Fitted, (object, which): (usize, usize), head: 
         pieces,
         Cell::Number(cost_s * 1e3, 4),
         Cell::Number(fitted.cpu_s[which][object] * 1e3, 3),
-        simpler(fitted, object).filter(|_| which == 1).map_or("", |told| told.word).into(),
+        simpler(fitted, object).filter(|_| which == 1).map_or("", |note| note.word).into(),
     ]);
     cells
 }
@@ -70,7 +70,7 @@ fn simpler(fitted: &Fitted, object: usize) -> Option<&Simpler> {
 }
 
 fn notes(fitted: &Fitted) -> impl Iterator<Item = &str> {
-    fitted.simpler.iter().flatten().map(|told| told.note.as_str())
+    fitted.simpler.iter().flatten().map(|found| found.note.as_str())
 }
 
 /// The cost of a solve by every integrator.
@@ -80,7 +80,7 @@ fn prices(task: &Task<'_>) -> String {
 }
 
 /// An object's setting and cost: present or needed.
-fn picked(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
+fn setting_and_cost(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
     match which {
         0 => (fitted.now.0[object], fitted.now.1.costs_s[object]),
         _ => (fitted.need.settings[object], fitted.need.trial.costs_s[object]),
@@ -94,7 +94,7 @@ fn method(model: &str, setting: Setting) -> Option<&'static str> {
 /// The same as JSON.
 pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bool) -> anyhow::Result<String> {
     let side = |object: usize, which: usize| -> Value {
-        let (setting, cost_s) = picked(fitted, object, which);
+        let (setting, cost_s) = setting_and_cost(fitted, object, which);
         let cpu = fitted.cpu_s[which][object];
         let model = models(task, object)[which];
         json!({
@@ -108,12 +108,12 @@ pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bo
     };
     let object = |at: usize| {
         let (name, [model, _]) = (&task.objects[at].name, models(task, at));
-        let simpler = simpler(fitted, at).map(|told| told.word);
+        let simpler = simpler(fitted, at).map(|note| note.word);
         json!({ "name": name, "model": model, "pays": side(at, 0), "needs": side(at, 1), "simpler": simpler })
     };
     let price = |(integrator, price): (Integrator, &f64)| (integrator.name().to_owned(), json!(finite(*price)));
     let solves: serde_json::Map<_, _> = Integrator::ALL.into_iter().zip(&task.prices).map(price).collect();
-    let told = json!({
+    let report = json!({
         "scene": args.scene,
         "tolerance_m": args.tolerance,
         "seconds": args.seconds,
@@ -128,7 +128,7 @@ pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bo
         "complete": !fitted.need.cut_short,
         "written": written,
     });
-    Ok(format!("{}\n", serde_json::to_string_pretty(&told)?))
+    Ok(format!("{}\n", serde_json::to_string_pretty(&report)?))
 }
 
 fn finite(number: f64) -> Option<f64> {

@@ -35,14 +35,14 @@ pub(super) struct Limits<'a> {
 pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -> Vec<Option<Simpler>> {
     let Some(played) = task.play(&need.settings) else { return Vec::new() };
     let plain = |object: usize| {
-        own(task, object)
-            .or_else(|| resting(task, &played, (object, limits.room_m)))
-            .or_else(|| flying(task, &played, (object, limits.room_m)))
+        own_control(task, object)
+            .or_else(|| resting(task, &played, object, limits.room_m))
+            .or_else(|| flying(task, &played, object, limits.room_m))
     };
     let mut simpler: Vec<_> = (0..task.objects.len()).map(plain).collect();
-    for (object, told) in simpler.iter_mut().enumerate() {
-        if told.is_none() {
-            *told = slack(task, object, need, limits);
+    for (object, note_of) in simpler.iter_mut().enumerate() {
+        if note_of.is_none() {
+            *note_of = slack(task, object, need, limits);
         }
     }
     simpler
@@ -56,15 +56,15 @@ fn paths(task: &Task<'_>, played: &Played, object: usize) -> Vec<Path> {
 }
 
 /// The note on an object whose settings may not be chosen.
-fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
+fn own_control(task: &Task<'_>, object: usize) -> Option<Simpler> {
     let tolerance_m = task.member(object).tolerance_m?;
     let (name, held) = (&task.objects[object].name, length(tolerance_m));
-    let note = format!("`{name}` holds an error of {held} by itself: its steps and segments are not chosen here");
-    Some(Simpler { word: "its own choice", note })
+    let note = format!("`{name}` controls its own error to {held}: its steps and segments are not chosen by fit");
+    Some(Simpler { word: "own control", note })
 }
 
 /// The note on an object that does not move.
-fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
+fn resting(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Option<Simpler> {
     let paths = paths(task, played, object);
     let still = !paths.is_empty() && paths.iter().all(|path| path.extent_m() <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
@@ -76,7 +76,7 @@ fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> 
 }
 
 /// The note on a body that nothing touches.
-fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
+fn flying(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Option<Simpler> {
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
     let agents = &task.objects[object].agents;
     let paired = played.pairs.iter().any(|(a, b)| agents.contains(a) || agents.contains(b));
@@ -84,7 +84,7 @@ fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> O
     let flies = paths(task, played, object).iter().all(|path| path.from_flight_m(spec.gravity) <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
     let note = format!(
-        "nothing touches `{name}` in {seconds} s: it needs no contact solver, and its flight is exact at any step"
+        "`{name}` touches nothing in {seconds} s: it needs no contact solver, and its free flight is exact at any step"
     );
     (!paired && !jointed && flies).then_some(Simpler { word: "flight: no solver", note })
 }
@@ -104,10 +104,10 @@ fn slack(task: &mut Task<'_>, object: usize, need: &mut Found, limits: &Limits<'
     let Setting { dt_s, pieces, .. } = rope.settings[object];
     let [as_rope_ms, as_tube_ms] = [&rope, &*need].map(|found| found.trial.costs_s[object] * 1e3);
     let note = format!(
-        "`{}` neither twists nor bends stiffly enough to matter: `model = \"rope\"` with {pieces} segments and {:.3} ms costs {as_rope_ms:.3} ms a second, the tube {as_tube_ms:.3} ms{}",
+        "torsion and bending of `{}` have no effect here: `model = \"rope\"` with {pieces} segments and {:.3} ms costs {as_rope_ms:.3} ms per second, the tube {as_tube_ms:.3} ms{}",
         task.objects[object].name,
         dt_s * 1e3,
-        if cheaper { "" } else { ", so it stays one" },
+        if cheaper { "" } else { ", so it stays a tube" },
     );
     if cheaper {
         *need = rope;

@@ -56,10 +56,11 @@ impl<'a> Task<'a> {
         args: &FitArgs,
         scene: Scene,
         objects: Vec<Object>,
-        (stopped, bar): (&'a AtomicBool, Bar),
+        stopped: &'a AtomicBool,
+        bar: Bar,
     ) -> Result<Self, BadInput> {
         if objects.is_empty() {
-            return Err(BadInput(format!("{}: nothing in it moves: there is nothing to fit", scene.name)));
+            return Err(BadInput(format!("{}: no object moves: there is nothing to fit", scene.name)));
         }
         let mut points = held(&scene, &objects, args.probe.as_deref())?;
         let held = points.len();
@@ -87,8 +88,8 @@ impl<'a> Task<'a> {
 
     /// The reason why there is no answer.
     pub(super) fn lost(&self) -> String {
-        let why = self.parked.as_deref().unwrap_or("no run came to its end");
-        format!("there is no answer to hold it against: {why}")
+        let why = self.parked.as_deref().unwrap_or("no run reached its end");
+        format!("there is no converged answer to compare with: {why}")
     }
 
     /// The first agent of an object: all of them are alike.
@@ -128,7 +129,7 @@ impl<'a> Task<'a> {
         let settings = self.refined(level, true);
         let mut played = self.play(&settings)?;
         if let Some((agent, reason)) = &played.parked {
-            self.parked = Some(format!("`{}` gave up: {reason}", self.scene.name_of(*agent)));
+            self.parked = Some(format!("`{}` was parked: {reason}", self.scene.name_of(*agent)));
             return None;
         }
         played.paths.truncate(self.held);
@@ -263,10 +264,9 @@ fn held(scene: &Scene, objects: &[Object], wanted: Option<&str>) -> Result<Vec<P
     match (points.is_empty(), wanted) {
         (false, _) => Ok(points),
         (true, Some(name)) => {
-            let what =
-                format!("there is no probe on `{name}` and no such object that moves; there are {}", names(objects));
+            let what = format!("`{name}` has no probe and is not a moving object; moving objects: {}", names(objects));
             Err(BadInput(what))
         }
-        (true, None) => Err(BadInput(format!("{}: nothing in it has a place: there is nothing to hold", scene.name))),
+        (true, None) => Err(BadInput(format!("{}: no object has a position to compare", scene.name))),
     }
 }

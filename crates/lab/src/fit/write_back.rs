@@ -24,7 +24,7 @@ pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Re
     let again = Source::open(&path.to_string_lossy()).and_then(|source| load(&source, &[]));
     if let Err(error) = again {
         std::fs::write(path, &before).with_context(|| format!("{shown} cannot be written"))?;
-        return Err(anyhow::Error::from(error).context(format!("{shown} was left as it was")));
+        return Err(anyhow::Error::from(error).context(format!("{shown} is unchanged")));
     }
     Ok(changes)
 }
@@ -42,18 +42,18 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
         let wanted = &task.objects[object];
         let member = &scene.agents[wanted.agents[0].0 as usize];
         let table = tables(&mut document).find(|table| name(table) == Some(&wanted.name));
-        let table = table.ok_or_else(|| format!("`{}` has no table `[[object]]` of its own", wanted.name))?;
-        changes += put_dt(table, (now, need));
-        changes += if becomes_rope { to_rope::put(table, member) } else { put(table, member, (now, need)) };
+        let table = table.ok_or_else(|| format!("`{}` has no `[[object]]` table of its own", wanted.name))?;
+        changes += put_dt(table, now, need);
+        changes += if becomes_rope { to_rope::put(table, member) } else { put(table, member, now, need) };
     }
     Ok((document.to_string(), changes))
 }
 
 /// Puts a step into an object's table; returns the number of changed keys.
-fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
+fn put_dt(table: &mut Table, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.dt_s != now.dt_s {
-        let dt_ms = tidy(need.dt_s * 1e3);
+        let dt_ms = rounded(need.dt_s * 1e3);
         let has_rate = table.contains_key("rate_hz");
         if has_rate {
             changes += set(table, "rate_hz", (1e3 / dt_ms).into());
@@ -66,7 +66,7 @@ fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
 }
 
 /// Puts a division and a method into an object's table; returns the number of changed keys.
-fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
+fn put(table: &mut Table, member: &Member, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.pieces != now.pieces {
         changes += set(table, "segments", segments(member));
@@ -102,6 +102,6 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) -> usize {
 }
 
 /// Rounds to six digits after the point, so that 0.1 + 0.2 is 0.3.
-pub(super) fn tidy(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.6}").parse().unwrap_or(value)
 }

@@ -28,13 +28,13 @@ pub(super) struct Checked {
 
 impl Checked {
     /// A line of text.
-    pub fn told(&self) -> String {
-        let told = |settle: Option<f64>| settle.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
+    pub fn text(&self) -> String {
+        let text = |settle: Option<f64>| settle.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
         format!(
-            "on its own frames it settles from {} of the rate in {}; predicted was {}\n",
+            "on measured frames the loop settles from {} of the rate in {}; predicted: {}\n",
             self.rate,
-            told(self.measured_s),
-            told(self.predicted_s)
+            text(self.measured_s),
+            text(self.predicted_s)
         )
     }
 
@@ -67,9 +67,9 @@ pub(super) fn check(
         size: on.size,
         drawing: if on.live { live(on.size)? } else { Drawing::Nothing },
     };
-    let bar = Bar::new("its own frames", args.common.quiet || args.common.json);
+    let bar = Bar::new("measured frames", args.common.quiet || args.common.json);
     let runs = push(Session::open(on.scene.clone())?, pushes, &mut |share| {
-        bar.tell(share, "pushed away from its target".to_owned());
+        bar.tell(share, "step response".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
     let measured = runs.iter().map(|frames| settled_s(frames, set_s));

@@ -26,7 +26,7 @@ const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 
 /// Draws and writes the figure.
 pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuned) -> anyhow::Result<[PathBuf; 2]> {
-    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), misses(on, tuned)];
+    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), late_frames(on, tuned)];
     let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
     let figure = Figure { title, panels, columns: 2 };
     let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
@@ -48,9 +48,9 @@ fn fit(plant: &Plant) -> Panel {
     let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
     let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
     Panel {
-        title: "the plant: measured, and the fitted line".to_owned(),
+        title: "plant: measured frames and fitted line".to_owned(),
         x: Axis::linear("polygons, thousands", x.0.max(0.0), x.1),
-        y: Axis::linear("time of a frame, ms", y.0.max(0.0), y.1),
+        y: Axis::linear("frame time, ms", y.0.max(0.0), y.1),
         layers: vec![
             layer("frames", Colour::Sky, Mark::Dots(points)),
             layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
@@ -58,7 +58,7 @@ fn fit(plant: &Plant) -> Panel {
     }
 }
 
-fn calm(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
+fn undisturbed_trial(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
     Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
 }
 
@@ -74,38 +74,38 @@ fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
 
 /// Step responses from 0.4 and from 2.5 times the target rate.
 fn responses(on: &Identified, tuned: &Tuned) -> Panel {
-    let plant = judged_on(on, tuned);
+    let plant = evaluated_plant(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
     for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
         for (k, rate) in STARTS.into_iter().enumerate() {
-            let beats = play(&plant, &calm(on, row.verdict.contender, rate, SHOWN_S));
+            let beats = play(&plant, &undisturbed_trial(on, row.verdict.contender, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
             layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
         }
     }
     Panel {
-        title: "from 0.4 and from 2.5 times the rate".to_owned(),
+        title: "step responses from 0.4 and from 2.5 times the rate".to_owned(),
         x: Axis::linear("time, s", 0.0, SHOWN_S),
-        y: Axis::log("time of a frame over the wanted one", 0.2, 4.0),
+        y: Axis::log("frame time / target", 0.2, 4.0),
         layers,
     }
 }
 
 /// The plant on the machine on which the gains were judged.
-fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
+fn evaluated_plant(on: &Identified, tuned: &Tuned) -> Plant {
     on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
 }
 
 /// The printed law over (α, β): where it settles, is slow, or swings; the chosen gains as a dot.
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
-    let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
+    let ([columns, rows], plant) = (CELLS, evaluated_plant(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
     let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
         Candidate::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
         _ => None,
     });
     let found: Vec<_> = found.collect();
-    let (alphas, betas) = (around(ALPHA, found.iter().map(|at| at.0)), around(BETA, found.iter().map(|at| at.1)));
+    let (alphas, betas) = (widened(ALPHA, found.iter().map(|at| at.0)), widened(BETA, found.iter().map(|at| at.1)));
     let corners = (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)));
     let cells: Vec<[f64; 4]> = corners
         .map(|(column, row)| {
@@ -115,27 +115,27 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
         .collect();
     let starts = cells.iter().flat_map(|[a, a_end, b, b_end]| {
         let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
-        STARTS.map(|rate| calm(on, law, rate, MAP_S))
+        STARTS.map(|rate| undisturbed_trial(on, law, rate, MAP_S))
     });
     let measured = measure(&plant, &starts.collect::<Vec<_>>(), None);
     let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
     let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
     let [good, slow, swings] = [0, 1, 2].map(of);
     Panel {
-        title: "the printed law over its gains".to_owned(),
+        title: "stability map of the printed law".to_owned(),
         x: Axis::log("α", alphas.0, alphas.1),
         y: Axis::log("β", betas.0, betas.1),
         layers: vec![
             layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
-            layer("slower, or elsewhere", Colour::Sky, Mark::Cells(slow)),
-            layer("swings for ever", Colour::Red, Mark::Cells(swings)),
+            layer("settles later or elsewhere", Colour::Sky, Mark::Cells(slow)),
+            layer("limit cycle", Colour::Red, Mark::Cells(swings)),
             layer("chosen", Colour::Blue, Mark::Dots(found)),
         ],
     }
 }
 
 /// A range extended to contain these values, with half a decade of room around each.
-fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
+fn widened(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
     const ROOM: f64 = 3.2;
     values.fold(range, |(low, high), value| (low.min(value / ROOM), high.max(value * ROOM)))
 }
@@ -150,14 +150,14 @@ fn kind(measured: &[Measures]) -> usize {
 }
 
 /// Late frames over the speed of the machine, with 40 % more load for a third of the time.
-fn misses(on: &Identified, tuned: &Tuned) -> Panel {
+fn late_frames(on: &Identified, tuned: &Tuned) -> Panel {
     let trial = |contender: Candidate, speed: f64| Trial {
         speed,
         disturbance: Disturbance::Load(1.4),
         noise: on.plant.line.scatter,
         seed: 1,
         start: Start::Rate(speed),
-        ..calm(on, contender, 1.0, 4.0)
+        ..undisturbed_trial(on, contender, 1.0, 4.0)
     };
     let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.contender, speed)));
     let measured = measure(&on.plant, &trials.collect::<Vec<_>>(), None);
@@ -169,7 +169,7 @@ fn misses(on: &Identified, tuned: &Tuned) -> Panel {
     let layers: Vec<_> = lines.collect();
     let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);
     Panel {
-        title: "tuned at 1, run on a machine of another speed, load + 40 %".to_owned(),
+        title: "gains tuned at speed 1, on machines of other speeds, load + 40 %".to_owned(),
         x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
         y: Axis::linear("late frames, %", 0.0, 1.05 * high),
         layers,
@@ -181,10 +181,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_found_stands_inside_the_map() {
-        assert_eq!(around(BETA, [1.0].into_iter()), BETA);
-        let (low, high) = around(BETA, [50.0, 0.01].into_iter());
+    fn the_found_gains_are_inside_the_map() {
+        assert_eq!(widened(BETA, [1.0].into_iter()), BETA);
+        let (low, high) = widened(BETA, [50.0, 0.01].into_iter());
         assert!(low < 0.004 && high > 150.0, "{low} {high}");
-        assert_eq!(around(ALPHA, std::iter::empty()), ALPHA);
+        assert_eq!(widened(ALPHA, std::iter::empty()), ALPHA);
     }
 }

@@ -70,7 +70,8 @@ impl Tuned {
 pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
     let scene = scene(args)?;
     let given = args.analyse.as_deref().map(|text| gains::parsed(text, scene.target.frame_hz)).transpose()?;
-    let fragment = args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", stem(&args.scene))));
+    let fragment =
+        args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", file_stem(&args.scene))));
     if given.is_none() {
         gains::check_place(&fragment, "--gains", args.force)?;
     }
@@ -85,7 +86,7 @@ pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
 }
 
 /// The scene's name as a part of a file's name.
-fn stem(name: &str) -> String {
+fn file_stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
@@ -99,12 +100,12 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
     let bar = Bar::new("experiment", args.common.quiet || args.common.json);
     let done = experiment(session, plan, &mut |share| {
-        bar.tell(share, "drawing at many resolutions".to_owned());
+        bar.tell(share, "drawing frames at many resolutions".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
     drop(bar);
     if done.interrupted {
-        message("interrupted before the experiment was over: nothing is known yet, and nothing was written");
+        message("interrupted before the identification experiment ended: nothing was written");
         return Ok(None);
     }
     let plant = Plant::identify(&done.observed).map_err(|why| BadInput(format!("{}: {why}", scene.name)))?;
@@ -159,7 +160,7 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     let mut checked = Vec::new();
     // after an interrupt the user does not wait for figures
     if !tuned.interrupted {
-        files.extend(figures::write(folder, &stem(&on.scene.name), on, &tuned)?);
+        files.extend(figures::write(folder, &file_stem(&on.scene.name), on, &tuned)?);
         checked = checked::check(args, on, &tuned, stopped)?;
     }
     data(&if args.common.json {
@@ -195,12 +196,12 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
             break;
         }
     }
-    let best = best_law(&found).context("not one candidate could be judged")?;
+    let best = best_law(&found).context("no candidate could be evaluated")?;
     let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
     let mut rows: Vec<_> =
         found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
     let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.contender == best.into()).cloned();
-    rows.extend(verdict.iter().flat_map(|verdict| rivals(on, verdict, extent)));
+    rows.extend(verdict.iter().flat_map(|verdict| reference_laws(on, verdict, extent)));
     Ok(Tuned { rows, found, best, interrupted })
 }
 
@@ -215,11 +216,11 @@ fn best_law(found: &[(Family, Found)]) -> Option<Law> {
 }
 
 /// The laws for comparison with the gains found; the relay's law has the same margin.
-fn rivals(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
+fn reference_laws(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
     let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
     let margin = 1.0 - best.contender.set_share();
     let rivals = [
-        ("corrected, its own", Some(Law::CORRECTED)),
+        ("corrected, default gains", Some(Law::CORRECTED)),
         ("printed, α = 1e-4", Some(Law::PRINTED)),
         ("normalised, α = k/f₀", Some(normalised)),
         ("relay (Ziegler-Nichols)", relay_gains(&on.plant.on(best.at_speed), on.target_hz, margin)),

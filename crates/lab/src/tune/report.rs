@@ -47,22 +47,22 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
     format!(
         "{}{}\n{}\nbest: {}\n{}files: {}\n",
         plant(on),
-        elsewhere(tuned),
+        speed_note(tuned),
         table.text(),
         gains::told(tuned.best.into()),
-        checked.iter().map(Checked::told).collect::<String>(),
+        checked.iter().map(Checked::text).collect::<String>(),
         files.join(", ")
     )
 }
 
 /// A note where the gains were judged on another machine, because the view leaves nothing to control on this one.
-fn elsewhere(tuned: &Tuned) -> String {
+fn speed_note(tuned: &Tuned) -> String {
     let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
     if speed == 1.0 {
         return String::new();
     }
     format!(
-        "  on this machine it rests at its finest and takes less than it may: judged on one {speed} times as fast\n"
+        "note  on this machine the finest level fits in the frame budget: gains were evaluated on a machine {speed} times as fast\n"
     )
 }
 
@@ -180,24 +180,24 @@ fn gains_json(contender: Candidate) -> Value {
 pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String {
     let near = e.near.map_or_else(String::new, |near| {
         format!(
-            "  near the set point a frame removes {:.1} % of an error, and the loop swings past {:.1} %; with the machine's speed off as far \
-             as the target can be reached: {}\n",
+            "  near the set point a frame removes {:.1} % of an error, and the loop is unstable past {:.1} %; margins over \
+             the machine speeds at which the target can be reached: {}\n",
             100.0 * near.gain,
             100.0 * near.gain * near.gain_margin(),
             v.margins.map_or_else(|| "out of reach".to_owned(), margins)
         )
     });
     let rest = |eps: f64, ratio: f64, end: bool| {
-        format!("ε̂ = {eps:.4} at {ratio:.2} of its time{}", if end { " (a limit)" } else { "" })
+        format!("ε̂ = {eps:.4} at {ratio:.2} of the target time{}", if end { " (a limit)" } else { "" })
     };
     let rests: Vec<_> = e.rests.iter().map(|r| rest(r.eps_hat, r.ratio, r.clamped)).collect();
     let cycle = e.cycle.map_or_else(String::new, |c| {
-        format!("  it swings by {:.1} % of its time every {:.3} s\n", 100.0 * c.amplitude, c.period_s)
+        format!("  limit cycle: amplitude {:.1} % of the frame time, period {:.3} s\n", 100.0 * c.amplitude, c.period_s)
     });
     let settle = |k: usize| e.from[k].settle_s.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
     format!(
         "{}  {}, {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  can rest: {}\n{cycle}  settles from 0.4 of the rate: \
-         {}, from 2.5: {}; overshoot {:.2}, {:.2}\n  n changes {:.3} times a frame at rest; late {:.2} % of disturbed frames\n\n{}\n",
+         {}, from 2.5: {}; overshoot {:.2}, {:.2}\n  n changes {:.3} times per frame at rest; late {:.2} % of disturbed frames\n\n{}\n",
         plant(on),
         law_name(v.contender),
         gains::told(v.contender),

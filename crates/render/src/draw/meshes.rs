@@ -42,11 +42,11 @@ impl Mesh {
 
     /// Draws `count` instances, as triangles or as edges; returns the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, count: u32) -> u32 {
-        self.draw_first(pass, (edges, u32::MAX), count)
+        self.draw_first(pass, edges, u32::MAX, count)
     }
 
     /// Draws its first `triangles` (all edges, if edges are requested) for `count` instances; returns the number of draws.
-    pub fn draw_first(&self, pass: &mut wgpu::RenderPass<'_>, (edges, triangles): (bool, u32), count: u32) -> u32 {
+    pub fn draw_first(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, triangles: u32, count: u32) -> u32 {
         let first = self.corners.min(triangles.saturating_mul(3));
         let (indices, corners) = if edges { (&self.edges, self.ends) } else { (&self.triangles, first) };
         if corners == 0 || count == 0 {
@@ -71,7 +71,7 @@ fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
 pub struct Meshes {
     patches: [Option<Mesh>; N_MAX as usize + 1],
     solids: HashMap<MeshKey, Mesh>,
-    given: Option<Arc<[PrimitiveMesh]>>,
+    custom: Option<Arc<[PrimitiveMesh]>>,
     /// Foliage levels by model and level index, and whether they are strokes.
     parts: HashMap<(u32, u8), (Mesh, bool)>,
     models: Option<Arc<[Model]>>,
@@ -80,9 +80,9 @@ pub struct Meshes {
 impl Meshes {
     /// Makes the meshes that `picture` needs and that are missing.
     pub fn prepare(&mut self, device: &wgpu::Device, picture: &Picture) {
-        if self.given.as_ref().is_none_or(|given| !Arc::ptr_eq(given, &picture.meshes)) {
-            self.solids.retain(|key, _| !matches!(key, MeshKey::Given(_)));
-            self.given = Some(Arc::clone(&picture.meshes));
+        if self.custom.as_ref().is_none_or(|custom| !Arc::ptr_eq(custom, &picture.meshes)) {
+            self.solids.retain(|key, _| !matches!(key, MeshKey::Custom(_)));
+            self.custom = Some(Arc::clone(&picture.meshes));
         }
         for tube in &picture.tubes {
             for n in [tube.n, tube.n.min(super::passes::SHADOW_LEVEL)] {
@@ -97,7 +97,7 @@ impl Meshes {
         }
         for run in &picture.solids {
             match run.kind.mesh {
-                MeshKey::Cut(..) | MeshKey::Glide(..) => {}
+                MeshKey::Cut(..) | MeshKey::Geomorph(..) => {}
                 MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
                 key => {
                     self.solids.entry(key).or_insert_with(|| solid_mesh(device, key, &picture.meshes));
@@ -143,7 +143,7 @@ fn patch_mesh(device: &wgpu::Device, n: u8) -> Mesh {
     Mesh::new(device, bytemuck::cast_slice(&vertices), &triangles)
 }
 
-fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> Mesh {
+fn solid_mesh(device: &wgpu::Device, key: MeshKey, custom: &[PrimitiveMesh]) -> Mesh {
     let made;
     let mesh = match key {
         MeshKey::Primitive(primitive, n) => {
@@ -154,25 +154,30 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> M
             made = slab(cells);
             &made
         }
-        MeshKey::Given(number) => match given.get(number as usize) {
+        MeshKey::Custom(number) => match custom.get(number as usize) {
             Some(mesh) => mesh,
             None => &PrimitiveMesh::default(),
         },
-        MeshKey::Cut(..) | MeshKey::Glide(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
+        MeshKey::Cut(..) | MeshKey::Geomorph(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
     };
     primitive_mesh(device, mesh)
 }
 
-/// The corners of a point and of a line, by the shader's numbers, and their triangles.
-const POINT: (&[u8], &[[u32; 3]]) = (&[0, 1, 2], &[[0, 1, 2]]);
-const LINE: (&[u8], &[[u32; 3]]) = (&[4, 5, 6, 7], &[[0, 1, 2], [0, 2, 3]]);
+/// The mesh of one stroke: its corners by the shader's numbers, and its triangles.
+struct StrokeShape {
+    corners: &'static [u8],
+    triangles: &'static [[u32; 3]],
+}
 
-fn strokes_mesh(device: &wgpu::Device, strokes: &[Stroke], (corners, faces): &(&[u8], &[[u32; 3]])) -> Mesh {
+const POINT: StrokeShape = StrokeShape { corners: &[0, 1, 2], triangles: &[[0, 1, 2]] };
+const LINE: StrokeShape = StrokeShape { corners: &[4, 5, 6, 7], triangles: &[[0, 1, 2], [0, 2, 3]] };
+
+fn strokes_mesh(device: &wgpu::Device, strokes: &[Stroke], shape: &StrokeShape) -> Mesh {
     let corner = |s: &Stroke, c: u8| [s.from.extend(s.radius_m).to_array(), s.way.extend(f32::from(c)).to_array()];
     let vertices: Vec<[[f32; 4]; 2]> =
-        strokes.iter().flat_map(|stroke| corners.iter().map(move |&c| corner(stroke, c))).collect();
-    let stride = corners.len() as u32;
-    let face = |i: u32| faces.iter().map(move |t| t.map(|c| i * stride + c));
+        strokes.iter().flat_map(|stroke| shape.corners.iter().map(move |&c| corner(stroke, c))).collect();
+    let stride = shape.corners.len() as u32;
+    let face = |i: u32| shape.triangles.iter().map(move |t| t.map(|c| i * stride + c));
     let triangles: Vec<[u32; 3]> = (0..strokes.len() as u32).flat_map(face).collect();
     Mesh::new(device, bytemuck::cast_slice(&vertices), &triangles)
 }
@@ -188,14 +193,15 @@ fn slab(cells: [u8; 3]) -> PrimitiveMesh {
     for axis in 0..3 {
         let (right, up) = ((axis + 1) % 3, (axis + 2) % 3);
         for side in [-1.0_f32, 1.0] {
-            add_face(&mut mesh, (axis, right, up), side, [cells[right], cells[up]].map(u32::from));
+            add_face(&mut mesh, axis, side, [cells[right], cells[up]].map(u32::from));
         }
     }
     mesh
 }
 
-/// One side of a box of half extents 1: a grid of `columns` × `rows` cells along the axes `right` and `up`.
-fn add_face(mesh: &mut PrimitiveMesh, (axis, right, up): (usize, usize, usize), side: f32, [columns, rows]: [u32; 2]) {
+/// One side of a box of half extents 1, across an axis: a grid of `columns` × `rows` cells along the next two axes.
+fn add_face(mesh: &mut PrimitiveMesh, axis: usize, side: f32, [columns, rows]: [u32; 2]) {
+    let (right, up) = ((axis + 1) % 3, (axis + 2) % 3);
     let first = mesh.vertices.len() as u32;
     let mut normal = Vec3::ZERO;
     normal[axis] = side;

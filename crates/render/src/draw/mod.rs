@@ -15,7 +15,7 @@ mod textures;
 mod timing;
 mod tissue;
 
-use super::offscreen::Lost;
+use super::offscreen::DeviceLoss;
 use super::picture::{Picture, SkinSample, SolidInstance};
 use super::view::{Camera, Size};
 use bindings::{Bindings, Layouts};
@@ -100,7 +100,7 @@ pub enum DrawError {
         reason: String,
     },
     /// wgpu rejected a call: a bug of this crate, or a device out of memory. The picture is undefined.
-    #[error("the graphics device refused: {message}")]
+    #[error("the graphics device reported an error: {message}")]
     Refused {
         /// The message of wgpu.
         message: String,
@@ -114,7 +114,7 @@ pub struct Renderer {
     queue: wgpu::Queue,
     options: RendererOptions,
     format: wgpu::TextureFormat,
-    lost: Lost,
+    lost: DeviceLoss,
     pipelines: Pipelines,
     bindings: Bindings,
     meshes: Meshes,
@@ -138,7 +138,7 @@ impl Renderer {
         format: wgpu::TextureFormat,
         options: RendererOptions,
     ) -> Result<Self, DrawError> {
-        let lost = Lost::watch(device);
+        let lost = DeviceLoss::watch(device);
         let options = RendererOptions {
             samples: if options.samples > 1 { 4 } else { 1 },
             shadow_px: options.shadow_px.clamp(64, 8192).min(device.limits().max_texture_dimension_2d),
@@ -172,7 +172,7 @@ impl Renderer {
 
     /// Whether and why the device was lost.
     #[must_use]
-    pub fn lost(&self) -> &Lost {
+    pub fn lost(&self) -> &DeviceLoss {
         &self.lost
     }
 

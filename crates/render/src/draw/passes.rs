@@ -4,6 +4,7 @@
 
 use super::super::level::Shading;
 use super::super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
+use super::cuts::MorphedCut;
 use super::meshes::Mesh;
 use super::timing::Timing;
 use super::{Renderer, Target};
@@ -36,7 +37,7 @@ impl Renderer {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
-        draws + self.draw_skins(&mut pass, picture, (|_| &self.pipelines.solid_shadow, false))
+        draws + self.draw_skins(&mut pass, picture, |_| &self.pipelines.solid_shadow, false)
     }
 
     /// Draws the picture, nearest kinds first so that hidden pixels are not lit; returns the number of draws.
@@ -72,7 +73,7 @@ impl Renderer {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
-        draws += self.draw_skins(&mut pass, picture, (|shading| self.pipelines.solid_of(shading, false), false));
+        draws += self.draw_skins(&mut pass, picture, |shading| self.pipelines.solid_of(shading, false), false);
         if picture.style.wireframe {
             draws += self.draw_edges(&mut pass, picture);
         }
@@ -100,7 +101,7 @@ impl Renderer {
         for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.kind.mesh)) {
             draws += self.draw_solids(pass, run, true);
         }
-        draws + self.draw_skins(pass, picture, (|_| &self.pipelines.solid_edges, true))
+        draws + self.draw_skins(pass, picture, |_| &self.pipelines.solid_edges, true)
     }
 
     /// The skins of soft bodies, each a mesh drawn once with the pipeline of its shading.
@@ -108,7 +109,8 @@ impl Renderer {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         picture: &Picture,
-        (pipeline, edges): (impl Fn(Shading) -> &'a wgpu::RenderPipeline, bool),
+        pipeline: impl Fn(Shading) -> &'a wgpu::RenderPipeline,
+        edges: bool,
     ) -> u32 {
         let Some(instances) = self.instances.buffer() else { return 0 };
         let stride = size_of::<SolidInstance>() as u64;
@@ -146,20 +148,24 @@ impl Renderer {
         let from = u64::from(run.first) * stride;
         pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
         match run.kind.mesh {
-            MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut, None), (edges, run.count)),
-            MeshKey::Glide(model, cut, to) => self.cuts.draw(pass, (model, cut, Some(to)), (edges, run.count)),
-            MeshKey::Part(model, rung, triangles) => {
-                self.meshes.part(model, rung).map_or(0, |mesh| draw_still(pass, mesh, (edges, triangles), run.count))
+            MeshKey::Cut(model, cut) => {
+                self.cuts.draw(pass, MorphedCut { model, cut, coarser: None }, edges, run.count)
             }
-            key => self.meshes.solid(key).map_or(0, |mesh| draw_still(pass, mesh, (edges, u32::MAX), run.count)),
+            MeshKey::Geomorph(model, cut, to) => {
+                self.cuts.draw(pass, MorphedCut { model, cut, coarser: Some(to) }, edges, run.count)
+            }
+            MeshKey::Part(model, rung, triangles) => {
+                self.meshes.part(model, rung).map_or(0, |mesh| draw_still(pass, mesh, edges, triangles, run.count))
+            }
+            key => self.meshes.solid(key).map_or(0, |mesh| draw_still(pass, mesh, edges, u32::MAX, run.count)),
         }
     }
 }
 
 /// Draws a mesh that is not morphing: both ends of its geomorph are the mesh itself.
-fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, (edges, triangles): (bool, u32), count: u32) -> u32 {
+fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, edges: bool, triangles: u32, count: u32) -> u32 {
     pass.set_vertex_buffer(2, mesh.vertices());
-    mesh.draw_first(pass, (edges, triangles), count)
+    mesh.draw_first(pass, edges, triangles, count)
 }
 
 fn depth(view: &wgpu::TextureView, clear: f32, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {

@@ -118,7 +118,7 @@ impl Pipelines {
         };
         let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
         let painted = module("painted", &[SOLID, PAINTED].concat());
-        let kitchen = PipelineBuilder::new(device, layouts, format, options);
+        let builder = PipelineBuilder::new(device, layouts, format, options);
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
             layout(16, vertex, &wgpu::vertex_attr_array![0 => Float32x4]),
@@ -132,12 +132,12 @@ impl Pipelines {
         ];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
-            kitchen.cook(&PipelineDesc { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
+            builder.create(&PipelineDesc { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
         };
         let solid = |label, vertex, fragment, topology| {
-            kitchen.cook(&PipelineDesc { label, vertex, fragment, buffers: &solids, topology, module: &solid })
+            builder.create(&PipelineDesc { label, vertex, fragment, buffers: &solids, topology, module: &solid })
         };
-        let [stroke, stroke_shadow] = kitchen.strokes(&module("stroke", &[SOLID, STROKE].concat()));
+        let [stroke, stroke_shadow] = builder.strokes(&module("stroke", &[SOLID, STROKE].concat()));
         let lean = |entry: [&'static str; 2]| entry[usize::from(options.lean)];
         let skin_vertex = lean(["vs_skin", "vs_skin_lean"]);
         Self {
@@ -155,20 +155,20 @@ impl Pipelines {
             ),
             solid_flat: solid("flat solid", "vs_flat", Some("fs_flat"), TriangleList),
             solid_gouraud: solid("gouraud solid", "vs_slab", Some("fs_slab"), TriangleList),
-            painted: kitchen.painted(&solids, (&painted, "fs_painted")),
+            painted: builder.painted(&solids, &painted, "fs_painted"),
             skins_shadowed: ["fs_skin_shadowed", "fs_tissue_shadowed"]
                 .map(|fragment| tube("shadowed skin", "vs_skin", Some(fragment), TriangleList)),
             solids_shadowed: [
                 solid("shadowed solid", "vs_solid", Some("fs_solid_shadowed"), TriangleList),
-                kitchen.painted(&solids, (&painted, "fs_painted_shadowed")),
+                builder.painted(&solids, &painted, "fs_painted_shadowed"),
             ],
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
             solid_edges: solid("solid edges", "vs_solid", Some("fs_solid_edge"), LineList),
             solid_shadow: solid("solid shadow", "vs_solid_shadow", None, TriangleList),
-            floor: kitchen.floor(&floor, options.lean),
-            room: kitchen.plain(&floor, ("vs_room", "fs_room"), TriangleList),
+            floor: builder.floor(&floor, options.lean),
+            room: builder.plain(&floor, "vs_room", "fs_room", TriangleList),
         }
     }
 }
@@ -216,11 +216,11 @@ impl<'a> PipelineBuilder<'a> {
     fn floor(&self, module: &ShaderModule, lean: bool) -> Vec<(RenderPipeline, u32)> {
         use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
         if !lean {
-            return vec![(self.plain(module, ("vs_floor", "fs_floor"), TriangleStrip), 4)];
+            return vec![(self.plain(module, "vs_floor", "fs_floor", TriangleStrip), 4)];
         }
         vec![
-            (self.plain(module, ("vs_floor_patch", "fs_floor_patch"), TriangleList), FLOOR_PATCH_CORNERS),
-            (self.plain(module, ("vs_floor_rings", "fs_floor_rings"), TriangleList), FLOOR_RING_CORNERS),
+            (self.plain(module, "vs_floor_patch", "fs_floor_patch", TriangleList), FLOOR_PATCH_CORNERS),
+            (self.plain(module, "vs_floor_rings", "fs_floor_rings", TriangleList), FLOOR_RING_CORNERS),
         ]
     }
 
@@ -228,10 +228,11 @@ impl<'a> PipelineBuilder<'a> {
     fn plain(
         &self,
         module: &ShaderModule,
-        (vertex, fragment): (&str, &str),
+        vertex: &str,
+        fragment: &str,
         topology: wgpu::PrimitiveTopology,
     ) -> RenderPipeline {
-        self.cook(&PipelineDesc { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
+        self.create(&PipelineDesc { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
     }
 
     /// Pipelines for points and lines, in the picture and in the shadow map.
@@ -243,7 +244,7 @@ impl<'a> PipelineBuilder<'a> {
         ];
         let topology = wgpu::PrimitiveTopology::TriangleList;
         [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
-            self.cook(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
+            self.create(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
         })
     }
 
@@ -251,23 +252,24 @@ impl<'a> PipelineBuilder<'a> {
     fn painted(
         &self,
         buffers: &[Option<VertexBufferLayout<'_>>],
-        (module, fragment): (&ShaderModule, &str),
+        module: &ShaderModule,
+        fragment: &str,
     ) -> RenderPipeline {
         let (vertex, fragment) = ("vs_painted", Some(fragment));
         let topology = wgpu::PrimitiveTopology::TriangleList;
-        self.cook_in(
+        self.create_with(
             &PipelineDesc { label: "painted", vertex, fragment, buffers, topology, module },
             &self.with_texture,
         )
     }
 
-    fn cook(&self, recipe: &PipelineDesc<'_>) -> RenderPipeline {
-        self.cook_in(recipe, &self.layouts[usize::from(recipe.fragment.is_some())])
+    fn create(&self, desc: &PipelineDesc<'_>) -> RenderPipeline {
+        self.create_with(desc, &self.layouts[usize::from(desc.fragment.is_some())])
     }
 
-    fn cook_in(&self, recipe: &PipelineDesc<'_>, layout: &wgpu::PipelineLayout) -> RenderPipeline {
-        let lines = recipe.topology == wgpu::PrimitiveTopology::LineList;
-        let shadow = recipe.fragment.is_none();
+    fn create_with(&self, desc: &PipelineDesc<'_>, layout: &wgpu::PipelineLayout) -> RenderPipeline {
+        let lines = desc.topology == wgpu::PrimitiveTopology::LineList;
+        let shadow = desc.fragment.is_none();
         let flag = |on: bool| f64::from(u8::from(on));
         let taps = f64::from(self.shadow_taps);
         let encode = ("ENCODE_SRGB", flag(!self.format.is_srgb()));
@@ -278,23 +280,23 @@ impl<'a> PipelineBuilder<'a> {
         let targets =
             [Some(wgpu::ColorTargetState { format: self.format, blend: None, write_mask: wgpu::ColorWrites::ALL })];
         self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(recipe.label),
+            label: Some(desc.label),
             layout: Some(layout),
             vertex: wgpu::VertexState {
-                module: recipe.module,
-                entry_point: Some(recipe.vertex),
+                module: desc.module,
+                entry_point: Some(desc.vertex),
                 compilation_options: options(&nudge),
-                buffers: recipe.buffers,
+                buffers: desc.buffers,
             },
             primitive: wgpu::PrimitiveState {
-                topology: recipe.topology,
-                cull_mode: (!lines).then_some(wgpu::Face::Back).filter(|_| !recipe.buffers.is_empty()),
+                topology: desc.topology,
+                cull_mode: (!lines).then_some(wgpu::Face::Back).filter(|_| !desc.buffers.is_empty()),
                 ..Default::default()
             },
             depth_stencil: Some(depth_state(shadow)),
             multisample: wgpu::MultisampleState { count: if shadow { 1 } else { self.samples }, ..Default::default() },
-            fragment: recipe.fragment.map(|entry| wgpu::FragmentState {
-                module: recipe.module,
+            fragment: desc.fragment.map(|entry| wgpu::FragmentState {
+                module: desc.module,
                 entry_point: Some(entry),
                 compilation_options: options(&constants),
                 targets: &targets,

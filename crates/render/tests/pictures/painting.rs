@@ -6,7 +6,7 @@ use image::{ImageFormat, Rgba, RgbaImage};
 use metachron_core::{AgentId, Resolution};
 use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, Texture, Wrap, generate};
 use metachron_render::{
-    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, Style,
+    Actor, Appearance, Camera, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading, Size, Style,
 };
 use metachron_scene::Source;
 use metachron_world::Scene;
@@ -20,10 +20,10 @@ const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 512, s
 
 /// A mesh with a texture, seen from −y.
 fn draw(gpu: &Gpu, (model, texture): (&Model, &Arc<Texture>), shading: Shading) -> RgbaImage {
-    let look = Look { colour: [255; 3], material: Material::Skin };
+    let appearance = Appearance { colour: [255; 3], material: Material::Skin };
     let at = Placement { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: 1.0 };
     let mut stage =
-        SceneView::new(vec![Actor { id: AgentId(0), form: Form::Scenery(model.clone(), at), look }], vec![]);
+        SceneView::new(vec![Actor { id: AgentId(0), form: Form::Scenery(model.clone(), at), appearance }], vec![]);
     stage.paint(AgentId(0), texture);
     let camera = Camera::looking(DVec3::NEG_Y * 5.0, DVec3::ZERO, 0.3);
     stage.survey(&camera, SIZE);
@@ -171,6 +171,6 @@ fn textures_are_shared_and_wrong_ones_refused_where_they_stand() {
         assert!(said.contains(told), "{object}\n{said}");
     }
     let other = "generate = \"sphere\"\nshading = \"any\"\ntexture = \"planks\"\ncolour = \"#804020\"";
-    let look = load(folder.path(), other).unwrap().scenery[0].look;
-    assert_eq!((look.shading, look.colour), (ShadingKind::Any, [0x80, 0x40, 0x20]));
+    let appearance = load(folder.path(), other).unwrap().scenery[0].look;
+    assert_eq!((appearance.shading, appearance.colour), (ShadingKind::Any, [0x80, 0x40, 0x20]));
 }

@@ -6,7 +6,8 @@ use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use metachron_render::{
-    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, SceneView, Shading, Size, States, Style,
+    Actor, Appearance, Camera, Form, Level, Material, Offscreen, RendererOptions, SceneView, Shading, Size, States,
+    Style,
 };
 use metachron_scene::Source;
 use metachron_world::Scene;
@@ -130,9 +131,10 @@ impl Studio {
 }
 
 fn stage(models: &[Model], scale: f64) -> SceneView {
-    let look = Look { colour: [230, 60, 40], material: Material::Skin };
+    let appearance = Appearance { colour: [230, 60, 40], material: Material::Skin };
     let at = Placement { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale };
-    let actor = |(id, model): (u32, &Model)| Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look };
+    let actor =
+        |(id, model): (u32, &Model)| Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), appearance };
     SceneView::new((0..).zip(models).map(actor).collect(), vec![])
 }
 
@@ -177,8 +179,8 @@ fn flat_shading_has_at_most_one_colour_a_triangle() {
 #[test]
 fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
     let Some(mut studio) = Studio::new(DVec3::new(0.5, -3.0, 1.0), DVec3::new(0.5, 0.0, 0.0)) else { return };
-    let look = Look { colour: [230, 60, 40], material: Material::Tissue };
-    let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
+    let appearance = Appearance { colour: [230, 60, 40], material: Material::Tissue };
+    let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form: Form::Tube, appearance }], vec![]);
     let arc_m: Vec<f64> = (0..=20).map(|i| f64::from(i) * 0.05).collect();
     let body = Body::Curve(CurveState {
         positions: arc_m.iter().map(|&s| DVec3::new(s, 0.0, 0.2 * (5.0 * s).sin())).collect(),
@@ -187,7 +189,7 @@ fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
         radii_m: vec![0.1; 21],
         arc_m,
     });
-    stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+    stage.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
     stage.pose(SimTime::ZERO, States::Latest);
     let at = Resolution { eps_m: 0.25, n: 2 };
     let mut colours = |shading| {
@@ -218,10 +220,10 @@ fn a_change_of_level_that_glides_is_seen_less_from_frame_to_frame_and_ends_at_th
         let (before, after) = (studio.draw(&mut stage, &levels(from)), studio.draw(&mut stage, &levels(to)));
         let jump = difference(&before, &after);
         studio.draw(&mut stage, &levels(from));
-        stage.glide_over(6);
+        stage.set_geomorph_frames(6);
         let mut frames = vec![before];
         frames.extend((0..6).map(|_| studio.draw(&mut stage, &levels(to))));
-        stage.glide_over(0);
+        stage.set_geomorph_frames(0);
         let steps: Vec<f64> = frames.windows(2).map(|pair| difference(&pair[0], &pair[1])).collect();
         // six equal steps of the way, of which outlines and lights of a few pixels make more than a sixth
         assert!(steps.iter().all(|step| *step < 0.5 * jump), "{from} to {to}: {steps:?} of {jump}");
@@ -265,11 +267,11 @@ fn a_tree_of_points_and_lines_covers_about_what_the_whole_tree_does() {
 #[test]
 fn copies_of_a_mesh_at_one_count_are_one_draw() {
     let scene = load(HALL).unwrap();
-    let look = Look { colour: [200; 3], material: Material::Plastic };
+    let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
     let actors = scene.scenery.iter().enumerate().map(|(id, it)| Actor {
         id: AgentId(id as u32),
         form: Form::Scenery(it.model.clone(), it.at),
-        look,
+        appearance,
     });
     let mut stage = SceneView::new(actors.collect(), vec![]);
     let camera = Camera::looking(DVec3::new(-60.0, -60.0, 60.0), DVec3::new(50.0, 70.0, 0.0), 1.4);

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid, ToolShape};
-use metachron_render::{Actor, Camera, Form, Level, Look, Material, SceneView, States, StaticObject};
+use metachron_render::{Actor, Appearance, Camera, Form, Level, Material, SceneView, States, StaticObject};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -12,18 +12,22 @@ pub const TUBE: u32 = 0;
 
 /// A stage with everything posed at time zero, and a camera that shows it.
 pub fn still_life() -> (SceneView, Camera) {
-    let look = |colour, material| Look { colour, material };
-    let solid = |id, solid, look| Actor { id: AgentId(id), form: Form::Solid(solid), look };
+    let appearance = |colour, material| Appearance { colour, material };
+    let solid = |id, solid, appearance| Actor { id: AgentId(id), form: Form::Solid(solid), appearance };
     let tool = |id| Actor {
         id: AgentId(id),
         form: Form::Tool(ToolShape { shaft_radius_m: 0.004, shaft_length_m: 0.35 }),
-        look: look([205, 208, 214], Material::Metal),
+        appearance: appearance([205, 208, 214], Material::Metal),
     };
     let actors = vec![
-        Actor { id: AgentId(TUBE), form: Form::Tube, look: look([216, 122, 110], Material::Tissue) },
-        solid(1, Solid::Ball { radius_m: 0.028 }, look([226, 214, 190], Material::Plastic)),
-        solid(2, Solid::Box { half_extents_m: DVec3::new(0.03, 0.022, 0.02) }, look([78, 122, 140], Material::Plastic)),
-        solid(3, Solid::Capsule { radius_m: 0.014, half_height_m: 0.03 }, look([200, 202, 208], Material::Metal)),
+        Actor { id: AgentId(TUBE), form: Form::Tube, appearance: appearance([216, 122, 110], Material::Tissue) },
+        solid(1, Solid::Ball { radius_m: 0.028 }, appearance([226, 214, 190], Material::Plastic)),
+        solid(
+            2,
+            Solid::Box { half_extents_m: DVec3::new(0.03, 0.022, 0.02) },
+            appearance([78, 122, 140], Material::Plastic),
+        ),
+        solid(3, Solid::Capsule { radius_m: 0.014, half_height_m: 0.03 }, appearance([200, 202, 208], Material::Metal)),
         tool(4),
         tool(5),
     ];
@@ -63,7 +67,7 @@ pub fn still_life() -> (SceneView, Camera) {
         tool(DVec3::new(0.10, -0.09, 0.09), DVec3::new(0.42, -0.34, 0.42), 0.9, None),
     ];
     for (id, body) in (0..).zip(bodies) {
-        stage.see(AgentId(id), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+        stage.set_snapshot(AgentId(id), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
     }
     stage.pose(SimTime::ZERO, States::Latest);
     let camera = Camera::looking(DVec3::new(0.12, -0.62, 0.52), DVec3::new(0.03, 0.0, 0.02), 0.72);
@@ -72,7 +76,7 @@ pub fn still_life() -> (SceneView, Camera) {
 
 /// The tray the tube lies in: a bottom and four walls, and the floor below.
 fn tray() -> Vec<StaticObject> {
-    let steel = Look { colour: [74, 88, 94], material: Material::Skin };
+    let steel = Appearance { colour: [74, 88, 94], material: Material::Skin };
     let (x, y, wall, high) = (0.36, 0.22, 0.008, 0.03);
     let side = |position, half_extents_m| StaticObject {
         obstacle: Obstacle {
@@ -83,11 +87,11 @@ fn tray() -> Vec<StaticObject> {
             friction: 0.3,
             restitution: 0.0,
         },
-        look: steel,
+        appearance: steel,
     };
     let floor = StaticObject {
         obstacle: Obstacle { solid: Solid::Plane, ..side(DVec3::new(0.0, 0.0, -0.016), DVec3::ONE).obstacle },
-        look: Look { colour: [30, 58, 66], material: Material::Skin },
+        appearance: Appearance { colour: [30, 58, 66], material: Material::Skin },
     };
     vec![
         floor,

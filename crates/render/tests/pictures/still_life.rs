@@ -108,7 +108,7 @@ fn broken_shapes_leave_no_hole_in_the_picture() {
     curve.positions[9] = curve.positions[7];
     curve.radii_m[12] = 0.0;
     let snapshot = Snapshot { time: SimTime::from_nanos(1), body: Body::Curve(curve), ..Snapshot::default() };
-    stage.see(AgentId(stage::TUBE), &Arc::new(snapshot), true);
+    stage.set_snapshot(AgentId(stage::TUBE), &Arc::new(snapshot), true);
     stage.pose(SimTime::from_nanos(1), States::Latest);
     for eps_m in [1e-3, 0.05, 10.0, f64::NAN] {
         let image = draw(&gpu, &mut stage, &camera, &stage::level(eps_m, 3), Style::default());

@@ -44,7 +44,7 @@ fn least_cost_s(methods: &[usize], tolerance_m: f64) -> f64 {
 }
 
 #[test]
-fn what_is_found_holds_and_is_within_a_factor_of_the_least() {
+fn a_found_setting_meets_the_tolerance_within_a_factor_of_the_least_cost() {
     for tolerance_m in [1e-2, 5e-3, 2e-3] {
         let found = search(&[choice(&[0])], tolerance_m, START);
         let least = least_cost_s(&[0], tolerance_m);
@@ -63,7 +63,7 @@ fn a_method_of_higher_order_is_taken_where_its_longer_steps_pay() {
 }
 
 #[test]
-fn every_object_is_fitted_and_what_may_not_change_stays() {
+fn every_object_is_fitted_and_fixed_settings_are_kept() {
     let fixed = Choice { dt_max_s: START.dt_s, pieces_min: START.pieces, methods: vec![] };
     let found = search(&[choice(&[0]), fixed, choice(&[0])], 5e-3, START);
     assert_eq!(found.settings[1], START);
@@ -93,7 +93,7 @@ fn level(k: u32, order: i32) -> Vec<Path> {
 }
 
 #[test]
-fn the_error_of_the_converged_answer_is_what_is_left_of_it() {
+fn the_error_of_a_converged_answer_is_estimated_from_the_last_refinement() {
     for order in [1, 2] {
         let found = converge(8, 1e-4, &mut |k| Some(level(k, order))).unwrap();
         let truth = 1e-2 * 0.5_f64.powi(order * found.level as i32);
@@ -103,7 +103,7 @@ fn the_error_of_the_converged_answer_is_what_is_left_of_it() {
 }
 
 #[test]
-fn an_answer_that_does_not_converge_says_how_far_it_may_be_off() {
+fn an_answer_that_does_not_converge_reports_its_error() {
     let wild = |k: u32| vec![Path { samples: vec![(0.0, DVec3::X * if k.is_multiple_of(2) { 0.1 } else { -0.1 })] }];
     let found = converge(4, 1e-4, &mut |k| Some(wild(k))).unwrap();
     assert!(found.level == 4 && found.error_m > 0.2, "{}", found.error_m);

@@ -45,7 +45,8 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         certificate: some(|row| row.value_over_bound.map(|part| 1.0 - part)).map(|s| s.p95),
         level_changes: share(|row| row.changes),
         reversals: share(|row| row.reversals),
-        model_error: some(|row| row.predicted_ms.map(|told| (row.frame_ms / told - 1.0).abs())).map(|s| s.p95),
+        model_error: some(|row| row.predicted_ms.map(|predicted| (row.frame_ms / predicted - 1.0).abs()))
+            .map(|s| s.p95),
         cull_ms: spread(|row| row.cull_ms),
         select_ms: spread(|row| row.select_ms),
         draw_ms: spread(|row| row.draw_ms),
@@ -67,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn choices_are_counted_by_objects_in_view_and_errors_by_what_was_promised() {
+    fn level_changes_are_per_object_in_view_and_errors_relative_to_the_prediction() {
         let frame = |k: u32| FrameRecord {
             objects: 10,
             frame_ms: 10.0 + f64::from(k) * 0.01,

@@ -9,15 +9,15 @@ use crate::FrameRecord;
 use serde::Serialize;
 
 /// A miss is a frame whose work exceeds this many targets.
-const MISS: f64 = 1.05;
-/// A frame is binding where its full-detail cost exceeds this many targets.
-const BINDING: f64 = 1.15;
+pub const MISS: f64 = 1.05;
+/// A frame is binding where its full-detail cost exceeds this many targets: the others would be on time under any policy.
+pub const BINDING: f64 = 1.15;
 /// Frames of the median that has to settle.
-const SETTLE_MEDIAN: usize = 9;
+pub const SETTLE_MEDIAN: usize = 9;
 /// The median must stay this close to the later mean, as a share of it …
-const SETTLE_BAND: f64 = 0.06;
+pub const SETTLE_BAND: f64 = 0.06;
 /// … for so many frames.
-const SETTLE_HOLD: usize = 20;
+pub const SETTLE_HOLD: usize = 20;
 
 /// Mean, spread and percentiles of a measured time, milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_frame_measured_is_no_number() {
+    fn an_unmeasured_statistic_is_none() {
         let summary = summarise(&[], 10.0);
         assert_eq!((summary.frame_ms, summary.interval_ms, summary.missed_share), (None, None, None));
         let undrawn = summarise_undrawn(&[FrameRecord { interval_ms: 20.0, ..FrameRecord::default() }]);

@@ -41,11 +41,11 @@ const OPERATORS: [(&str, Operator); 6] = [
 pub enum GoalError {
     /// There is no operator.
     #[error(
-        "`{0}` is no condition; expected FIELD OPERATOR NUMBER, such as missed_share>0.01 (operators: > >= < <= == !=)"
+        "`{0}` is not a condition; expected FIELD OPERATOR NUMBER, such as missed_share>0.01 (operators: > >= < <= == !=)"
     )]
     NoOperator(String),
     /// The limit is not a number.
-    #[error("`{0}` is no number to compare with")]
+    #[error("`{0}` is not a finite number; expected one to compare with")]
     NoNumber(String),
     /// The report has no such field.
     #[error("the report has no field `{path}`{hint}; fields here: {known}")]
@@ -58,7 +58,7 @@ pub enum GoalError {
         known: String,
     },
     /// The field exists but is not a number.
-    #[error("the field `{0}` is no number")]
+    #[error("the field `{0}` is not a number")]
     NotANumber(String),
 }
 
@@ -150,7 +150,7 @@ fn find<'v>(root: &'v Value, path: &str, any: bool) -> Result<&'v Value, GoalErr
             }
             _ => None,
         };
-        here = next.ok_or_else(|| unknown(path, part, here))?;
+        here = next.ok_or_else(|| unknown_field(path, part, here))?;
     }
     Ok(here)
 }
@@ -159,7 +159,7 @@ fn is_named(entry: &Value, name: &str) -> bool {
     ["name", "object", "a"].iter().any(|key| entry.get(key).and_then(Value::as_str) == Some(name))
 }
 
-fn unknown(path: &str, part: &str, here: &Value) -> GoalError {
+fn unknown_field(path: &str, part: &str, here: &Value) -> GoalError {
     let known: Vec<&str> = match here {
         Value::Object(table) => table.keys().map(String::as_str).collect(),
         Value::Array(list) => {
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_was_not_measured_is_no_success() {
+    fn a_goal_on_an_unmeasured_number_is_not_kept() {
         assert_eq!(judge("binding_stddev>0.035"), Verdict::NotMeasured);
     }
 
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_field_is_told_before_the_run_with_the_nearest_name() {
+    fn an_unknown_field_is_refused_with_the_nearest_name() {
         let error = "mised_share>0".parse::<Goal>().unwrap_err().to_string();
         assert!(error.contains("did you mean `missed_share`?"), "{error}");
         let error = "frame_ms.p98>0".parse::<Goal>().unwrap_err().to_string();
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_condition_is_refused() {
+    fn an_expression_that_is_not_a_condition_is_refused() {
         for bad in ["", "missed_share", ">1", "missed_share>", "missed_share>x", "missed_share>nan", "missed_share=1"] {
             assert!(bad.parse::<Goal>().is_err(), "{bad}");
         }

@@ -8,7 +8,9 @@ mod goal;
 mod summary;
 
 pub use choices::{ChoiceSummary, summarise_choices};
-pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
+pub use frames::{
+    BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Spread, summarise, summarise_undrawn,
+};
 pub use goal::{Goal, GoalError, Verdict};
 
 use metachron_world::{Moved, Overlap};
@@ -54,7 +56,7 @@ pub struct Report {
     pub moved: Vec<MovedReport>,
     /// The effect of different clocks, where requested.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub oracle: Option<OracleReport>,
+    pub oracle: Option<ReferenceReport>,
     /// How the frame budget was spent.
     pub budget: BudgetReport,
     /// The scene's probes.
@@ -198,7 +200,7 @@ impl MovedReport {
 
 /// The same scene under one very fine common clock, and the difference from its own clocks.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct OracleReport {
+pub struct ReferenceReport {
     /// Step of the common clock, milliseconds.
     pub dt_ms: f64,
     /// Simulated seconds that both runs have played: all of the run, unless Ctrl-C ended the second one.
@@ -263,7 +265,7 @@ impl Report {
         let frame = crate::FrameRecord { gpu_ms: Some(0.0), ..Default::default() };
         let summary = summarise(&[frame], 1.0);
         let name = String::new;
-        let oracle = OracleReport { couplings: vec![CouplingError::default()], ..OracleReport::default() };
+        let oracle = ReferenceReport { couplings: vec![CouplingError::default()], ..ReferenceReport::default() };
         Self {
             scene: name(),
             policy: name(),
@@ -364,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_report_says_what_choices_came_to() {
+    fn the_report_includes_the_choice_summary() {
         let json = serde_json::to_value(Report::template()).unwrap();
         for path in [
             "/budget/value_over_bound",

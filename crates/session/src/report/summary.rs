@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, OracleReport, Report, Spread};
+use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, ReferenceReport, Report, Spread};
 use std::fmt::Write;
 
 impl Report {
@@ -27,7 +27,7 @@ impl Report {
         self.agents.iter().for_each(|agent| out_of_reach(&mut out, agent));
         coupling_table(&mut out, &self.couplings);
         if let Some(oracle) = &self.oracle {
-            oracle_table(&mut out, oracle);
+            reference_table(&mut out, oracle);
         }
         out
     }
@@ -35,7 +35,7 @@ impl Report {
 
 fn frame_line(out: &mut String, summary: &FrameSummary, target_ms: f64) {
     let (Some(work), Some(missed)) = (&summary.frame_ms, summary.missed_share) else {
-        let _ = writeln!(out, "frame  not measured: no frame was drawn, and none has a declared cost");
+        let _ = writeln!(out, "frame  not measured: nothing was drawn and no drawing cost is declared");
         return;
     };
     let Spread { mean, p99, max, .. } = work;
@@ -55,7 +55,7 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
         let _ = write!(out, "; {:.2} % of levels change, {:.2} % back", 100.0 * change, 100.0 * back);
     }
     if let Some(error) = choices.model_error {
-        let _ = write!(out, "; predictions {}", off_by(error));
+        let _ = write!(out, "; predictions {}", error_text(error));
     }
     if let Some(gap) = choices.certificate {
         let _ = write!(out, "; within {:.2} % of the best", 100.0 * gap);
@@ -64,11 +64,11 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
 }
 
 /// The error of predictions in 19 of 20 frames, relative to the predicted time, as text.
-fn off_by(error: f64) -> String {
+fn error_text(error: f64) -> String {
     if error < 1.0 {
         format!("off by less than {:.1} % (19 of 20 frames)", 100.0 * error)
     } else {
-        format!("useless: off by up to {error:.1} times what a frame took (19 of 20 frames)")
+        format!("unusable: off by up to {error:.1} times the frame's time (19 of 20 frames)")
     }
 }
 
@@ -99,7 +99,7 @@ fn out_of_reach(out: &mut String, agent: &AgentReport) {
     let eps = eps_m.map_or_else(String::new, |eps_m| format!(" and an ε of {:.2} mm", eps_m * 1e3));
     let _ = writeln!(
         out,
-        "note  `{name}` cannot hold {:.4} mm: at steps of {dt_ms:.2} ms{eps}, the finest of its ranges, it errs by {:.4} mm",
+        "note  `{name}` cannot meet its tolerance of {:.4} mm: at steps of {dt_ms:.2} ms{eps}, the finest of its ranges, its error is {:.4} mm",
         tolerance_m * 1e3,
         residual_m * 1e3
     );
@@ -130,11 +130,11 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
             c.penetration_m * 1e3
         );
     }
-    more(out, couplings.len());
+    omitted_rows(out, couplings.len());
 }
 
-fn oracle_table(out: &mut String, oracle: &OracleReport) {
-    let OracleReport { dt_ms, sim_s, states, .. } = oracle;
+fn reference_table(out: &mut String, oracle: &ReferenceReport) {
+    let ReferenceReport { dt_ms, sim_s, states, .. } = oracle;
     let _ = writeln!(out, "\nagainst one common clock of {dt_ms:.4} ms over {sim_s:.2} s, {states} points compared");
     let _ = writeln!(
         out,
@@ -154,10 +154,10 @@ fn oracle_table(out: &mut String, oracle: &OracleReport) {
             shown(c.impulse_oracle_n_s)
         );
     }
-    more(out, oracle.couplings.len());
+    omitted_rows(out, oracle.couplings.len());
 }
 
-fn more(out: &mut String, count: usize) {
+fn omitted_rows(out: &mut String, count: usize) {
     if count > COUPLINGS_SHOWN {
         let _ = writeln!(out, "and {} more in the report", count - COUPLINGS_SHOWN);
     }

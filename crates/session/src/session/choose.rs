@@ -3,6 +3,7 @@
 //! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, measuring a frame.
 
 use super::super::assemble;
+use super::super::cpu_budget::FramePeriod;
 use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
@@ -16,42 +17,42 @@ impl Session {
         let started = self.now();
         self.gather();
         self.survey(camera, size);
-        self.sight.look(started, self.stage.seen(), camera, size);
+        self.visible_resolution.update(started, self.scene_view.seen(), camera, size);
         let culled = self.now();
         self.chosen.cull = culled.saturating_sub(started) + self.declared_cull();
         self.choose(started, size);
         let chosen = self.now();
-        let picture = self.stage.compose(camera, &self.levels, style, hand);
+        let picture = self.scene_view.compose(camera, &self.levels, style, hand);
         self.chosen.triangles = picture.triangles();
         self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
         self.chosen.select += chosen.saturating_sub(culled);
         self.chosen.build = self.world.now().saturating_sub(chosen);
-        self.stage.picture()
+        self.scene_view.picture()
     }
 
     /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Returns the part of it from the
     /// start of the drawing to its end.
     pub fn spend_declared(&mut self, size: Size) -> Duration {
-        let Chosen { cull, select, beside, objects_s, other_triangles, .. } = self.chosen;
+        let Chosen { cull, select, select_next, objects_s, other_triangles, .. } = self.chosen;
         let backdrop = Backdrop { pixels: size.pixels(), triangles: other_triangles };
         let seconds = self.declared.backdrop_s(backdrop) + objects_s;
         let draw = self.machine.frame_time(seconds, self.frames(), self.now());
         let started = self.now();
-        self.world.spend(cull + select + draw.max(beside.unwrap_or_default()));
+        self.world.spend(cull + select + draw.max(select_next.unwrap_or_default()));
         self.now().saturating_sub(started + cull + select)
     }
 
     /// Finds the objects seen by `camera`.
     pub fn survey(&mut self, camera: &Camera, size: Size) {
-        self.stage.survey(camera, size);
-        assemble::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
+        self.scene_view.survey(camera, size);
+        assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), &self.scene);
     }
 
     /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.
     fn choose(&mut self, started: Duration, size: Size) {
         self.chosen.select = Duration::ZERO;
         if !self.control.take_up(&self.views) {
-            self.bid(size);
+            self.set_choice_inputs(size);
             self.control.plan(&self.views);
             self.chosen.select = self.declared_choice();
         }
@@ -60,8 +61,8 @@ impl Session {
         }
         let plan = self.control.last_plan();
         self.levels.clear();
-        self.levels.extend(self.views.iter().zip(&plan.levels).map(assemble::level));
-        self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
+        self.levels.extend(self.views.iter().zip(&plan.levels).map(|(view, demand)| assemble::level(view, demand)));
+        self.chosen.objects = self.scene_view.seen().iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
         self.chosen.objects_s = self.declared.objects_s(self.views.iter(), &plan.levels);
         self.chosen.n = self.mean_level();
@@ -75,10 +76,10 @@ impl Session {
     }
 
     /// Sets the controller's inputs for the next choice.
-    pub fn bid(&mut self, size: Size) {
+    pub fn set_choice_inputs(&mut self, size: Size) {
         // the triangles outside the choice hardly change from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
-        self.buy();
+        self.share_processor();
         self.control.set_cull(self.chosen.cull);
     }
 
@@ -98,16 +99,17 @@ impl Session {
     }
 
     /// Shares the processor between agents and the picture, if it also draws.
-    fn buy(&mut self) {
+    fn share_processor(&mut self) {
         let wants = self.control.wants().filter(|_| self.shares_processor);
         let Some((wants, lambda)) = wants else {
-            self.purse.close();
+            self.cpu_budget.close();
             return self.control.set_reserve(0.0);
         };
         let period_s = 1.0 / self.control.target_hz();
         let drawing = Drawing { wants, lambda };
         let (cores, control) = (self.cores(), &self.control);
-        let limit_s = self.purse.settle((cores, period_s), drawing, &self.views, |at| control.weight(at));
+        let limit_s =
+            self.cpu_budget.settle(FramePeriod { cores, period_s }, drawing, &self.views, |at| control.weight(at));
         let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
         self.control.set_reserve(reserve_s);
     }

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 impl Session {
     pub(super) fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
-        let Chosen { sim, triangles, more_triangles, objects, cull, select, beside, build, n, .. } = self.chosen;
+        let Chosen { sim, triangles, more_triangles, objects, cull, select, select_next, build, n, .. } = self.chosen;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let plan = self.control.last_plan();
         let promise = plan.promise;
@@ -27,7 +27,7 @@ impl Session {
             triangles,
             objects,
             cull_ms: ms(cull),
-            select_ms: ms(select + beside.unwrap_or_default()),
+            select_ms: ms(select + select_next.unwrap_or_default()),
             draw_ms: ms(build + finished.draw),
             lag_ms: ms(cull + select + build + finished.draw),
             predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
@@ -43,7 +43,7 @@ impl Session {
     /// Mean n of the tubes in view, else of everything in view; zero if nothing is in view.
     pub fn mean_level(&self) -> f64 {
         let mean = |tubes_only: bool| {
-            let all = self.stage.seen().iter().zip(&self.levels);
+            let all = self.scene_view.seen().iter().zip(&self.levels);
             let drawn = all.filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
             let (sum, count) =
                 drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
@@ -76,7 +76,7 @@ mod tests {
     use metachron_scene::Source;
 
     #[test]
-    fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {
+    fn time_before_the_first_step_counts_as_start_up() {
         let text = b"format = 1\nexecutor = \"threads\"\n[[object]]\nname = \"idle\"\nmodel = \"synthetic\"\nrate_hz = 10.0\ncost_us = 10.0\n";
         let scene = metachron_scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
         let opened = std::time::Instant::now();

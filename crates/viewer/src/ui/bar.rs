@@ -20,8 +20,8 @@ const NARROW: f32 = 560.0;
 const SLIM: f32 = 360.0;
 
 /// Tooltip of the real-time factor.
-const REAL_TIME: &str = "Simulated time that was stepped for each second, by the agent that keeps up least: \
-                         what it cannot make up is dropped. The wanted speed is on the left";
+const REAL_TIME: &str = "Simulated seconds per second of the slowest agent; time that an agent cannot catch up is dropped. \
+                         The requested speed is on the left";
 
 /// Draws the bar.
 pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command> {
@@ -60,19 +60,19 @@ pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command
 fn transport(ui: &mut Ui, status: &Status, out: &mut Vec<Command>) {
     ui.spacing_mut().item_spacing.x = 2.0;
     let (icon, name) = if status.running { (Icon::Pause, "Pause") } else { (Icon::Run, "Run") };
-    button(ui, (icon, name), Command::PauseOrRun, out);
-    button(ui, (Icon::Step, "Step"), Command::Step, out);
-    button(ui, (Icon::Reset, "Reset"), Command::Reset, out);
+    button(ui, icon, name, Command::PauseOrRun, out);
+    button(ui, Icon::Step, "Step", Command::Step, out);
+    button(ui, Icon::Reset, "Reset", Command::Reset, out);
 }
 
 fn speed(ui: &mut Ui, status: &Status, out: &mut Vec<Command>) {
-    button(ui, (Icon::Minus, "Slower"), Command::Slower, out);
+    button(ui, Icon::Minus, "Slower", Command::Slower, out);
     let text = RichText::new(text::speed(status.speed)).monospace();
     let response = ui.add(egui::Button::new(text).frame(false).min_size(egui::vec2(38.0, 22.0)));
     if response.on_hover_text(hover(ui, "Speed; click for real time", Command::RealTime)).clicked() {
         out.push(Command::RealTime);
     }
-    button(ui, (Icon::Plus, "Faster"), Command::Faster, out);
+    button(ui, Icon::Plus, "Faster", Command::Faster, out);
 }
 
 fn clock(ui: &mut Ui, status: &Status, wide: bool, palette: &Palette) {
@@ -90,7 +90,7 @@ fn clock(ui: &mut Ui, status: &Status, wide: bool, palette: &Palette) {
 
 fn frame_rate(ui: &mut Ui, status: &Status, summary: &FrameSummary, palette: &Palette) {
     let (text, color) = rate_text(status, summary, palette);
-    ui.label(RichText::new(text).monospace().color(color)).on_hover_text("Frames per second, measured and wanted");
+    ui.label(RichText::new(text).monospace().color(color)).on_hover_text("Frames per second, measured and target");
     ui.add_space(5.0);
     let (rect, _) = ui.allocate_exact_size(egui::vec2(8.0, 8.0), egui::Sense::hover());
     ui.painter().circle_filled(rect.center(), 3.5, color);
@@ -110,12 +110,12 @@ fn rate_text(status: &Status, summary: &FrameSummary, palette: &Palette) -> (Str
 
 fn tools(ui: &mut Ui, out: &mut Vec<Command>) {
     ui.spacing_mut().item_spacing.x = 2.0;
-    button(ui, (Icon::Help, "Help"), Command::Help, out);
-    button(ui, (Icon::Screenshot, "Screenshot"), Command::Screenshot, out);
-    button(ui, (Icon::Panels, "Hide panels"), Command::HideUi, out);
+    button(ui, Icon::Help, "Help", Command::Help, out);
+    button(ui, Icon::Screenshot, "Screenshot", Command::Screenshot, out);
+    button(ui, Icon::Panels, "Hide panels", Command::HideUi, out);
 }
 
-fn button(ui: &mut Ui, (icon, name): (Icon, &str), command: Command, out: &mut Vec<Command>) {
+fn button(ui: &mut Ui, icon: Icon, name: &str, command: Command, out: &mut Vec<Command>) {
     let hover = hover(ui, name, command);
     if icon_button(ui, icon, name, &hover).clicked() {
         out.push(command);

@@ -65,33 +65,33 @@ impl Blit {
     }
 
     /// A drawable for `view`; it keeps the texture alive.
-    pub fn show(&self, device: &wgpu::Device, view: &wgpu::TextureView) -> Arc<Shown> {
+    pub fn show(&self, device: &wgpu::Device, view: &wgpu::TextureView) -> Arc<BlitShape> {
         let entry = wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("blit"),
             layout: &self.layout,
             entries: &[entry],
         });
-        Arc::new(Shown { pipeline: self.pipeline.clone(), group })
+        Arc::new(BlitShape { pipeline: self.pipeline.clone(), group })
     }
 }
 
 /// A texture drawn in egui's render pass.
-pub struct Shown {
+pub struct BlitShape {
     pipeline: wgpu::RenderPipeline,
     group: wgpu::BindGroup,
 }
 
-impl Shown {
+impl BlitShape {
     /// The shape that draws it in `rect`.
     pub fn shape(self: &Arc<Self>, rect: egui::Rect) -> egui::Shape {
-        egui_wgpu::Callback::new_paint_callback(rect, InPass(Arc::clone(self))).into()
+        egui_wgpu::Callback::new_paint_callback(rect, PaintCallback(Arc::clone(self))).into()
     }
 }
 
-struct InPass(Arc<Shown>);
+struct PaintCallback(Arc<BlitShape>);
 
-impl egui_wgpu::CallbackTrait for InPass {
+impl egui_wgpu::CallbackTrait for PaintCallback {
     fn paint(
         &self,
         _info: egui::PaintCallbackInfo,

@@ -27,7 +27,9 @@ pub fn show(ui: &mut Ui, shares: &Shares) {
     ui.add_space(3.0);
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, 2.0 * HIGH + 3.0), Sense::hover());
-    response.on_hover_text("Above: cores that simulate, of all. Below: the time of a frame; the line is its target.");
+    response.on_hover_text(
+        "Above: fraction of all cores used by the simulation. Below: frame time; the line is the frame budget.",
+    );
     let line = |row: f32| Rect::from_min_size(pos2(rect.left(), rect.top() + row * (HIGH + 3.0)), vec2(width, HIGH));
     bar(ui, line(0.0), &[(simulation, COLOURS[0])], 1.0);
     let frame = [(cull, COLOURS[1]), (select, COLOURS[2]), (draw, COLOURS[3]), (rest, COLOURS[4])];
@@ -38,22 +40,23 @@ pub fn show(ui: &mut Ui, shares: &Shares) {
         ui.spacing_mut().item_spacing.x = 6.0;
         let parts = [simulation, cull, select, draw, rest];
         for (((name, means), part), colour) in NAMES.into_iter().zip(parts).zip(COLOURS) {
-            ui.label(RichText::new(format!("{name} {}", told(part))).small().color(colour)).on_hover_text(means);
+            ui.label(RichText::new(format!("{name} {}", percent_text(part))).small().color(colour))
+                .on_hover_text(means);
         }
     });
 }
 
 /// The parts and their tooltips.
 const NAMES: [(&str, &str); 5] = [
-    ("simulation", "What agents take of all cores"),
-    ("cull", "Taking the newest states and finding what is seen; 100 % is the time of a frame"),
-    ("select", "Choosing levels; 100 % is the time of a frame"),
-    ("draw", "Making the picture and drawing it; 100 % is the time of a frame"),
-    ("window", "Panels, and showing all of it on the screen; 100 % is the time of a frame"),
+    ("simulation", "Agents' share of all cores"),
+    ("cull", "Reading states and visibility culling; 100 % is the frame budget"),
+    ("select", "Selecting levels of detail; 100 % is the frame budget"),
+    ("draw", "Composing and drawing the picture; 100 % is the frame budget"),
+    ("window", "Panels and presentation; 100 % is the frame budget"),
 ];
 
 /// A fraction in percent, or as a multiple of the whole.
-fn told(part: f64) -> String {
+fn percent_text(part: f64) -> String {
     if part < 2.0 { format!("{:.0} %", 100.0 * part) } else { format!("{part:.1}×") }
 }
 
@@ -75,6 +78,6 @@ mod tests {
 
     #[test]
     fn what_takes_many_frames_is_told_in_frames() {
-        assert_eq!([0.016, 1.2, 15.63].map(told), ["2 %", "120 %", "15.6×"]);
+        assert_eq!([0.016, 1.2, 15.63].map(percent_text), ["2 %", "120 %", "15.6×"]);
     }
 }

@@ -121,7 +121,7 @@ pub const SHORTCUTS: [Shortcut; 23] = [
 
 /// Mouse actions over the picture, for the help.
 pub const MOUSE: [(&str, &str); 7] = [
-    ("Left drag on an object", "Pull it with a spring; the wheel moves the hand in depth"),
+    ("Left drag on an object", "Pull it with a spring; the wheel moves the spring's end in depth"),
     ("Left drag beside objects, or with Alt", "Orbit"),
     ("Right or middle drag", "Pan"),
     ("Wheel", "Zoom"),
@@ -154,7 +154,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     let flying = ctx.input(|input| input.pointer.secondary_down());
     let mut found = Vec::new();
     for shortcut in &SHORTCUTS {
-        for keys in shortcut.keys.iter().filter(|keys| listens(keys, typing, focused, flying)) {
+        for keys in shortcut.keys.iter().filter(|keys| is_active(keys, typing, focused, flying)) {
             if ctx.input_mut(|input| input.consume_shortcut(keys)) {
                 found.push(shortcut.command);
             }
@@ -163,7 +163,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     found
 }
 
-fn listens(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool) -> bool {
+fn is_active(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool) -> bool {
     if keys.modifiers.any() || is_function(keys.logical_key) || keys.logical_key == Key::Escape {
         return true;
     }

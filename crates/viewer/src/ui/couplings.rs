@@ -9,10 +9,10 @@ use egui::{Grid, RichText, Ui};
 
 /// The columns and their tooltips.
 const COLUMNS: [(&str, &str); 4] = [
-    ("Pair", "Who owns the contact, and the other"),
-    ("Law", "How the two act on each other"),
-    ("Force", "With which they press, hold or pull now"),
-    ("Tank", "Energy that the coupling may still give before it fades"),
+    ("Pair", "Owner of the contact, and its peer"),
+    ("Law", "Contact law"),
+    ("Force", "Present contact, grasp or joint force"),
+    ("Tank", "Energy left before the coupling's push-out is turned off"),
 ];
 
 /// More rows than this are counted, not listed.
@@ -32,13 +32,13 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
             ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
             ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
             let force = ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
-            if let Some(felt) = row.inverse_mass_per_kg {
-                force.on_hover_text(weighed(row, felt));
+            if let Some(inverse_masses) = row.inverse_mass_per_kg {
+                force.on_hover_text(effective_mass_text(row, inverse_masses));
             }
             let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
             let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
             let color = if low { palette.warn } else { palette.weak };
-            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(spoken(row));
+            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(accessible_text(row));
             ui.end_row();
         }
     });
@@ -47,24 +47,24 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
     }
 }
 
-fn spoken(row: &CouplingRow) -> String {
+fn accessible_text(row: &CouplingRow) -> String {
     format!(
-        "{} contacts, {} deep; what the energy tank may still give before the coupling fades",
+        "{} contacts, {} deep; energy left in the tank before the push-out is turned off",
         row.contacts,
         text::metres(row.penetration_m)
     )
 }
 
 /// Tooltip: the effective mass of both at the contact with the largest force.
-fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
-    let felt = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
+fn effective_mass_text(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
+    let inverse_masses = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
     format!(
-        "The contact that bears most feels as heavy as {}: there {} gives way like {}, {} like {}",
-        felt(a + b),
+        "Effective mass at the contact with the largest force: {} ({} {}, {} {})",
+        inverse_masses(a + b),
         row.a,
-        felt(a),
+        inverse_masses(a),
         row.b,
-        felt(b)
+        inverse_masses(b)
     )
 }
 
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_contact_weighs_is_told_of_both_sides_and_of_both_together() {
+    fn the_tooltip_gives_the_effective_mass_of_both_agents_and_of_the_pair() {
         let row = CouplingRow {
             a: "hose".to_owned(),
             b: "floor".to_owned(),
@@ -106,12 +106,12 @@ mod tests {
             inverse_mass_per_kg: None,
             tank_j: None,
         };
-        let told = |pair| weighed(&row, pair);
+        let tooltip = |pair| effective_mass_text(&row, pair);
         assert_eq!(
-            told([60.0, 20.0]),
-            "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
+            tooltip([60.0, 20.0]),
+            "Effective mass at the contact with the largest force: 12.5 g (hose 16.7 g, floor 50.0 g)"
         );
         // a driven body has no inverse mass: it does not give way at all
-        assert!(told([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
+        assert!(tooltip([0.5, 0.0]).ends_with("(hose 2.00 kg, floor immovable)"));
     }
 }

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summary_leaves_out_frames_that_say_nothing() {
+    fn the_summary_excludes_skipped_frames() {
         let mut history = History::default();
         history.push_frame(&FrameTimes { skip: Some(Skip::Hidden), ..frame(9_000, 90_000) });
         (0..9).for_each(|_| history.push_frame(&frame(10, 20)));

@@ -3,7 +3,7 @@
 //! In: egui's response over the picture. Out: a moved camera and [`Action`]s. Never here: forces (the spring is part of the object's own
 //! solver) and drawing, except the spring's end and the name under the pointer.
 
-use super::protocol::{Action, Bounds, Show};
+use super::protocol::{Action, Bounds, Simulation};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align2, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Response, Stroke, Ui, vec2};
@@ -44,7 +44,7 @@ struct Window {
 struct Turn<'a> {
     ui: &'a Ui,
     response: &'a Response,
-    show: &'a dyn Show,
+    simulation: &'a dyn Simulation,
     window: Window,
     actions: Vec<Action>,
 }
@@ -78,8 +78,8 @@ pub fn size_of(rect: Rect, scale: f32) -> Size {
 impl Hand {
     /// The camera of the picture.
     #[must_use]
-    pub fn camera(&self, show: &dyn Show) -> Camera {
-        self.own.unwrap_or_else(|| show.scene_camera())
+    pub fn camera(&self, simulation: &dyn Simulation) -> Camera {
+        self.own.unwrap_or_else(|| simulation.scene_camera())
     }
 
     /// Switches to the scene's own camera.
@@ -88,26 +88,26 @@ impl Hand {
     }
 
     /// Keeps the present camera; it follows neither the scene nor an object.
-    pub fn free(&mut self, show: &dyn Show) {
-        (self.own, self.track) = (Some(self.camera(show)), false);
+    pub fn free(&mut self, simulation: &dyn Simulation) {
+        (self.own, self.track) = (Some(self.camera(simulation)), false);
     }
 
     /// Frames all of `bounds` in a picture of this size.
-    pub fn frame(&mut self, show: &dyn Show, bounds: &Bounds, size: Size) {
-        self.steer(show, |camera| camera.show(bounds.centre, FRAME_ROOM * bounds.radius_m, size));
+    pub fn frame(&mut self, simulation: &dyn Simulation, bounds: &Bounds, size: Size) {
+        self.change_camera(simulation, |camera| camera.show(bounds.centre, FRAME_ROOM * bounds.radius_m, size));
     }
 
-    fn steer(&mut self, show: &dyn Show, change: impl FnOnce(&mut Camera)) {
-        let mut camera = self.camera(show);
+    fn change_camera(&mut self, simulation: &dyn Simulation, change: impl FnOnce(&mut Camera)) {
+        let mut camera = self.camera(simulation);
         change(&mut camera);
         self.own = Some(camera);
     }
 
     /// Applies this frame's input over the picture; returns the resulting actions.
-    pub fn input(&mut self, ui: &Ui, response: &Response, show: &dyn Show) -> Vec<Action> {
-        self.follow_tracked(show);
-        let window = self.window(ui, response, show);
-        let mut turn = Turn { ui, response, show, window, actions: Vec::new() };
+    pub fn input(&mut self, ui: &Ui, response: &Response, simulation: &dyn Simulation) -> Vec<Action> {
+        self.follow_tracked(simulation);
+        let window = self.window(ui, response, simulation);
+        let mut turn = Turn { ui, response, simulation, window, actions: Vec::new() };
         self.start(&mut turn);
         if self.grip.is_some() {
             self.pull(&mut turn)
@@ -120,15 +120,15 @@ impl Hand {
         turn.actions
     }
 
-    fn window(&self, ui: &Ui, response: &Response, show: &dyn Show) -> Window {
-        Window { rect: response.rect, scale: ui.ctx().pixels_per_point(), camera: self.camera(show) }
+    fn window(&self, ui: &Ui, response: &Response, simulation: &dyn Simulation) -> Window {
+        Window { rect: response.rect, scale: ui.ctx().pixels_per_point(), camera: self.camera(simulation) }
     }
 
-    fn follow_tracked(&mut self, show: &dyn Show) {
-        let selected = if self.track { show.status().selected } else { None };
-        let centre = selected.and_then(|id| show.bounds(Some(id))).map(|ball| ball.centre);
+    fn follow_tracked(&mut self, simulation: &dyn Simulation) {
+        let selected = if self.track { simulation.status().selected } else { None };
+        let centre = selected.and_then(|id| simulation.bounds(Some(id))).map(|ball| ball.centre);
         if let (Some(before), Some(now)) = (self.tracked, centre) {
-            self.steer(show, |camera| camera.target_m += now - before);
+            self.change_camera(simulation, |camera| camera.target_m += now - before);
         }
         self.tracked = centre;
     }
@@ -140,7 +140,7 @@ impl Hand {
             return;
         }
         let origin = turn.ui.input(|input| input.pointer.press_origin());
-        if let Some(hit) = origin.and_then(|at| turn.show.pick(turn.window.ray(at))) {
+        if let Some(hit) = origin.and_then(|at| turn.simulation.pick(turn.window.ray(at))) {
             self.grip = Some(hit.point_m);
             turn.actions.extend([Action::Select(Some(hit.object)), Action::DragStart(hit)]);
         }
@@ -166,7 +166,9 @@ impl Hand {
         }
         let (pixels, size) = (turn.window.pixels(delta), turn.window.size());
         let turning = turn.response.dragged_by(PointerButton::Primary);
-        self.steer(turn.show, |camera| if turning { camera.orbit(pixels, size) } else { camera.pan(pixels, size) });
+        self.change_camera(turn.simulation, |camera| {
+            if turning { camera.orbit(pixels, size) } else { camera.pan(pixels, size) }
+        });
     }
 
     /// The wheel zooms, or moves the spring's free end in depth while an object is pulled.
@@ -183,7 +185,7 @@ impl Hand {
             turn.actions.push(Action::DragMove(target));
         } else if self.grip.is_none() && (scroll != 0.0 || pinch != 1.0) {
             let factor = (-scroll * ZOOM_PER_POINT).exp() / pinch;
-            self.steer(turn.show, |camera| camera.zoom(factor));
+            self.change_camera(turn.simulation, |camera| camera.zoom(factor));
         }
     }
 
@@ -195,7 +197,7 @@ impl Hand {
             (if input.pointer.secondary_down() { flight } else { DVec3::ZERO }, f64::from(input.stable_dt))
         });
         if flight != DVec3::ZERO && turn.response.is_pointer_button_down_on() {
-            self.steer(turn.show, |camera| camera.fly(flight * FLY_PER_S * dt * camera.distance_m));
+            self.change_camera(turn.simulation, |camera| camera.fly(flight * FLY_PER_S * dt * camera.distance_m));
         }
     }
 
@@ -203,36 +205,36 @@ impl Hand {
         if !turn.response.clicked() {
             return;
         }
-        let hit = turn.response.interact_pointer_pos().and_then(|at| turn.show.pick(turn.window.ray(at)));
+        let hit = turn.response.interact_pointer_pos().and_then(|at| turn.simulation.pick(turn.window.ray(at)));
         turn.actions.push(Action::Select(hit.map(|hit| hit.object)));
         if turn.response.double_clicked()
-            && let Some(bounds) = hit.and_then(|hit| turn.show.bounds(Some(hit.object)))
+            && let Some(bounds) = hit.and_then(|hit| turn.simulation.bounds(Some(hit.object)))
         {
-            self.frame(turn.show, &bounds, turn.window.size());
+            self.frame(turn.simulation, &bounds, turn.window.size());
         }
     }
 
     /// Draws the spring's free end with its force, and the name of the object under the pointer.
-    pub fn draw(&self, ui: &Ui, response: &Response, show: &dyn Show) {
-        let window = self.window(ui, response, show);
+    pub fn draw(&self, ui: &Ui, response: &Response, simulation: &dyn Simulation) {
+        let window = self.window(ui, response, simulation);
         let palette = palette(ui);
-        if let Some(held) = &show.status().held {
+        if let Some(held) = &simulation.status().held {
             if let Some(at) = window.place(held.target) {
                 draw_hand(ui, at, held.force_n, &palette);
             }
             ui.set_cursor_icon(CursorIcon::Grabbing);
-        } else if let Some(hit) = hovered(ui, response, show, &window) {
+        } else if let Some(hit) = hovered(ui, response, simulation, &window) {
             ui.set_cursor_icon(CursorIcon::Grab);
-            draw_name(ui, &hit, show, &palette);
+            draw_name(ui, &hit, simulation, &palette);
         }
     }
 }
 
-fn hovered(ui: &Ui, response: &Response, show: &dyn Show, window: &Window) -> Option<Hit> {
+fn hovered(ui: &Ui, response: &Response, simulation: &dyn Simulation, window: &Window) -> Option<Hit> {
     if !response.hovered() || ui.input(|input| input.pointer.any_down()) {
         return None;
     }
-    show.pick(window.ray(response.hover_pos()?))
+    simulation.pick(window.ray(response.hover_pos()?))
 }
 
 /// The point where `ray` meets the plane through `through` across `normal`; `through` itself where they do not meet.
@@ -242,8 +244,8 @@ fn on_plane(ray: &Ray, through: DVec3, normal: DVec3) -> DVec3 {
     if along > 1e-6 && distance > 0.0 { ray.origin + ray.direction * (distance / along) } else { through }
 }
 
-fn draw_name(ui: &Ui, hit: &Hit, show: &dyn Show, palette: &Palette) {
-    let agents = &show.status().agents;
+fn draw_name(ui: &Ui, hit: &Hit, simulation: &dyn Simulation, palette: &Palette) {
+    let agents = &simulation.status().agents;
     let Some(row) = agents.iter().find(|row| row.id == hit.object) else { return };
     let Some(at) = ui.input(|input| input.pointer.hover_pos()) else { return };
     label(ui, at + vec2(14.0, 4.0), &row.name, palette);

@@ -1,15 +1,15 @@
 //! The window itself: eframe around the [`Viewer`], paced at the target rate, reopened when its device is lost.
 //!
-//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
+//! In: a [`Simulation`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
 //! eframe reconfigures an outdated surface and remakes a lost one, but does not notice a lost device; so [`run_window`] receives the loss
-//! from wgpu, closes the window and opens it again on a new device. The show keeps running.
+//! from wgpu, closes the window and opens it again on a new device. The simulation keeps running.
 
 use super::present_time::Presenting;
-use super::protocol::{FrameTimes, Message, Show, Skip, Weight};
+use super::protocol::{FrameTimes, Message, Severity, Simulation, Skip};
 use super::screen::GpuScreen;
-use super::{Layout, Screen, Viewer, Wishes};
+use super::{Layout, Screen, Viewer, WindowRequests};
 use eframe::{CreationContext, NativeOptions, egui_wgpu};
-use metachron_render::Lost;
+use metachron_render::DeviceLoss;
 use std::cell::{Cell, OnceCell};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ pub struct WindowOptions {
 pub enum WindowEnd {
     /// The user closed it.
     Closed,
-    /// The show requested it ([`Show::wants_close`]).
+    /// The simulation requested it ([`Simulation::wants_close`]).
     Finished,
 }
 
@@ -49,10 +49,10 @@ pub enum WindowError {
     #[error("no graphics adapter can draw into a window: {0}; on Debian and Ubuntu install mesa-vulkan-drivers")]
     NoAdapter(String),
     /// The device was lost this many times in a row, each within a second of being made.
-    #[error("the graphics device was lost {0} times within a second of being made")]
+    #[error("the graphics device was lost {0} times, each within a second of its creation")]
     DeviceUnstable(u32),
     /// The window was open, and its display is gone.
-    #[error("the window is gone: {0}")]
+    #[error("the window was lost: {0}")]
     Gone(String),
     /// The window could not be made for another reason.
     #[error("the window could not be opened: {0}")]
@@ -63,7 +63,7 @@ pub enum WindowError {
 const YOUNG: Duration = Duration::from_secs(1);
 /// Early losses in a row after which the window gives up.
 const LOSSES_MAX: u32 = 5;
-/// While the window is hidden, [`Show::wants_close`] is polled at this interval.
+/// While the window is hidden, [`Simulation::wants_close`] is polled at this interval.
 const HIDDEN_POLL: Duration = Duration::from_millis(200);
 /// Interval between pictures while the simulation is paused and there is no input.
 const STILL_PERIOD: Duration = Duration::from_millis(250);
@@ -76,32 +76,32 @@ const EARLY: Duration = Duration::from_micros(500);
 /// A picture later than this was delayed by the one before.
 const LATE: Duration = Duration::from_millis(1);
 
-/// Opens the window and shows `show` in it until the user or the show closes it.
+/// Opens the window and shows `simulation` in it until the user or the simulation closes it.
 ///
-/// To be called on the main thread. A lost device is replaced; the show is not notified and need not react.
+/// To be called on the main thread. A lost device is replaced; the simulation is not notified and need not react.
 ///
 /// # Errors
 /// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as its display is gone;
-/// the others where graphics fail. The show is left unchanged.
-pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
+/// the others where graphics fail. The simulation is left unchanged.
+pub fn run_window(simulation: &mut dyn Simulation, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
     find_display()?;
     let mut viewer = Viewer::default();
     let mut options = options.clone();
     let (mut losses, mut first) = (0, true);
     loop {
         let opened = Instant::now();
-        match open(show, &mut viewer, &options, first)? {
-            Fate::Open | Fate::Closed => return Ok(WindowEnd::Closed),
-            Fate::Finished => return Ok(WindowEnd::Finished),
-            Fate::DeviceLost => {}
+        match open(simulation, &mut viewer, &options, first)? {
+            WindowState::Open | WindowState::Closed => return Ok(WindowEnd::Closed),
+            WindowState::Finished => return Ok(WindowEnd::Finished),
+            WindowState::DeviceLost => {}
         }
         losses = if opened.elapsed() < YOUNG { losses + 1 } else { 0 };
         if losses >= LOSSES_MAX {
             return Err(WindowError::DeviceUnstable(losses));
         }
         (options.lose_device_after, first) = (None, false);
-        let text = "The graphics device was lost and made anew.".to_owned();
-        viewer.note(0.0, Message { weight: Weight::Warning, text });
+        let text = "The graphics device was lost and has been recreated.".to_owned();
+        viewer.note(0.0, Message { severity: Severity::Warning, text });
     }
 }
 
@@ -120,7 +120,7 @@ fn find_display() -> Result<(), WindowError> {
 
 /// State of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Fate {
+enum WindowState {
     Open,
     Closed,
     Finished,
@@ -128,10 +128,15 @@ enum Fate {
 }
 
 /// One window on one device, until either ends.
-fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
-    let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
-    let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
-    let native = native_options(&show.status().scene, options.size);
+fn open(
+    simulation: &mut dyn Simulation,
+    viewer: &mut Viewer,
+    options: &WindowOptions,
+    first: bool,
+) -> Result<WindowState, WindowError> {
+    let (window_state, device) = (Rc::new(Cell::new(WindowState::Open)), Rc::new(OnceCell::<DeviceLoss>::new()));
+    let (shell_state, watched) = (Rc::clone(&window_state), Rc::clone(&device));
+    let native = native_options(&simulation.status().scene, options.size);
     let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
         Viewer::install(&cc.egui_ctx);
         if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
@@ -140,69 +145,71 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
         let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
-        show.drawn_by(screen.adapter(), screen.is_software());
-        Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
+        simulation.drawn_by(screen.adapter(), screen.is_software());
+        Ok(Box::new(Shell::new(simulation, viewer, screen, shell_state, options.screenshots.clone())))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
     let opened = || device.get().is_some();
-    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
+    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the simulation nor the viewer is being
     // modified at that point
-    match hearing_winit(|| panic::catch_unwind(AssertUnwindSafe(run))) {
-        (_, true) => return Err(no_answer(opened())),
+    match catch_winit_panic(|| panic::catch_unwind(AssertUnwindSafe(run))) {
+        (_, true) => return Err(display_error(opened())),
         (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
-        (Err(_), _) if lost() => return Ok(Fate::DeviceLost),
+        (Err(_), _) if lost() => return Ok(WindowState::DeviceLost),
         (Err(bug), _) => panic::resume_unwind(bug),
     }
-    Ok(fate.get())
+    Ok(window_state.get())
 }
 
 /// Returns the result of `run`, and whether winit panicked meanwhile, as it does where the display does not answer; that panic is not
 /// printed.
-fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
-    let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
-    let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
+fn catch_winit_panic<T>(run: impl FnOnce() -> T) -> (T, bool) {
+    let (before, panicked) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
+    let (previous_hook, panic_flag) = (Arc::clone(&before), Arc::clone(&panicked));
     panic::set_hook(Box::new(move |panic| match panic.location() {
         Some(place) if place.file().split(['/', '\\']).any(|part| part.starts_with("winit-")) => {
-            hears.store(true, Ordering::Relaxed)
+            panic_flag.store(true, Ordering::Relaxed)
         }
-        _ => others(panic),
+        _ => previous_hook(panic),
     }));
     let given = run();
     drop(panic::take_hook());
     if let Ok(before) = Arc::try_unwrap(before) {
         panic::set_hook(before);
     }
-    (given, heard.load(Ordering::Relaxed))
+    (given, panicked.load(Ordering::Relaxed))
 }
 
 const LAYOUT: &str = "metachron layout";
 
 fn named_error(error: eframe::Error, opened: bool) -> WindowError {
     match error {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => no_answer(opened),
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => display_error(opened),
         eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
         other => WindowError::Failed(other.to_string()),
     }
 }
 
 /// The error for a display that does not answer, or no longer answers if the window was already `opened`.
-fn no_answer(opened: bool) -> WindowError {
+fn display_error(opened: bool) -> WindowError {
     let read = |key: &str| std::env::var(key).ok();
     if opened {
-        return WindowError::Gone(unanswered(read, "no longer answers"));
+        return WindowError::Gone(display_message(read, "no longer responds"));
     }
-    let why = unanswered(read, "does not answer");
-    WindowError::NoDisplay(format!("{why}; name one that does, or run with --headless"))
+    let why = display_message(read, "does not respond");
+    WindowError::NoDisplay(format!(
+        "{why}; set DISPLAY or WAYLAND_DISPLAY to a working display, or run with --headless"
+    ))
 }
 
 /// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
-fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
+fn display_message(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
     let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
     let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
-        return "the system gives no window".to_owned();
+        return "the system cannot open a window".to_owned();
     };
-    format!("`{value}`, which {key} names, {fails}")
+    format!("the display `{value}` ({key}) {fails}")
 }
 
 fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
@@ -234,10 +241,10 @@ fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
 
 /// The application inside eframe.
 struct Shell<'a> {
-    show: &'a mut dyn Show,
+    simulation: &'a mut dyn Simulation,
     viewer: &'a mut Viewer,
     screen: GpuScreen,
-    fate: Rc<Cell<Fate>>,
+    window_state: Rc<Cell<WindowState>>,
     screenshots: PathBuf,
     pace: Pace,
     presenting: Presenting,
@@ -278,17 +285,18 @@ impl Pace {
 
 impl<'a> Shell<'a> {
     fn new(
-        show: &'a mut dyn Show,
+        simulation: &'a mut dyn Simulation,
         viewer: &'a mut Viewer,
         screen: GpuScreen,
-        (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
+        window_state: Rc<Cell<WindowState>>,
+        screenshots: PathBuf,
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
         Self {
-            show,
+            simulation,
             viewer,
             screen,
-            fate,
+            window_state,
             screenshots,
             pace,
             presenting: Presenting::default(),
@@ -304,18 +312,18 @@ impl<'a> Shell<'a> {
             let held = input.pointer.any_down() || !input.keys_down.is_empty();
             (input.time, held || !input.raw.events.is_empty() || !input.raw.dropped_files.is_empty())
         });
-        if touched || self.show.status().running {
+        if touched || self.simulation.status().running {
             self.touched_s = now_s;
         }
         now_s - self.touched_s > CALM
     }
 
-    fn close(&self, ctx: &egui::Context, fate: Fate) {
-        self.fate.set(fate);
+    fn close(&self, ctx: &egui::Context, window_state: WindowState) {
+        self.window_state.set(window_state);
         ctx.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
-    /// Collects the times of the picture just drawn, and passes them to the show and the plots.
+    /// Collects the times of the picture just drawn, and passes them to the simulation and the plots.
     fn account(&mut self, interval: Duration, panels: Duration) {
         let Some(drawn) = self.screen.take_times() else { return };
         // a GPU presents on its own: waiting for it is not work
@@ -326,7 +334,7 @@ impl<'a> Shell<'a> {
             Some(Skip::Hidden)
         } else if drawn.resized {
             Some(Skip::Resized)
-        } else if !self.show.status().running {
+        } else if !self.simulation.status().running {
             Some(Skip::Still)
         } else {
             None
@@ -342,19 +350,21 @@ impl<'a> Shell<'a> {
             skip,
         };
         self.presenting.worked(drawn.compose + drawn.draw + panels, skip.is_none());
-        self.show.measured(&times);
+        self.simulation.measured(&times);
         self.viewer.measured(&times);
     }
 
-    fn fulfil(&mut self, ctx: &egui::Context, wishes: Wishes) {
-        if wishes.quit {
-            self.close(ctx, Fate::Closed);
+    fn fulfil(&mut self, ctx: &egui::Context, requests: WindowRequests) {
+        if requests.quit {
+            self.close(ctx, WindowState::Closed);
         }
-        if wishes.screenshot {
-            let scene = self.show.status().scene.clone();
+        if requests.screenshot {
+            let scene = self.simulation.status().scene.clone();
             let message = match self.screen.save(&self.screenshots, &scene) {
-                Ok(path) => Message { weight: Weight::Note, text: format!("Picture written to {}", path.display()) },
-                Err(text) => Message { weight: Weight::Failure, text },
+                Ok(path) => {
+                    Message { severity: Severity::Note, text: format!("Picture written to {}", path.display()) }
+                }
+                Err(text) => Message { severity: Severity::Failure, text },
             };
             self.viewer.note(ctx.time(), message);
         }
@@ -363,13 +373,13 @@ impl<'a> Shell<'a> {
 
 impl eframe::App for Shell<'_> {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        if self.fate.get() != Fate::Open {
+        if self.window_state.get() != WindowState::Open {
             return;
         }
         if self.screen.lost().reason().is_some() {
-            self.close(ctx, Fate::DeviceLost);
-        } else if self.show.wants_close() {
-            self.close(ctx, Fate::Finished);
+            self.close(ctx, WindowState::DeviceLost);
+        } else if self.simulation.wants_close() {
+            self.close(ctx, WindowState::Finished);
         }
         if ctx.input(|input| input.viewport().visible()) == Some(false) {
             self.hidden = true;
@@ -378,13 +388,13 @@ impl eframe::App for Shell<'_> {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        if self.fate.get() != Fate::Open {
+        if self.window_state.get() != WindowState::Open {
             return;
         }
         let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
         let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
         let panels = panels.saturating_sub(self.drawing);
-        let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
+        let period = Duration::from_secs_f64(1.0 / self.simulation.status().target_hz.clamp(0.1, 1000.0));
         let still = self.is_still(ui.ctx());
         let due = first_pass && self.pace.is_due(now, still);
         let late = now.saturating_duration_since(self.pace.next(still)) > LATE;
@@ -393,14 +403,14 @@ impl eframe::App for Shell<'_> {
             self.presenting.started(interval, late);
         }
         self.screen.set_due(due);
-        let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
+        let (requests, drawing) = self.viewer.ui(ui, self.simulation, &mut self.screen);
         self.drawing = if first_pass { drawing } else { self.drawing + drawing };
         self.account(interval, panels);
         if let Some(error) = self.screen.take_failure() {
             let text = format!("The picture could not be drawn: {error}");
-            self.viewer.note(ui.ctx().time(), Message { weight: Weight::Failure, text });
+            self.viewer.note(ui.ctx().time(), Message { severity: Severity::Failure, text });
         }
-        self.fulfil(ui.ctx(), wishes);
+        self.fulfil(ui.ctx(), requests);
         if self.screen.lost().reason().is_some() {
             // egui must not draw on a lost device: its vertex buffer would be missing, and it would panic
             ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
@@ -423,13 +433,13 @@ mod tests {
 
     #[test]
     fn a_display_that_does_not_answer_is_named() {
-        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
-        assert_eq!(told, "`:77`, which DISPLAY names, does not answer");
-        assert_eq!(unanswered(|_| None, "does not answer"), "the system gives no window");
+        let message = display_message(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not respond");
+        assert_eq!(message, "the display `:77` (DISPLAY) does not respond");
+        assert_eq!(display_message(|_| None, "does not respond"), "the system cannot open a window");
     }
 
     #[test]
-    fn a_size_that_is_given_wins_over_the_one_that_is_restored() {
+    fn a_given_size_overrides_the_restored_one() {
         let restored = || egui::ViewportBuilder::default().with_inner_size([1000.0, 700.0]).with_maximized(true);
         let built = native_options("tube", Some([800.0, 600.0])).window_builder.unwrap()(restored());
         assert_eq!((built.inner_size, built.maximized), (Some([800.0, 600.0].into()), Some(false)));
@@ -437,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_keep_their_beat_and_a_stall_starts_a_new_one() {
+    fn pictures_keep_their_schedule_and_a_stall_restarts_it() {
         let begin = Instant::now();
         let period = Duration::from_millis(20);
         let mut pace = Pace { due: begin, started: None, pictures: 0 };

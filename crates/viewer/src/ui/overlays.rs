@@ -5,7 +5,7 @@
 use super::commands;
 use super::commands::{Command, Group, MOUSE, SHORTCUTS};
 use super::history::FrameSummary;
-use super::protocol::{Message, Status, Weight};
+use super::protocol::{Message, Severity, Status};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align2, Area, Frame, Id, Key, Order, Rect, RichText, Ui, vec2};
@@ -93,7 +93,7 @@ fn info_rows(status: &Status, summary: &FrameSummary, adapter: &str) -> Vec<(&'s
         ("Simulated time", format!("{:.3} s", status.sim_time.as_secs_f64())),
         ("Speed", format!("{:.2}× of {}", status.real_time_factor, text::speed(status.speed))),
         ("Frames", format!("{:.1} of {:.0} per s", summary.rate_hz, status.target_hz)),
-        ("Work", format!("{}, 99 % below {}", text::seconds(summary.mean_s), text::seconds(summary.p99_s))),
+        ("Work", format!("{}, 99th percentile {}", text::seconds(summary.mean_s), text::seconds(summary.p99_s))),
         ("Triangles", text::count(status.triangles)),
         ("Agents", format!("{} on {}", status.agents.len(), status.executor)),
         ("Policy", status.policy.clone()),
@@ -127,10 +127,10 @@ pub fn messages(ui: &Ui, over: Rect, messages: &[Message]) {
     area.pivot(Align2::LEFT_BOTTOM).fixed_pos(over.left_bottom() + vec2(12.0, -12.0)).show(ui.ctx(), |ui| {
         ui.set_max_width(0.7 * over.width());
         for message in &messages[messages.len().saturating_sub(SHOWN)..] {
-            let color = match message.weight {
-                Weight::Note => palette.text,
-                Weight::Warning => palette.warn,
-                Weight::Failure => palette.bad,
+            let color = match message.severity {
+                Severity::Note => palette.text,
+                Severity::Warning => palette.warn,
+                Severity::Failure => palette.bad,
             };
             card(&palette).show(ui, |ui| ui.label(RichText::new(&message.text).color(color)));
         }

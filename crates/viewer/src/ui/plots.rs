@@ -26,7 +26,7 @@ pub fn frame_times(ui: &mut Ui, history: &History, target_hz: f64) {
     let interval = Line::new("Interval", points(|f| f.interval)).color(palette.weak.gamma_multiply(0.55)).width(1.0);
     let work = Line::new("Work", points(|f| f.work)).color(palette.accent).width(1.6);
     let target = HLine::new("Target", target_ms).color(palette.warn).style(LineStyle::dashed_loose()).width(1.0);
-    quiet("frame times", 112.0, &palette)
+    plain_plot("frame times", 112.0, &palette)
         .y_grid_spacer(|input| even_marks(input, 4.0))
         .include_x(0.0)
         .include_x(FRAMES as f64)
@@ -43,7 +43,7 @@ pub fn frame_times(ui: &mut Ui, history: &History, target_hz: f64) {
     legend(ui, &[("work", palette.accent), ("interval", palette.weak), ("target", palette.warn)]);
 }
 
-fn quiet(name: &'static str, height: f32, palette: &Palette) -> Plot<'static> {
+fn plain_plot(name: &'static str, height: f32, palette: &Palette) -> Plot<'static> {
     Plot::new(name)
         .height(height)
         .show_grid([false, true])
@@ -103,11 +103,11 @@ pub fn costs(ui: &mut Ui, status: &Status) {
             bar(ui, column(rect, 0.34, 0.66), row.cpu_share / widest, palette.accent);
             let on_time = if share >= 0.95 { palette.good } else { palette.warn };
             bar(ui, column(rect, 0.68, 0.99), share, on_time);
-            words(ui, rect, row, &palette);
-            response.on_hover_text(format!("{} a step", text::seconds(row.step_s)));
+            row_text(ui, rect, row, &palette);
+            response.on_hover_text(format!("{} per step", text::seconds(row.step_s)));
         }
     });
-    legend(ui, &[("share of a core", palette.accent), ("rate of the wanted", palette.good)]);
+    legend(ui, &[("share of a core", palette.accent), ("rate / requested rate", palette.good)]);
 }
 
 fn column(rect: Rect, from: f32, to: f32) -> Rect {
@@ -121,7 +121,7 @@ fn bar(ui: &Ui, rect: Rect, share: f64, color: Color32) {
     ui.painter().rect_filled(filled, 3.0, color.gamma_multiply(0.75));
 }
 
-fn words(ui: &Ui, rect: Rect, row: &crate::ui::protocol::AgentRow, palette: &Palette) {
+fn row_text(ui: &Ui, rect: Rect, row: &crate::ui::protocol::AgentRow, palette: &Palette) {
     let clip = ui.painter().with_clip_rect(rect.with_max_x(rect.left() + 0.32 * rect.width()));
     clip.text(rect.left_center(), Align2::LEFT_CENTER, &row.name, FontId::proportional(12.5), palette.text);
     let figure = |at: f32, text: String| {
@@ -148,16 +148,16 @@ pub fn histories(ui: &mut Ui, status: &Status, history: &History) {
     let sim = series(&|s| s.sim_eps_m.map(|eps| 1e3 * eps));
     let picture = series(&|s| s.picture_eps_m.map(|eps| 1e3 * eps));
     let level = series(&|s| s.n.map(f64::from));
-    small(ui, "ε, mm", vec![("picture", picture, palette.accent), ("simulation", sim, palette.good)]);
-    small(ui, "n", vec![("n", level, palette.accent)]);
-    small(ui, "dt, ms", vec![("dt", series(&|s| Some(1e3 * s.dt_s)), palette.good)]);
-    small(ui, "Step cost, µs", vec![("cost", series(&|s| Some(1e6 * s.step_s)), palette.good)]);
-    small(ui, "Age, ms", vec![("age", series(&|s| Some(1e3 * s.age_s)), palette.accent)]);
+    history_plot(ui, "ε, mm", vec![("picture", picture, palette.accent), ("simulation", sim, palette.good)]);
+    history_plot(ui, "n", vec![("n", level, palette.accent)]);
+    history_plot(ui, "dt, ms", vec![("dt", series(&|s| Some(1e3 * s.dt_s)), palette.good)]);
+    history_plot(ui, "Step cost, µs", vec![("cost", series(&|s| Some(1e6 * s.step_s)), palette.good)]);
+    history_plot(ui, "Age, ms", vec![("age", series(&|s| Some(1e3 * s.age_s)), palette.accent)]);
     ui.add_space(2.0);
     legend(ui, &[("picture", palette.accent), ("simulation", palette.good), ("last minute", Color32::TRANSPARENT)]);
 }
 
-fn small(ui: &mut Ui, name: &'static str, lines: Vec<(&'static str, Vec<[f64; 2]>, Color32)>) {
+fn history_plot(ui: &mut Ui, name: &'static str, lines: Vec<(&'static str, Vec<[f64; 2]>, Color32)>) {
     if lines.iter().all(|(_, points, _)| points.is_empty()) {
         return;
     }
@@ -171,7 +171,7 @@ fn small(ui: &mut Ui, name: &'static str, lines: Vec<(&'static str, Vec<[f64; 2]
         }
     });
     let top = lines.iter().flat_map(|(_, points, _)| points).map(|p| p[1]).fold(1e-3, f64::max);
-    quiet(name, 44.0, &palette)
+    plain_plot(name, 44.0, &palette)
         .width(340.0)
         .include_x(-60.0)
         .include_x(0.0)

@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn late_pictures_tell_how_long_showing_takes_and_those_on_time_do_not_forget_it() {
+    fn late_pictures_measure_the_present_time_and_punctual_ones_keep_it() {
         let mut presenting = Presenting::default();
         play(&mut presenting, 10.0, 20);
         assert_eq!(presenting.time(), Duration::ZERO);
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn one_stall_of_the_system_is_not_believed() {
+    fn a_single_stall_does_not_change_the_estimate() {
         let mut presenting = Presenting::default();
         play(&mut presenting, 25.0, 9);
         presenting.worked(ms(25.0), true);
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_unlike_others_teach_nothing() {
+    fn unusual_pictures_do_not_change_the_estimate() {
         let mut presenting = Presenting::default();
         presenting.worked(ms(25.0), false);
         presenting.started(ms(500.0), true);

@@ -1,6 +1,6 @@
 //! The interface between the window and the program: data shown, and actions requested.
 //!
-//! In: a [`Show`], implemented where the program's parts are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
+//! In: a [`Simulation`], implemented where the program's parts are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
 //! Never here: egui, a window, the runtime. The viewer knows the rest of metachron through these types only.
 
 use glam::DVec3;
@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Supplies the window with its content and applies the user's actions.
 ///
 /// No call may wait for an agent: the thread that makes these calls draws the window.
-pub trait Show {
+pub trait Simulation {
     /// Applies a user action.
     fn apply(&mut self, action: Action);
 
@@ -39,7 +39,7 @@ pub trait Show {
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds>;
 
     /// The camera predicted for the time at which the next picture is finished.
-    fn ahead(&mut self, camera: Camera) -> Camera {
+    fn predict_camera(&mut self, camera: Camera) -> Camera {
         camera
     }
 
@@ -136,7 +136,7 @@ pub struct Bounds {
 
 /// The state of the user spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct HandStatus {
     /// Position of the spring's free end, metres.
     pub target: DVec3,
     /// The force on the object in newtons, ≥ 0.
@@ -225,7 +225,7 @@ pub struct Status {
     /// The selected object.
     pub selected: Option<AgentId>,
     /// The user spring while attached.
-    pub held: Option<Held>,
+    pub held: Option<HandStatus>,
     /// One row for each agent, in the scene's order.
     pub agents: Vec<AgentRow>,
     /// The couplings between agents at present.
@@ -363,7 +363,7 @@ impl Law {
 
 /// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Weight {
+pub enum Severity {
     /// Information.
     Note,
     /// A request could not be fulfilled as given.
@@ -376,7 +376,7 @@ pub enum Weight {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
     /// Severity.
-    pub weight: Weight,
+    pub severity: Severity,
     /// The text.
     pub text: String,
 }

@@ -4,13 +4,13 @@
 //! The thread waits for the picture, so that its measured work is complete; egui draws after it on the same queue.
 
 use super::Screen;
-use super::blit::{Blit, Shown};
-use super::protocol::{Show, ViewRequest};
+use super::blit::{Blit, BlitShape};
+use super::protocol::{Simulation, ViewRequest};
 use egui::{Rect, Shape};
 use egui_wgpu::{RenderState, wgpu};
 use metachron_render::Gpu;
 use metachron_render::offscreen;
-use metachron_render::{DrawError, Lost, Renderer, RendererOptions, Size, Target};
+use metachron_render::{DeviceLoss, DrawError, Renderer, RendererOptions, Size, Target};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -32,7 +32,7 @@ pub struct DrawnTimes {
 struct Canvas {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    shown: Arc<Shown>,
+    shown: Arc<BlitShape>,
 }
 
 /// The window's device as a [`Screen`].
@@ -76,7 +76,7 @@ impl GpuScreen {
     }
 
     /// Whether the device was lost: nothing can be drawn until it is replaced.
-    pub fn lost(&self) -> &Lost {
+    pub fn lost(&self) -> &DeviceLoss {
         self.renderer.lost()
     }
 
@@ -105,7 +105,7 @@ impl GpuScreen {
     /// # Errors
     /// A sentence for the user with the file and the cause.
     pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf, String> {
-        let Some(canvas) = &self.canvas else { return Err("There is no picture yet.".to_owned()) };
+        let Some(canvas) = &self.canvas else { return Err("No picture has been drawn yet.".to_owned()) };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let path = folder.join(format!("metachron-{}-{}.png", file_name(scene), now.as_millis()));
         let image = offscreen::read_back(&self.gpu, &canvas.texture, self.lost());
@@ -113,16 +113,16 @@ impl GpuScreen {
         written.map(|()| path).map_err(|error| error.to_string())
     }
 
-    fn render(&mut self, show: &mut dyn Show, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {
+    fn render(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {
         let start = Instant::now();
-        let picture = show.compose(view);
+        let picture = simulation.compose(view);
         let composed = Instant::now();
         let max = self.gpu.device.limits().max_texture_dimension_2d;
         let size = Size { width: view.size.width.clamp(1, max), height: view.size.height.clamp(1, max) };
         let resized = self.resize(size);
         let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
         let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
-        show.while_drawn(view);
+        simulation.while_drawn(view);
         // a failure here means a lost device, which is noticed before the next frame
         let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
         let gpu = self.renderer.gpu_time().or(times.gpu);
@@ -170,12 +170,12 @@ fn file_name(scene: &str) -> String {
 }
 
 impl Screen for GpuScreen {
-    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<Shape> {
+    fn draw(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest, over: Rect) -> Option<Shape> {
         if self.lost().reason().is_some() {
             return None;
         }
         if self.due || self.canvas.is_none() {
-            match self.render(show, view) {
+            match self.render(simulation, view) {
                 Ok(times) => self.times = Some(times),
                 Err(error) => self.failure = Some(error),
             }

@@ -1,8 +1,8 @@
 //! The side panel: frame time against the target, the controller and its gains, drawing options of the picture.
 //!
-//! In: the [`Status`] and the recent frames. Out: [`Action`]s, and changed [`Looks`]. Never here: the law itself.
+//! In: the [`Status`] and the recent frames. Out: [`Action`]s, and changed [`DrawingOptions`]. Never here: the law itself.
 
-use super::Looks;
+use super::DrawingOptions;
 use super::history::{FrameSummary, History};
 use super::plots;
 use super::protocol::{Action, AgentRow, AgentState, Law, Status, Tuning};
@@ -10,15 +10,16 @@ use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
 use metachron_lod::cost::benefit::Sliders;
+use std::ops::RangeInclusive;
 
 /// Range of target frame rates on the slider, per second.
-const TARGET_HZ: (f64, f64) = (5.0, 144.0);
+const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 
 /// Tooltip of the tuning button.
-const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
+const TUNE: &str = "Tune the gains: a few seconds of frames at many resolutions, then a search in the background; the best gains are applied";
 
 /// Draws the panel.
-pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut Looks) -> Vec<Action> {
+pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut DrawingOptions) -> Vec<Action> {
     let mut actions = Vec::new();
     egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 3.0;
@@ -50,14 +51,14 @@ fn frame(ui: &mut Ui, status: &Status, history: &History, summary: &FrameSummary
     let late = format!("{:.1} %", 100.0 * summary.late_share);
     ui.add_space(2.0);
     ui.columns_const(|[work, tail, lateness]| {
-        tile(
+        number_tile(
             work,
             "mean work",
             &text::seconds(summary.mean_s),
-            "Mean work of a frame: states, levels, drawing, panels",
+            "Mean frame time: reading states, selecting levels, drawing, panels",
         );
-        tile(tail, "99 % below", &text::seconds(summary.p99_s), "The work that 99 of 100 frames stay below");
-        tile(lateness, "late frames", &late, "Share of recent frames that came more than a tenth of a period late");
+        number_tile(tail, "99th percentile", &text::seconds(summary.p99_s), "99th percentile of the frame time");
+        number_tile(lateness, "late frames", &late, "Fraction of recent frames late by more than a tenth of a period");
     });
     let mut target = status.target_hz;
     slider(ui, "Target rate", &mut target, TARGET_HZ, |s| s.step_by(1.0).suffix(" fps"));
@@ -83,11 +84,11 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
         out.push(Action::Policy(policy));
     }
     let mut frozen = status.frozen;
-    if ui.checkbox(&mut frozen, "Freeze selection").on_hover_text("Every object keeps the level it has").changed() {
+    if ui.checkbox(&mut frozen, "Freeze selection").on_hover_text("All objects keep their present level").changed() {
         out.push(Action::Freeze(frozen));
     }
     if let Some(sliders) = status.sliders {
-        worth(ui, (sliders, status.damped), out);
+        benefit_weights(ui, sliders, status.damped, out);
     }
     if let Some(law) = status.law {
         feedback(ui, law, status, out);
@@ -95,13 +96,13 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
 }
 
 /// Sliders for the weights of a level's benefit; hysteresis only where the policy uses it.
-fn worth(ui: &mut Ui, (sliders, damped): (Sliders, bool), out: &mut Vec<Action>) {
+fn benefit_weights(ui: &mut Ui, sliders: Sliders, damped: bool, out: &mut Vec<Action>) {
     let mut wanted = sliders;
     let Sliders { size, accuracy, importance, focus, motion, hysteresis } = &mut wanted;
     let factors =
         [("Size", size), ("Accuracy", accuracy), ("Importance", importance), ("Focus", focus), ("Motion", motion)];
     for (name, value) in factors.into_iter().chain(damped.then_some(("Hysteresis", hysteresis))) {
-        slider(ui, name, value, (0.0, 1.0), |s| s.max_decimals(2));
+        slider(ui, name, value, 0.0..=1.0, |s| s.max_decimals(2));
     }
     if wanted != sliders {
         out.push(Action::Sliders(wanted));
@@ -135,7 +136,7 @@ fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
 /// Progress of the search for gains, with a cancel button.
 fn progress(ui: &mut Ui, tuning: &Tuning, out: &mut Vec<Action>) {
     ui.horizontal(|ui| {
-        if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay as they were").clicked() {
+        if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay unchanged").clicked() {
             out.push(Action::StopTuning);
         }
         let bar = ProgressBar::new(tuning.done as f32).desired_height(14.0).show_percentage();
@@ -160,16 +161,16 @@ fn choose_law(ui: &mut Ui, law: &mut Law, laws: &[Law]) {
 fn gains(ui: &mut Ui, law: &mut Law) {
     match law {
         Law::Printed { alpha, beta } => {
-            slider(ui, "Gain α", alpha, (1e-6, 1e-1), |s| {
+            slider(ui, "Gain α", alpha, 1e-6..=1e-1, |s| {
                 s.logarithmic(true).custom_formatter(|v, _| format!("{v:.1e}"))
             });
-            slider(ui, "Gain β", beta, (0.1, 50.0), |s| s.logarithmic(true).max_decimals(2));
+            slider(ui, "Gain β", beta, 0.1..=50.0, |s| s.logarithmic(true).max_decimals(2));
         }
         Law::Corrected { kappa, lead, margin } => {
-            slider(ui, "Gain κ", kappa, (0.01, 0.99), |s| s.max_decimals(2));
-            slider(ui, "Lead λ", lead, (0.0, 0.99), |s| s.max_decimals(2));
+            slider(ui, "Gain κ", kappa, 0.01..=0.99, |s| s.max_decimals(2));
+            slider(ui, "Lead λ", lead, 0.0..=0.99, |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
-            slider(ui, "Margin", &mut percent, (0.0, 50.0), |s| s.max_decimals(0).suffix(" %"));
+            slider(ui, "Margin", &mut percent, 0.0..=50.0, |s| s.max_decimals(0).suffix(" %"));
             // the conversion to percent and back must not count as a change
             if (percent - *margin * 100.0).abs() > 1e-9 {
                 *margin = percent / 100.0;
@@ -188,7 +189,7 @@ fn as_toml(status: &Status, law: &Law) -> String {
     format!("[target]\nframe_hz = {:?}\npolicy = \"{}\"\n{gains}", status.target_hz, status.policy)
 }
 
-fn picture(ui: &mut Ui, looks: &mut Looks, status: &Status) {
+fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
     egui::Grid::new("looks").num_columns(2).spacing(egui::vec2(18.0, 4.0)).show(ui, |ui| {
         if ui.checkbox(&mut looks.colours, "Colour by resolution").changed() && looks.colours {
             (looks.ages, looks.details) = (false, false);
@@ -225,22 +226,27 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         ui.label(RichText::new(format!("Parked: {reason}")).color(palette.bad));
     }
     value(ui, "Error estimate", &text::metres(row.residual_m), "The agent's own estimate");
-    value(ui, "Dropped time", &text::seconds(row.dropped_s), "Simulated time that could not be made up");
+    value(
+        ui,
+        "Dropped time",
+        &text::seconds(row.dropped_s),
+        "Simulated time dropped because the agent could not keep up",
+    );
     if let Some(simulation) = &row.simulation {
         value(ui, "Simulation ε", &text::metres(simulation.eps_m), "Spacing of samples along the shape");
     }
     if let Some(picture) = &row.picture {
         // a primitive is not divided along a shape: only its level is meaningful
         let eps = row.simulation.map_or_else(String::new, |_| format!("ε {}, ", text::metres(picture.eps_m)));
-        value(ui, "Picture", &format!("{eps}n {}", picture.n), "Interval of the skin, and the level of its patch");
+        value(ui, "Picture", &format!("{eps}n {}", picture.n), "Sample spacing of the skin, and level of its patches");
     }
     if let Some(force_n) = row.force_n {
-        value(ui, "Force", &format!("{} N", text::figures(force_n)), "What is held pulls back with this");
+        value(ui, "Force", &format!("{} N", text::figures(force_n)), "Reaction force of the grasped object");
     }
 }
 
 /// A number over its name.
-fn tile(ui: &mut Ui, name: &str, value: &str, hover: &str) {
+fn number_tile(ui: &mut Ui, name: &str, value: &str, hover: &str) {
     ui.spacing_mut().item_spacing.y = 0.0;
     ui.label(RichText::new(value).monospace().size(13.5)).on_hover_text(hover);
     ui.label(RichText::new(name).small().color(palette(ui).weak));
@@ -266,12 +272,12 @@ fn slider(
     ui: &mut Ui,
     name: &str,
     value: &mut f64,
-    (low, high): (f64, f64),
+    range: RangeInclusive<f64>,
     shape: impl FnOnce(Slider<'_>) -> Slider<'_>,
 ) {
     labelled(ui, name, |ui| {
         // a value outside the slider's range stays unchanged until the slider is moved
-        let free = Slider::new(value, low..=high).clamping(SliderClamping::Edits);
+        let free = Slider::new(value, range).clamping(SliderClamping::Edits);
         ui.add(shape(free)).accessible_name(name);
     });
 }
@@ -283,7 +289,7 @@ mod tests {
     use egui_kittest::kittest::Queryable;
 
     #[test]
-    fn the_slider_of_hysteresis_is_there_only_where_it_is_heeded() {
+    fn the_hysteresis_slider_is_shown_only_where_it_is_used() {
         let sliders = Some(Sliders::default());
         for (damped, there) in [(true, 1), (false, 0)] {
             let status = Status { sliders, damped, ..Status::default() };

@@ -15,7 +15,7 @@ const WIDTH_MIN: f32 = 940.0;
 const COLUMNS: [(&str, f32, bool); 10] = [
     ("Agent", 1.5, false),
     ("Model", 0.9, false),
-    ("Rate / wanted", 1.3, true),
+    ("Rate / requested", 1.3, true),
     ("dt", 0.85, true),
     ("Simulation ε", 1.0, true),
     ("Picture ε, n", 1.2, true),
@@ -83,7 +83,7 @@ fn header(ui: &mut Ui, edges: &[f32], palette: &Palette) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 18.0), Sense::hover());
     for (index, (name, _, number)) in COLUMNS.iter().enumerate() {
         let at = Cell { row: rect, edges, index, number: *number };
-        cell(ui, &at, (name, FontId::proportional(11.5)), palette.weak);
+        cell(ui, &at, name, FontId::proportional(11.5), palette.weak);
     }
     ui.painter().hline(rect.x_range(), rect.bottom(), egui::Stroke::new(1.0, palette.line));
 }
@@ -95,7 +95,7 @@ struct Cell<'a> {
     number: bool,
 }
 
-fn cell(ui: &Ui, at: &Cell<'_>, (text, font): (&str, FontId), color: Color32) {
+fn cell(ui: &Ui, at: &Cell<'_>, text: &str, font: FontId, color: Color32) {
     let (left, right) = (at.row.left() + at.edges[at.index], at.row.left() + at.edges[at.index + 1]);
     let clip = Rect::from_x_y_ranges(left..=right - 4.0, at.row.y_range());
     let painter = ui.painter().with_clip_rect(clip.intersect(ui.clip_rect()));
@@ -111,7 +111,7 @@ fn cell(ui: &Ui, at: &Cell<'_>, (text, font): (&str, FontId), color: Color32) {
 fn agent(ui: &mut Ui, row: &AgentRow, edges: &[f32], selected: bool, palette: &Palette) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let texts = cells(row);
-    response.widget_info(|| WidgetInfo::selected(Role::Row, true, selected, spoken(row, &texts)));
+    response.widget_info(|| WidgetInfo::selected(Role::Row, true, selected, accessible_text(row, &texts)));
     if ui.is_rect_visible(rect) {
         if selected {
             ui.painter().rect_filled(rect, 4.0, palette.accent.gamma_multiply(0.22));
@@ -123,7 +123,7 @@ fn agent(ui: &mut Ui, row: &AgentRow, edges: &[f32], selected: bool, palette: &P
         for (index, text) in texts.iter().enumerate() {
             let at = Cell { row: rect, edges, index, number: COLUMNS[index].2 };
             let font = if at.number { FontId::monospace(11.5) } else { FontId::proportional(12.5) };
-            cell(ui, &at, (text, font), cell_color(row, index, palette));
+            cell(ui, &at, text, font, cell_color(row, index, palette));
         }
     }
     if let AgentState::Parked(reason) = &row.state { response.on_hover_text(reason) } else { response }
@@ -153,13 +153,13 @@ fn dash() -> String {
 
 fn state_text(row: &AgentRow) -> String {
     match &row.state {
-        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("led by {by}")),
+        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("island of {by}")),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
     }
 }
 
-fn spoken(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
+fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
     format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[9])
 }
 

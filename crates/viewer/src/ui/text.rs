@@ -48,7 +48,7 @@ pub fn joules(value: f64) -> String {
 #[must_use]
 pub fn kilograms(value: f64) -> String {
     if !value.is_finite() {
-        return "what is held".to_owned();
+        return "immovable".to_owned();
     }
     match value.abs() {
         size if size < 1e-3 => format!("{} mg", figures(value * 1e6)),
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_a_dash() {
+    fn a_value_that_is_not_finite_is_a_dash() {
         assert_eq!(seconds(f64::NAN), "–");
         assert_eq!(metres(f64::INFINITY), "–");
     }

@@ -1,4 +1,4 @@
-//! A window without a device: a show and a screen that write down what they are asked for.
+//! A window without a device: a simulation and a screen that write down what they are asked for.
 
 use egui::{Key, Pos2, Rect, Shape};
 use egui_kittest::Harness;
@@ -7,8 +7,8 @@ use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 use metachron_render::{Camera, Hit, Picture, Ray, Size};
 use metachron_viewer::ui::{
-    Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, Screen, Show, Status, Tuning, ViewRequest, Viewer,
-    Wishes,
+    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Simulation, Status, Tuning, ViewRequest,
+    Viewer, WindowRequests,
 };
 
 /// A show of three agents around the origin that writes down what it is asked for.
@@ -48,7 +48,7 @@ impl Fake {
     }
 }
 
-impl Show for Fake {
+impl Simulation for Fake {
     fn apply(&mut self, action: Action) {
         match &action {
             Action::Pause => self.status.running = false,
@@ -62,7 +62,7 @@ impl Show for Fake {
             }
             Action::StopTuning => self.status.tuning = None,
             Action::DragStart(hit) => {
-                self.status.held = Some(Held { target: hit.point_m, force_n: 0.0 });
+                self.status.held = Some(HandStatus { target: hit.point_m, force_n: 0.0 });
             }
             Action::DragEnd => self.status.held = None,
             _ => {}
@@ -105,8 +105,8 @@ pub struct Blank {
 }
 
 impl Screen for Blank {
-    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, _over: Rect) -> Option<Shape> {
-        show.compose(view);
+    fn draw(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest, _over: Rect) -> Option<Shape> {
+        simulation.compose(view);
         self.views.push(view.clone());
         None
     }
@@ -119,9 +119,9 @@ impl Screen for Blank {
 /// The interface, and what it is shown on.
 pub struct World {
     pub viewer: Viewer,
-    pub show: Fake,
+    pub simulation: Fake,
     pub screen: Blank,
-    pub wishes: Wishes,
+    pub requests: WindowRequests,
     /// What the harness gives the interface to draw on: its window without a margin.
     pub inner: Size,
 }
@@ -132,20 +132,20 @@ pub fn window() -> Harness<'static, World> {
 }
 
 /// The same before another show.
-pub fn window_of(show: Fake) -> Harness<'static, World> {
+pub fn window_of(simulation: Fake) -> Harness<'static, World> {
     let world = World {
         viewer: Viewer::default(),
-        show,
+        simulation,
         screen: Blank::default(),
-        wishes: Wishes::default(),
+        requests: WindowRequests::default(),
         inner: Size { width: 0, height: 0 },
     };
     let draw = |ui: &mut egui::Ui, world: &mut World| {
         let room = ui.max_rect().size();
         world.inner = Size { width: room.x.round() as u32, height: room.y.round() as u32 };
-        let (wishes, _) = world.viewer.ui(ui, &mut world.show, &mut world.screen);
-        world.wishes.screenshot |= wishes.screenshot;
-        world.wishes.quit |= wishes.quit;
+        let (requests, _) = world.viewer.ui(ui, &mut world.simulation, &mut world.screen);
+        world.requests.screenshot |= requests.screenshot;
+        world.requests.quit |= requests.quit;
     };
     let mut harness = Harness::builder()
         .with_size(egui::vec2(1280.0, 800.0))
@@ -159,7 +159,7 @@ pub fn window_of(show: Fake) -> Harness<'static, World> {
 /// What it asked for since it was asked last.
 pub fn asked(harness: &mut Harness<'static, World>) -> Vec<Action> {
     harness.run_steps(2);
-    std::mem::take(&mut harness.state_mut().show.asked)
+    std::mem::take(&mut harness.state_mut().simulation.asked)
 }
 
 /// What it asks for when this key is pressed.

@@ -9,7 +9,9 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use fake::{BALL, Fake, World, asked, last_view, middle, press, window, window_of};
 use metachron_core::AgentId;
 use metachron_render::{Colouring, Hit};
-use metachron_viewer::ui::{Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Show, Weight, keys_text};
+use metachron_viewer::ui::{
+    Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Severity, Simulation, keys_text,
+};
 use std::time::Duration;
 
 #[test]
@@ -76,10 +78,10 @@ fn keys_ask_for_what_the_help_says() {
     harness.key_press_modifiers(Modifiers::COMMAND, Key::L);
     assert_eq!(asked(&mut harness), [Action::Reload]);
     press(&mut harness, Key::F12);
-    assert!(harness.state().wishes.screenshot);
+    assert!(harness.state().requests.screenshot);
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Q);
     asked(&mut harness);
-    assert!(harness.state().wishes.quit);
+    assert!(harness.state().requests.quit);
 }
 
 #[test]
@@ -121,9 +123,9 @@ fn a_window_left_alone_asks_for_nothing_whatever_the_numbers() {
         Law::Corrected { kappa: 0.123_456_7, lead: 0.0, margin: 0.777 },
     ];
     for law in laws {
-        let mut show = Fake::new();
-        (show.status.law, show.status.target_hz) = (Some(law), 239.76);
-        let mut harness = window_of(show);
+        let mut simulation = Fake::new();
+        (simulation.status.law, simulation.status.target_hz) = (Some(law), 239.76);
+        let mut harness = window_of(simulation);
         harness.run_steps(30);
         assert_eq!(asked(&mut harness), []);
     }
@@ -230,7 +232,7 @@ fn framing_brings_the_selected_object_near() {
     let near = last_view(&harness).camera.distance_m;
     assert!((near * 10.0 - far).abs() < 1e-6 * far, "{near} m, {far} m"); // the balls are 0.1 m and 1 m
     press(&mut harness, Key::V);
-    assert_eq!(last_view(&harness).camera, harness.state().show.scene_camera());
+    assert_eq!(last_view(&harness).camera, harness.state().simulation.scene_camera());
 }
 
 #[test]
@@ -282,13 +284,14 @@ fn letters_typed_into_a_field_toggle_nothing() {
 
 #[test]
 fn an_overloaded_scene_leaves_the_interface_alive() {
-    let mut show = Fake::new();
-    show.status.real_time_factor = 0.1;
-    show.status.clamp = Some("rests on the coarsest resolution".to_owned());
-    show.status
+    let mut simulation = Fake::new();
+    simulation.status.real_time_factor = 0.1;
+    simulation.status.clamp = Some("rests on the coarsest resolution".to_owned());
+    simulation
+        .status
         .messages
-        .push(Message { weight: Weight::Warning, text: "the scene needs more than it gets".to_owned() });
-    let mut harness = window_of(show);
+        .push(Message { severity: Severity::Warning, text: "the scene needs more than it gets".to_owned() });
+    let mut harness = window_of(simulation);
     for frame in 0..100 {
         let times = FrameTimes {
             work: Duration::from_millis(900),
@@ -308,9 +311,9 @@ fn an_overloaded_scene_leaves_the_interface_alive() {
 
 #[test]
 fn thousands_of_agents_do_not_hold_the_interface_up() {
-    let mut show = Fake::new();
-    show.status.agents = (0..5000).map(|i| AgentRow::new(AgentId(i), format!("object {i}"), "rigid")).collect();
-    let mut harness = window_of(show);
+    let mut simulation = Fake::new();
+    simulation.status.agents = (0..5000).map(|i| AgentRow::new(AgentId(i), format!("object {i}"), "rigid")).collect();
+    let mut harness = window_of(simulation);
     harness.run_steps(3);
     let rows = harness.query_all_by_label_contains("object ").count();
     assert!((1..40).contains(&rows), "{rows} rows were laid out"); // only what fits into the table

@@ -21,7 +21,7 @@ const SECONDS: f64 = 4.0;
 
 impl Benchmark for SolidBeam {
     const NAME: &'static str = "solid-beam";
-    const TITLE: &'static str = "Solid out of a wall under its own weight, at rest after 4 s";
+    const TITLE: &'static str = "Solid beam clamped at a wall under its own weight, at rest after 4 s";
     const ERROR: &'static str = "error of the sag / sag";
 
     fn cases(quick: bool) -> Vec<Case> {

@@ -156,8 +156,7 @@ fn goal(case: &'static str) -> Goal {
 
 impl Benchmark for TwistBuckling {
     const NAME: &'static str = "twist-buckling";
-    const TITLE: &'static str =
-        "Twist at which a straight tube between two clamps buckles, from five runs on one side of it";
+    const TITLE: &'static str = "Twist at which a straight tube between two clamps buckles, bracketed by five runs";
     const ERROR: &'static str = "error of the twist / twist";
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -176,7 +175,7 @@ impl Benchmark for TwistBuckling {
 
 impl Benchmark for MichellRing {
     const NAME: &'static str = "michell-ring";
-    const TITLE: &'static str = "Twist at which a ring leaves its plane, from five runs on one side of it";
+    const TITLE: &'static str = "Twist at which a ring leaves its plane, bracketed by five runs";
     const ERROR: &'static str = "error of the twist / twist";
 
     fn cases(quick: bool) -> Vec<Case> {

@@ -84,7 +84,8 @@ impl Goal {
         let asked = || rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
         asked().next()?;
         let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
-        let claim = format!("{case}{size}: CPU ms a simulated second by calibration for an error of at most {error:e}");
+        let claim =
+            format!("{case}{size}: CPU ms per simulated second by calibration for an error of at most {error:e}");
         let pace = pace_for_goals(rows.iter().map(|row| row.calibration_us));
         Some(Finding::at_most(claim, cheapest(asked(), error).map_or(f64::NAN, |ms| ms * pace), cpu_ms_per_s))
     }
@@ -157,11 +158,11 @@ impl<B: Benchmark> Experiment for Diagram<B> {
                 table.rows.push(vec![
                     case.into(),
                     method.into(),
-                    told(dt_order(&here), 2),
-                    told(segment_order(&here), 2),
+                    optional(dt_order(&here), 2),
+                    optional(segment_order(&here), 2),
                     (best, 6).into(),
-                    told(cheapest(here.iter().copied(), 1e-3), 3),
-                    told(cheapest(here.iter().copied(), 1e-4), 3),
+                    optional(cheapest(here.iter().copied(), 1e-3), 3),
+                    optional(cheapest(here.iter().copied(), 1e-4), 3),
                 ]);
             }
         }
@@ -184,7 +185,7 @@ fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
 }
 
 /// A number in a cell, or a dash where there is none.
-fn told(value: Option<f64>, digits: usize) -> Cell {
+fn optional(value: Option<f64>, digits: usize) -> Cell {
     value.map_or_else(|| "–".into(), |value| (value, digits).into())
 }
 

@@ -26,7 +26,7 @@ const LOOKS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 impl Benchmark for EndMoment {
     const NAME: &'static str = "end-moment";
     const TITLE: &'static str = "A moment at the end bends a straight tube to a circle, at rest after 10 s";
-    const ERROR: &'static str = "farthest of four points from the circle / L";
+    const ERROR: &'static str = "greatest distance of four points from the circle / L";
 
     fn cases(quick: bool) -> Vec<Case> {
         Case::pulled(&ANGLES.map(|(name, _)| name), quick)

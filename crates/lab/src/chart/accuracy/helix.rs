@@ -31,7 +31,7 @@ const SECONDS: f64 = 10.0;
 impl Benchmark for Helix {
     const NAME: &'static str = "helix";
     const TITLE: &'static str = "Helical spring pulled along its axis, at rest after 10 s";
-    const ERROR: &'static str = "error of the lengthening / lengthening";
+    const ERROR: &'static str = "error of the extension / extension";
 
     fn cases(quick: bool) -> Vec<Case> {
         // segments per turn: 12 … 96

@@ -26,7 +26,7 @@ const STRAIN: f64 = 1e-3;
 impl Benchmark for Inflation {
     const NAME: &'static str = "inflation";
     const TITLE: &'static str = "Closed tube under pressure";
-    const ERROR: &'static str = "error of the widening / widening";
+    const ERROR: &'static str = "error of the radial expansion / expansion";
 
     fn cases(_: bool) -> Vec<Case> {
         Case::ladder(&WALLS.map(|(name, _)| name), &[Integrator::ImplicitEuler], &[16], 10.0)

@@ -77,8 +77,8 @@ impl Play {
         let start = ThreadTime::now();
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
-            let around = StepContext { hands, ..StepContext::alone(AgentId(0), self.time) };
-            match self.agent.step(self.dt, &around) {
+            let context = StepContext { hands, ..StepContext::alone(AgentId(0), self.time) };
+            match self.agent.step(self.dt, &context) {
                 Ok(report) => self.substeps += u64::from(report.substeps),
                 Err(_) => sound = false,
             }

@@ -24,7 +24,7 @@ const LOOKS: usize = 100;
 
 impl Benchmark for Swing {
     const NAME: &'static str = "swing";
-    const TITLE: &'static str = "Cable let go from the horizontal, steps of 10 ms";
+    const TITLE: &'static str = "Cable released from the horizontal, steps of 10 ms";
     const ERROR: &'static str = "RMS of the tip in the first second, m";
 
     fn cases(quick: bool) -> Vec<Case> {

@@ -66,7 +66,8 @@ impl Experiment for CouplingError {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "error";
-    const TITLE: &'static str = "the same scene with clocks apart and under one tiny clock: the coupling error";
+    const TITLE: &'static str =
+        "coupling error: the same scene with separate clocks and under one very fine common clock";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
@@ -83,8 +84,9 @@ impl Experiment for CouplingError {
 
     fn measure(case: &Case) -> Row {
         let Case { scene, ratio, first_is_fast, seconds } = case.clone();
-        let Apart { looks, position_rms_m, position_max_m, momentum, impulse } = apart(case).unwrap_or_default();
-        Row { scene, ratio, first_is_fast, seconds, looks, position_rms_m, position_max_m, momentum, impulse }
+        let RunDifference { samples, position_rms_m, position_max_m, momentum, impulse } =
+            apart(case).unwrap_or_default();
+        Row { scene, ratio, first_is_fast, seconds, looks: samples, position_rms_m, position_max_m, momentum, impulse }
     }
 
     fn case_of(row: &Row) -> Case {
@@ -94,9 +96,9 @@ impl Experiment for CouplingError {
     fn figure(rows: &[Row]) -> Figure {
         let panels = vec![
             panel(rows, "position", "position, rms over the run, mm", |r| 1e3 * r.position_rms_m),
-            panel(rows, "impulse", "impulse, share of that under one clock", |r| r.impulse),
+            panel(rows, "impulse", "impulse error / impulse under the common clock", |r| r.impulse),
         ];
-        Figure { title: "What clocks apart change, against one clock of 4 kHz".to_owned(), panels, columns: 2 }
+        Figure { title: "Coupling error against one common clock of 4 kHz".to_owned(), panels, columns: 2 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -121,10 +123,14 @@ impl Experiment for CouplingError {
         let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
         let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.scene == scene).map(get));
         vec![
-            Finding::at_most("runs that did not come to their end", lost, 0.0),
-            Finding::at_most("two balls: impulse against that under one clock", of(SCENES[0], |r| r.impulse), BLOW_MAX),
-            Finding::at_most("two balls: momentum over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
-            Finding::at_most("ball on box: position, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
+            Finding::at_most("runs that stopped early", lost, 0.0),
+            Finding::at_most(
+                "two balls: impulse error over the impulse under the common clock",
+                of(SCENES[0], |r| r.impulse),
+                BLOW_MAX,
+            ),
+            Finding::at_most("two balls: momentum error over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
+            Finding::at_most("ball on box: position error, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
         ]
     }
 }
@@ -143,44 +149,44 @@ fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -
         }
     }
     let (low, high) = span(rows.iter().map(|r| least(get(r))), true);
-    let x = Axis::log("ratio of the clocks", 0.8, 125.0);
+    let x = Axis::log("ratio of step rates", 0.8, 125.0);
     Panel { title: title.to_owned(), x, y: Axis::log(label, low, 30.0 * high), layers }
 }
 
 /// The difference of two runs.
-struct Apart {
-    looks: usize,
+struct RunDifference {
+    samples: usize,
     position_rms_m: f64,
     position_max_m: f64,
     momentum: f64,
     impulse: f64,
 }
 
-impl Default for Apart {
+impl Default for RunDifference {
     fn default() -> Self {
         let none = f64::NAN;
-        Self { looks: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
+        Self { samples: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
     }
 }
 
 /// The record of one run: positions at every comparison, momentum and impulse at the last one.
 #[derive(Default)]
 struct Trail {
-    looks: Vec<Vec<DVec3>>,
+    samples: Vec<Vec<DVec3>>,
     momentum: DVec3,
     impulse_n_s: f64,
 }
 
-fn apart(case: &Case) -> Option<Apart> {
+fn apart(case: &Case) -> Option<RunDifference> {
     let slow_ns = FAST_NS * u64::from(case.ratio);
     let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
     let coupled = trail(case, slow_ns, steps_ns)?;
     let oracle = trail(case, slow_ns, [ORACLE_NS; 2])?;
-    let pairs = coupled.looks.iter().flatten().zip(oracle.looks.iter().flatten());
+    let pairs = coupled.samples.iter().flatten().zip(oracle.samples.iter().flatten());
     let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    Some(Apart {
-        looks: coupled.looks.len(),
+    Some(RunDifference {
+        samples: coupled.samples.len(),
         position_rms_m: mean.sqrt(),
         position_max_m: worst(squares).sqrt(),
         momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,
@@ -191,24 +197,24 @@ fn apart(case: &Case) -> Option<Apart> {
 /// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
 fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
     let Scene { play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64), Faults::default())?;
-    let looks = libm::round(case.seconds * 1e9) as u64 / every_ns;
+    let samples = libm::round(case.seconds * 1e9) as u64 / every_ns;
     let ids: Vec<AgentId> = (0..play.stage.members().len() as u32).map(AgentId).collect();
     let mut trail = Trail::default();
     play.run(2.0 * case.seconds, |play, _| {
-        let due = SimTime::from_nanos((trail.looks.len() as u64 + 1) * every_ns);
+        let due = SimTime::from_nanos((trail.samples.len() as u64 + 1) * every_ns);
         if ids.iter().all(|id| play.stage.own(*id).time.secs_after(due).abs() < SAME_S) {
-            trail.looks.push(points.iter().map(|point| place(play, *point)).collect());
+            trail.samples.push(points.iter().map(|(id, anchor)| position_m(play, *id, *anchor)).collect());
             trail.momentum = play.common(due).momentum;
             let pairs = ids.iter().flat_map(|id| &play.stage.own(*id).pairs);
             trail.impulse_n_s = pairs.map(|pair| pair.impulse_n_s).sum();
         }
-        (trail.looks.len() as u64) < looks
+        (trail.samples.len() as u64) < samples
     });
-    (trail.looks.len() as u64 == looks).then_some(trail)
+    (trail.samples.len() as u64 == samples).then_some(trail)
 }
 
 /// The position of a point, with every impulse on its way to its agent delivered.
-fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
+fn position_m(play: &Play, id: AgentId, anchor: Anchor) -> DVec3 {
     let members = play.stage.members();
     let Some(member) = members.get(id.0 as usize) else { return DVec3::NAN };
     let body = match settled(member, &members, member.snapshot.time) {

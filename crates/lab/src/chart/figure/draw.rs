@@ -69,7 +69,7 @@ pub fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<Rgb
     }
     root.present().map_err(undrawn)?;
     drop(root);
-    RgbImage::from_raw(all.0, all.1, pixels).context("there is nothing to name")
+    RgbImage::from_raw(all.0, all.1, pixels).context("there are no names to draw")
 }
 
 fn columns(figure: &Figure) -> usize {
@@ -200,7 +200,7 @@ fn draw_leaving<D: DrawingBackend>(
 ) -> anyhow::Result<()> {
     let (Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points)) = &layer.mark else { return Ok(()) };
     let (long, half) = (pen.at(9), pen.at(4));
-    let arrows = leaving(points, panel).into_iter().map(|(at, [right, up])| {
+    let arrows = border_crossings(points, panel).into_iter().map(|(at, [right, up])| {
         // on the screen y points down; the tip is at the border
         let corner = |along: i32, across: i32| (-right * along + up * across, up * along + right * across);
         EmptyElement::at(at)
@@ -211,17 +211,17 @@ fn draw_leaving<D: DrawingBackend>(
 }
 
 /// The points where a layer leaves the axes, once for each run beyond one border, and the direction: (right, up) of −1, 0, 1.
-fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
+fn border_crossings(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
     let mut before = [0, 0];
     let mut all = Vec::new();
     for (x, y) in finite(points) {
         let way = [panel.x.beyond(x), panel.y.beyond(y)];
         // a point beyond both borders is marked at the one above or below
-        let told = if way[1] != 0 { [0, way[1]] } else { way };
-        if told != [0, 0] && told != before {
-            all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), told));
+        let side = if way[1] != 0 { [0, way[1]] } else { way };
+        if side != [0, 0] && side != before {
+            all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), side));
         }
-        before = told;
+        before = side;
     }
     all
 }
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_are_drawn_with_the_font_that_the_program_brings() {
+    fn text_is_drawn_with_the_built_in_font() {
         assert_eq!(dark_pixels(""), 0);
         // Greek and signs that the charts' labels need: each draws a glyph of its own, not an empty one
         let counts = ["μ", "φ", "π", "²", "×", "≤", "Δ", "τ", "₁"].map(dark_pixels);
@@ -266,17 +266,17 @@ mod tests {
     }
 
     #[test]
-    fn what_goes_beyond_the_axes_is_marked_once_a_run_at_the_border() {
+    fn points_beyond_the_axes_are_marked_once_per_run_at_the_border() {
         let panel = |points: &[(f64, f64)]| {
             let layers = vec![Layer { label: String::new(), colour: Colour::Red, mark: Mark::Line(points.to_vec()) }];
             Panel { title: String::new(), x: Axis::linear("", 0.0, 1.0), y: Axis::log("", 0.1, 10.0), layers }
         };
         let points =
             [(0.0, 1.0), (0.1, 20.0), (0.2, 90.0), (0.3, 10.0), (0.4, 0.01), (0.5, 11.0), (1.5, 1.0), (0.6, f64::NAN)];
-        let marks = leaving(&points, &panel(&points));
+        let marks = border_crossings(&points, &panel(&points));
         let wanted = [((0.1, 10.0), [0, 1]), ((0.4, 0.1), [0, -1]), ((0.5, 10.0), [0, 1]), ((1.0, 1.0), [1, 0])];
         assert_eq!(marks, wanted);
-        assert_eq!(leaving(&[(0.0, 10.0 * (1.0 + 1e-12)), (1.0, 0.1)], &panel(&[])), [], "rounding");
+        assert_eq!(border_crossings(&[(0.0, 10.0 * (1.0 + 1e-12)), (1.0, 0.1)], &panel(&[])), [], "rounding");
         let polygons = |points: &[(f64, f64)]| {
             let figure = Figure { title: String::new(), panels: vec![panel(points)], columns: 1 };
             svg(&figure).unwrap().matches("<polygon").count()
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_drawn_is_in_both_kinds_of_file() {
+    fn a_figure_is_written_as_svg_and_as_png() {
         let dots = Layer {
             label: "dots".to_owned(),
             colour: Colour::Blue,

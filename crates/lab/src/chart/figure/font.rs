@@ -17,5 +17,5 @@ pub(super) fn bring_font(name: &str) -> anyhow::Result<()> {
 
 fn bring(name: &str) -> anyhow::Result<()> {
     register_font(name, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
-        .map_err(|_| anyhow!("the program's font is none"))
+        .map_err(|_| anyhow!("the built-in font cannot be read"))
 }

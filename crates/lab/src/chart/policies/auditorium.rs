@@ -31,7 +31,7 @@ impl Experiment for Auditorium {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "auditorium";
-    const TITLE: &'static str = "a walk through 384 seats with half a turn in six frames: who keeps to the time";
+    const TITLE: &'static str = "frame-time control on a walkthrough of 384 seats with half a turn in six frames";
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
@@ -53,7 +53,7 @@ impl Experiment for Auditorium {
             curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 3.0),
             curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 3.0),
         ];
-        figure("The walk through the auditorium (FS93, fig. 7)", panels, 1)
+        figure("Walkthrough of the auditorium (FS93, fig. 7)", panels, 1)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -81,7 +81,7 @@ impl Experiment for Auditorium {
             Finding::at_most("adaptive: binding stddev", ours, 0.035),
             Finding::at_most("adaptive: frames past 1.05 T", of("adaptive", |r| r.misses), 0.01),
             at_least("adaptive: benefit over the bound", of("adaptive", |r| r.value_over_bound), 0.99),
-            Finding::at_most("adaptive: reversals to an object and frame", of("adaptive", |r| r.reversals), 0.002),
+            Finding::at_most("adaptive: reversals per object and frame", of("adaptive", |r| r.reversals), 0.002),
         ]
     }
 }

@@ -5,8 +5,9 @@
 
 use super::camera::{Path, key};
 use super::closed_loop::Show;
+use super::common::LEVEL_PARTS;
 use super::machine::Fault;
-use super::scene::{Form, Scene, Thing, Worth};
+use super::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
 use glam::DVec3;
 use metachron_lod::cost::benefit::Shading;
 use metachron_lod::cost::stages::Stages;
@@ -17,8 +18,6 @@ const SEAT_POLYGONS: f64 = 186.0;
 /// The first piece has the polygons that are missing to 87,565.
 const PIECE_POLYGONS: [f64; 2] = [1021.0, 1008.0];
 const PIECES: usize = 16;
-/// Share of all polygons in each level.
-const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 /// A polygon takes 13.5 µs (FS93, view A: 0.98 s for 72,570); the cost of a pixel is such that a polygon takes 18.9 µs at 5300 of them.
 const STAGES: Stages = Stages { setup: 20.0, polygon: 12.0, vertex: 3.0, pixel: 0.012 };
 /// Frames of the path.
@@ -34,22 +33,29 @@ fn scene() -> Scene {
     let seats = (0..ROWS * SEATS).map(|i| {
         let (row, seat) = ((i / SEATS) as f64, (i % SEATS) as f64);
         let at = DVec3::new(2.0 + row, (seat - 11.5) * 0.6, 0.45 + 0.15 * row);
-        thing(at, 0.5, 0.6, SEAT_POLYGONS)
+        object(at, 0.5, 0.6, SEAT_POLYGONS)
     });
     let pieces = (0..PIECES).map(|i| {
         let at = DVec3::new(-4.0 - 2.5 * (i / 8) as f64, ((i % 8) as f64 - 3.5) * 1.8, 1.5);
-        thing(at, 0.9, 0.7, PIECE_POLYGONS[usize::from(i > 0)])
+        object(at, 0.9, 0.7, PIECE_POLYGONS[usize::from(i > 0)])
     });
-    Scene { things: seats.chain(pieces).collect(), stages: vec![STAGES] }
+    Scene { objects: seats.chain(pieces).collect(), stages: vec![STAGES] }
 }
 
-fn thing(centre_m: DVec3, radius_m: f64, fill: f64, polygons: f64) -> Thing {
-    let form = |part: f64| Form {
+fn object(centre_m: DVec3, radius_m: f64, fill: f64, polygons: f64) -> SceneObject {
+    let form = |part: f64| ObjectLevel {
         polygons: (part * polygons).round().max(2.0),
         algorithm: 0,
-        worth: Worth::Shaded(Shading::Flat),
+        worth: BenefitModel::Shaded(Shading::Flat),
     };
-    Thing { centre_m, radius_m, fill, importance: 1.0, complexity: polygons, forms: PARTS.map(form).to_vec() }
+    SceneObject {
+        centre_m,
+        radius_m,
+        fill,
+        importance: 1.0,
+        complexity: polygons,
+        forms: LEVEL_PARTS.map(form).to_vec(),
+    }
 }
 
 fn path() -> Path {
@@ -73,7 +79,7 @@ mod tests {
     #[test]
     fn hall_has_the_papers_polygons_and_its_path_the_papers_events() {
         let show = show(Fault::NONE, LAP, 1);
-        let all: f64 = show.scene.things.iter().filter_map(|t| t.forms.last()).map(|f| f.polygons).sum();
+        let all: f64 = show.scene.objects.iter().filter_map(|t| t.forms.last()).map(|f| f.polygons).sum();
         assert_eq!(all, 87_565.0);
         let full = |frame: usize| Scene::full(&show.seen(frame).0) / TARGET;
         // the paper: 9.9 at most in A, few and small in B, little before the turn and much after it

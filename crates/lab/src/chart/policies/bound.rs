@@ -3,8 +3,8 @@
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
-use super::common::{at_least, figure};
-use super::machine::Noise;
+use super::common::{LEVEL_PARTS, at_least, figure};
+use super::machine::RandomSource;
 use super::metrics::mean;
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
@@ -56,7 +56,7 @@ impl Experiment for Bound {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "bound";
-    const TITLE: &'static str = "benefit over the bound of the linear relaxation: no choice can have more";
+    const TITLE: &'static str = "benefit over the bound of the linear relaxation, which no selection can exceed";
 
     fn cases(quick: bool) -> Vec<Case> {
         let instances = if quick { QUICK_INSTANCES } else { INSTANCES };
@@ -98,7 +98,7 @@ impl Experiment for Bound {
         let colours = Colour::LINES.into_iter().chain([Colour::Grey]);
         let layers = POLICIES.iter().zip(colours).map(line).collect();
         let (x, y) = (Axis::log("objects", 8.0, 12_000.0), Axis::log("1 − benefit / bound, mean", 1e-7, 1.0));
-        figure("What a choice can lack at most", vec![Panel { title: String::new(), x, y, layers }], 1)
+        figure("Greatest possible loss of a selection", vec![Panel { title: String::new(), x, y, layers }], 1)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -127,7 +127,7 @@ impl Experiment for Bound {
                 0.99,
             ),
             Finding::at_most(
-                "greedy on the counter-example: half is not kept",
+                "greedy on the counter-example: benefit falls below half of the optimum",
                 of(COUNTER_EXAMPLE, 3, "greedy", |r| r.mean),
                 0.5,
             ),
@@ -137,12 +137,11 @@ impl Experiment for Bound {
 
 /// Objects of five levels, polygons log-normal over two decades, accuracy as of flat shading; the budget is a third of the full cost.
 fn random(objects: usize, seed: usize) -> Problem {
-    const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
-    let mut noise = Noise::new(1 + seed as u64);
+    let mut noise = RandomSource::new(1 + seed as u64);
     let of = |_| {
         let polygons = 300.0 * libm::exp(noise.normal());
         let pixels = 1000.0 * libm::exp(noise.normal());
-        PARTS.map(|part| {
+        LEVEL_PARTS.map(|part| {
             let drawn = (part * polygons).max(2.0);
             Entry::new((2000.0 + 1350.0 * drawn) as u64, (1e4 * pixels * (1.0 - 0.5 / drawn)) as u64)
         })

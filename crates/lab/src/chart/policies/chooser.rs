@@ -7,9 +7,9 @@ mod ours;
 mod sharing;
 mod whole;
 
-pub(super) use whole::{problem, worth};
+pub(super) use whole::{benefit, problem};
 
-use super::scene::{Scene, Seen};
+use super::scene::{Scene, VisibleObject};
 use metachron_lod::cost::overlap::Overlap;
 use metachron_lod::cost::value::Value;
 use metachron_lod::select::Level;
@@ -54,7 +54,7 @@ pub(super) struct Choice {
 /// A policy at work.
 pub(super) trait Chooser {
     /// Chooses for a frame.
-    fn choose(&mut self, frame: u64, scene: &Scene, seen: &[Seen], time: Time) -> Choice;
+    fn choose(&mut self, frame: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice;
 
     /// Takes in the measured time of a frame, microseconds.
     fn learn(&mut self, _frame: u64, _took: f64, _time: Time) {}

@@ -3,9 +3,9 @@
 //! In: a show (scene, path, machine, target) and a policy. Out: the results of every frame. Never here: statistics.
 
 use super::camera::Path;
-use super::chooser::{Choice, Pick, Policy, Time, problem, worth};
+use super::chooser::{Choice, Pick, Policy, Time, benefit, problem};
 use super::machine::{Fault, Machine};
-use super::scene::{Scene, Seen};
+use super::scene::{Scene, VisibleObject};
 use metachron_lod::select::{Level, linear};
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ pub(super) struct Frame {
     /// Benefit over the bound at the true costs.
     pub(super) quality: f64,
     /// Things in view, and those of them that were left out.
-    pub(super) things: usize,
+    pub(super) objects: usize,
     pub(super) holes: usize,
     /// Levels that changed, and those that changed back within three frames.
     pub(super) changes: usize,
@@ -56,7 +56,7 @@ const JUDGED: usize = 10;
 
 impl Show {
     /// The things seen in a frame, and the frame's time.
-    pub(super) fn seen(&self, frame: usize) -> (Vec<Seen>, Time) {
+    pub(super) fn seen(&self, frame: usize) -> (Vec<VisibleObject>, Time) {
         let seen = self.scene.seen(&self.path.camera(frame % self.lap));
         let logic = self.logic * seen.len() as f64;
         (seen, Time { target: self.target, logic, overlap: self.overlap })
@@ -72,7 +72,7 @@ impl Show {
         &self,
         policy: Policy,
         seed: u64,
-        watch: &mut dyn FnMut(usize, &[Seen], &Choice),
+        watch: &mut dyn FnMut(usize, &[VisibleObject], &Choice),
     ) -> Vec<Frame> {
         let (mut chooser, mut machine) = (policy.chooser(), Machine::new(seed, self.fault.clone()));
         let (mut frames, mut memory): (Vec<Frame>, _) = (Vec::with_capacity(self.frames), Memory::default());
@@ -96,9 +96,9 @@ impl Show {
         frames
     }
 
-    fn draw(&self, seen: &[Seen], time: Time, choice: &Choice, slower: f64) -> Frame {
-        let form = |s: &Seen, level: u32| self.scene.things[s.thing].forms[level as usize];
-        let sum = |of: &dyn Fn(&Seen, u32, f64) -> f64| {
+    fn draw(&self, seen: &[VisibleObject], time: Time, choice: &Choice, slower: f64) -> Frame {
+        let form = |s: &VisibleObject, level: u32| self.scene.objects[s.object].forms[level as usize];
+        let sum = |of: &dyn Fn(&VisibleObject, u32, f64) -> f64| {
             let drawn = seen.iter().zip(&choice.picks).filter_map(|(s, p)| Some(of(s, p.level?, p.part)));
             drawn.sum::<f64>()
         };
@@ -109,7 +109,7 @@ impl Show {
             predicted: choice.predicted / self.target,
             gap: choice.gap,
             quality: f64::NAN,
-            things: seen.len(),
+            objects: seen.len(),
             holes: choice.picks.iter().filter(|p| p.level.is_none()).count(),
             changes: 0,
             reversals: 0,
@@ -119,9 +119,9 @@ impl Show {
     }
 
     /// Benefit over the bound within a budget, microseconds by the table; NaN where even the cheapest levels of everything exceed it.
-    fn quality(&self, seen: &[Seen], budget: f64, choice: &Choice) -> f64 {
+    fn quality(&self, seen: &[VisibleObject], budget: f64, choice: &Choice) -> f64 {
         let bound = linear(&problem(&self.scene, seen, budget));
-        bound.map_or(f64::NAN, |bound| worth(&self.scene, seen, &choice.picks) / bound.value)
+        bound.map_or(f64::NAN, |bound| benefit(&self.scene, seen, &choice.picks) / bound.value)
     }
 }
 
@@ -134,17 +134,17 @@ struct Memory {
 impl Memory {
     /// Levels that changed since the previous frame, and the number of these that return to their level of up to three frames
     /// before that.
-    fn count(&mut self, seen: &[Seen], picks: &[Pick]) -> (usize, usize) {
+    fn count(&mut self, seen: &[VisibleObject], picks: &[Pick]) -> (usize, usize) {
         let (mut changes, mut reversals) = (0, 0);
         for (s, pick) in seen.iter().zip(picks) {
-            let was = |back: usize| self.past[back].get(&s.thing);
+            let was = |back: usize| self.past[back].get(&s.object);
             let changed = was(0).is_some_and(|before| *before != pick.level);
             let back = (1..4).any(|b| was(b) == Some(&pick.level) && (0..b).all(|between| was(between).is_some()));
             changes += usize::from(changed);
             reversals += usize::from(changed && back);
         }
         self.past.rotate_right(1);
-        self.past[0] = seen.iter().zip(picks).map(|(s, p)| (s.thing, p.level)).collect();
+        self.past[0] = seen.iter().zip(picks).map(|(s, p)| (s.object, p.level)).collect();
         (changes, reversals)
     }
 }

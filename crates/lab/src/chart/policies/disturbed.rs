@@ -34,7 +34,7 @@ impl Experiment for Disturbed {
     type Row = Row;
     const NAME: &'static str = "disturbed";
     const TITLE: &'static str =
-        "a table 25 % too low, 40 % more load in frames 300 to 700, 1 % of frames half as long again";
+        "cost table 25 % too low, 40 % more load in frames 300 to 700, stalls of 50 % in 1 % of frames";
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
@@ -61,7 +61,7 @@ impl Experiment for Disturbed {
 
     fn figure(_: &[Row]) -> Figure {
         let panels = POLICIES.map(|policy| curves(policy.name(), &disturbed(), &[policy], 2.5));
-        figure("A table too low, a step of load, stalls", panels.to_vec(), 3)
+        figure("Cost table too low, load step, stalls", panels.to_vec(), 3)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -76,7 +76,7 @@ impl Experiment for Disturbed {
         vec![
             Finding::at_most("adaptive: frames past 1.05 T", of("adaptive", |r| r.misses), 0.05),
             Finding::at_most("adaptive: frames until settled after a step", of("adaptive", |r| r.settled), 15.0),
-            at_least("greedy, which does not learn: frames past 1.05 T", of("greedy", |r| r.misses), 0.9),
+            at_least("greedy (no learning): frames past 1.05 T", of("greedy", |r| r.misses), 0.9),
         ]
     }
 }

@@ -30,7 +30,7 @@ const BENEFIT: f64 = 100.0;
 
 /// The selection algorithm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Who {
+enum Algorithm {
     /// (FS93) with a null impostor for each strut, no groups.
     Flat,
     /// (MB97, §4) from the last frame's cut.
@@ -41,11 +41,11 @@ enum Who {
     Hull,
 }
 
-const POLICIES: [(&str, Who); 4] = [
-    ("greedy with null", Who::Flat),
-    ("hierarchical", Who::Hierarchical),
-    ("hierarchical-flat", Who::HierarchicalFlat),
-    ("hull of cuts", Who::Hull),
+const POLICIES: [(&str, Algorithm); 4] = [
+    ("greedy with null", Algorithm::Flat),
+    ("hierarchical", Algorithm::Hierarchical),
+    ("hierarchical-flat", Algorithm::HierarchicalFlat),
+    ("hull of cuts", Algorithm::Hull),
 ];
 
 /// A limit and a policy.
@@ -78,7 +78,7 @@ impl Experiment for Domes {
     type Row = Row;
     const NAME: &'static str = "domes";
     const TITLE: &'static str =
-        "eight domes of 120 struts at half of the nominal cost, at it and at twice: groups or holes";
+        "eight domes of 120 struts at half, one and two times the nominal cost: groups or holes";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = if quick { QUICK_FRAMES } else { FRAMES };
@@ -87,16 +87,21 @@ impl Experiment for Domes {
     }
 
     fn measure(case: &Case) -> Row {
-        let who = POLICIES.iter().find(|p| p.0 == case.policy).map_or(Who::Flat, |p| p.1);
-        let (mut last, mut shown): (Vec<Level>, Vec<Shown>) = (Vec::new(), Vec::new());
+        let algorithm = POLICIES.iter().find(|p| p.0 == case.policy).map_or(Algorithm::Flat, |p| p.1);
+        let (mut last, mut shown): (Vec<Level>, Vec<StrutForm>) = (Vec::new(), Vec::new());
         let mut sums: [Vec<f64>; 5] = Default::default();
         for frame in 0..case.frames {
             let pixels = geodesic::pixels(frame);
-            let (now, spent) = choose(who, case.limit, &pixels, &mut last);
+            let (now, spent) = choose(algorithm, case.limit, &pixels, &mut last);
             let changed = now.iter().zip(&shown).filter(|(a, b)| a != b).count() as f64 / now.len() as f64;
-            let count = |what: Shown| now.iter().filter(|s| **s == what).count() as f64 / now.len() as f64;
-            let of_frame =
-                [count(Shown::Hole), error(&now, &pixels), changed, spent / case.limit as f64, count(Shown::Ball)];
+            let count = |what: StrutForm| now.iter().filter(|s| **s == what).count() as f64 / now.len() as f64;
+            let of_frame = [
+                count(StrutForm::Hole),
+                error(&now, &pixels),
+                changed,
+                spent / case.limit as f64,
+                count(StrutForm::Ball),
+            ];
             sums.iter_mut().zip(of_frame).for_each(|(sum, x)| sum.push(x));
             shown = now;
         }
@@ -111,7 +116,7 @@ impl Experiment for Domes {
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |title: &str, label, of: fn(&Row) -> f64| {
-            let line = |((name, _), colour): (&(&str, Who), Colour)| {
+            let line = |((name, _), colour): (&(&str, Algorithm), Colour)| {
                 let here = rows.iter().filter(|r| r.policy == *name);
                 let points = here.map(|r| (r.limit as f64, of(r))).collect();
                 Layer { label: (*name).to_owned(), colour, mark: Mark::Line(points) }
@@ -121,7 +126,7 @@ impl Experiment for Domes {
             Panel { title: title.to_owned(), x, y: Axis::linear(label, 0.0, 1.0), layers }
         };
         let panels = vec![
-            panel("holes", "part of struts that are not drawn", |r| r.holes),
+            panel("holes", "fraction of struts not drawn", |r| r.holes),
             panel("image error", "wrong pixels / pixels of struts", |r| r.error),
         ];
         figure("Domes of struts (MB97, fig. 7)", panels, 2)
@@ -164,7 +169,7 @@ impl Experiment for Domes {
 
 /// The form in which a strut is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shown {
+enum StrutForm {
     Hole,
     Ball,
     /// A prism, of this level.
@@ -172,27 +177,27 @@ enum Shown {
 }
 
 /// Chooses the form of every strut; returns the forms and their cost. `last` is the cut of the previous frame.
-fn choose(who: Who, limit: i64, pixels: &[f64], last: &mut Vec<Level>) -> (Vec<Shown>, f64) {
-    if who == Who::Flat {
+fn choose(algorithm: Algorithm, limit: i64, pixels: &[f64], last: &mut Vec<Level>) -> (Vec<StrutForm>, f64) {
+    if algorithm == Algorithm::Flat {
         let mut problem = Problem::new(Mode::AtMostOne, limit);
         for (id, px) in (0..).zip(pixels) {
             problem.push(id, &pictures(*px));
         }
         let selection = funkhouser::greedy(&problem, funkhouser::Scan::Skip);
-        let shown = selection.levels.iter().map(|l| l.map_or(Shown::Hole, Shown::Prism)).collect();
+        let shown = selection.levels.iter().map(|l| l.map_or(StrutForm::Hole, StrutForm::Prism)).collect();
         return (shown, selection.cost as f64);
     }
     let Ok(tree) = Tree::new(limit, &nodes(pixels)) else { return (Vec::new(), f64::NAN) };
-    let cut = match who {
-        Who::Hull => tree_exact::lagrange(&tree),
-        Who::HierarchicalFlat => mason_flat::flat(&tree),
-        Who::Hierarchical | Who::Flat => mason::incremental(&tree, last, Keep::Last).cut,
+    let cut = match algorithm {
+        Algorithm::Hull => tree_exact::lagrange(&tree),
+        Algorithm::HierarchicalFlat => mason_flat::flat(&tree),
+        Algorithm::Hierarchical | Algorithm::Flat => mason::incremental(&tree, last, Keep::Last).cut,
     };
     let shown = (0..DOMES * STRUTS)
         .map(|strut| match (cut.levels[1 + strut / STRUTS], cut.levels[1 + DOMES + strut]) {
-            (Some(_), _) => Shown::Ball,
-            (None, Some(level)) => Shown::Prism(level),
-            (None, None) => Shown::Hole,
+            (Some(_), _) => StrutForm::Ball,
+            (None, Some(level)) => StrutForm::Prism(level),
+            (None, None) => StrutForm::Hole,
         })
         .collect();
     last.clone_from(&cut.levels);
@@ -219,11 +224,11 @@ fn pictures(pixels: f64) -> [Entry; 6] {
 
 /// Wrong pixels, as a share of those that struts cover: for a prism the part that it lacks of the circle, for a ball the part that it
 /// fills between the struts, for a hole all of them.
-fn error(shown: &[Shown], pixels: &[f64]) -> f64 {
-    let wrong = |(shown, px): (&Shown, &f64)| match shown {
-        Shown::Hole => *px,
-        Shown::Ball => px * geodesic::ball_error(),
-        Shown::Prism(level) => px * geodesic::prism_error(SIDES[*level as usize] as f64),
+fn error(shown: &[StrutForm], pixels: &[f64]) -> f64 {
+    let wrong = |(shown, px): (&StrutForm, &f64)| match shown {
+        StrutForm::Hole => *px,
+        StrutForm::Ball => px * geodesic::ball_error(),
+        StrutForm::Prism(level) => px * geodesic::prism_error(SIDES[*level as usize] as f64),
     };
     shown.iter().zip(pixels).map(wrong).sum::<f64>() / pixels.iter().sum::<f64>()
 }

@@ -5,8 +5,8 @@
 
 use super::camera::{Path, key};
 use super::closed_loop::Show;
-use super::machine::{Fault, Noise};
-use super::scene::{Form, Scene, Thing, Worth};
+use super::machine::{Fault, RandomSource};
+use super::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -42,7 +42,7 @@ pub(super) enum Forms {
 
 /// The two paths through the grove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum CameraPath {
     /// Along one side: most trees are in view in the middle.
     Linear,
     /// Back and forth with two sudden turns.
@@ -50,19 +50,19 @@ pub(super) enum Way {
 }
 
 /// A walk of `frames` frames through a grove, `target` microseconds per frame.
-pub(super) fn show(trees: usize, way: Way, target: f64, forms: Forms, frames: usize) -> Show {
+pub(super) fn show(trees: usize, path: CameraPath, target: f64, forms: Forms, frames: usize) -> Show {
     let side_m = SIDE_M * (trees as f64 / TREES).sqrt();
-    let scene = Scene { things: things(trees, side_m, forms), stages: STAGES.to_vec() };
-    let path = path(way, side_m, frames);
+    let scene = Scene { objects: objects(trees, side_m, forms), stages: STAGES.to_vec() };
+    let path = keyed_path(path, side_m, frames);
     Show { scene, path, fault: Fault::NONE, target, frames, lap: frames, delay: 1, logic: LOGIC, overlap: OVERLAP }
 }
 
-fn things(trees: usize, side_m: f64, forms: Forms) -> Vec<Thing> {
-    let mut noise = Noise::new(trees as u64);
+fn objects(trees: usize, side_m: f64, forms: Forms) -> Vec<SceneObject> {
+    let mut noise = RandomSource::new(trees as u64);
     let tree = |i: usize| {
         let at = DVec3::new(noise.uniform() * side_m, noise.uniform() * side_m, 4.0);
         let [trunk, leaves] = TRIANGLES[i % 3];
-        let part = |triangles, fill, importance, simpler| Thing {
+        let part = |triangles, fill, importance, simpler| SceneObject {
             centre_m: at,
             radius_m: 4.0,
             fill,
@@ -76,14 +76,15 @@ fn things(trees: usize, side_m: f64, forms: Forms) -> Vec<Thing> {
 }
 
 /// The forms of a thing of so many triangles, coarsest first; `simpler` is the algorithm that draws lines or points.
-fn list(forms: Forms, triangles: f64, simpler: usize) -> Vec<Form> {
-    let whole = Form { polygons: triangles, algorithm: 0, worth: Worth::Part(1.0) };
+fn list(forms: Forms, triangles: f64, simpler: usize) -> Vec<ObjectLevel> {
+    let whole = ObjectLevel { polygons: triangles, algorithm: 0, worth: BenefitModel::Part(1.0) };
     let prefix = |k: i32| {
         let part = libm::exp2(-0.5 * f64::from(k));
-        Form { polygons: part * triangles, algorithm: 0, worth: Worth::Part(part.sqrt()) }
+        ObjectLevel { polygons: part * triangles, algorithm: 0, worth: BenefitModel::Part(part.sqrt()) }
     };
     // as many as cover the same pixels at their width; the benefit falls with the width
-    let wide = |w: f64| Form { polygons: triangles / w, algorithm: simpler, worth: Worth::Part(0.9 / w.sqrt()) };
+    let wide =
+        |w: f64| ObjectLevel { polygons: triangles / w, algorithm: simpler, worth: BenefitModel::Part(0.9 / w.sqrt()) };
     match forms {
         Forms::Whole => vec![whole],
         Forms::Prefixes => (0..=16).rev().map(prefix).collect(),
@@ -91,13 +92,13 @@ fn list(forms: Forms, triangles: f64, simpler: usize) -> Vec<Form> {
     }
 }
 
-fn path(way: Way, side_m: f64, frames: usize) -> Path {
+fn keyed_path(path: CameraPath, side_m: f64, frames: usize) -> Path {
     let at = |part: f64| (part * frames as f64) as usize;
     let place = |x: f64, y: f64| [x * side_m, y * side_m, 6.0];
-    let keys = match way {
-        Way::Linear => vec![key(0, place(-0.1, -0.1), 90.0, -3.0), key(frames, place(1.1, -0.1), 90.0, -3.0)],
+    let keys = match path {
+        CameraPath::Linear => vec![key(0, place(-0.1, -0.1), 90.0, -3.0), key(frames, place(1.1, -0.1), 90.0, -3.0)],
         // frames 560 and 1120 of 1680
-        Way::Zigzag => vec![
+        CameraPath::Zigzag => vec![
             key(0, place(0.1, 0.1), 60.0, -3.0),
             key(at(1.0 / 3.0), place(0.35, 0.6), 60.0, -3.0),
             key(at(1.0 / 3.0) + 1, place(0.35, 0.6), -70.0, -3.0),

@@ -32,9 +32,9 @@ pub(super) fn pixels(frame: usize) -> Vec<f64> {
 /// Projected length times projected width.
 fn strut(camera: &Camera, a: DVec3, b: DVec3) -> f64 {
     let middle = 0.5 * (a + b) - camera.eye();
-    let sight = middle.normalize();
+    let neighbour_of = middle.normalize();
     let scale = camera.pixels_per_metre(middle.dot(camera.forward()), SCREEN);
-    let across = (b - a) - sight * (b - a).dot(sight);
+    let across = (b - a) - neighbour_of * (b - a).dot(neighbour_of);
     across.length() * 2.0 * STRUT * scale * scale
 }
 

@@ -7,7 +7,7 @@ use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::common::{Case, at_least, curves, figure, number, table};
 use super::forest;
-use super::forest::{Forms, Way};
+use super::forest::{CameraPath, Forms};
 use super::metrics::Row;
 use metachron_lod::cost::value::Value;
 
@@ -18,31 +18,36 @@ pub(in super::super) struct Grove;
 struct Setting {
     name: &'static str,
     trees: usize,
-    way: Way,
+    path: CameraPath,
     target: f64,
     levels: bool,
     paper: f64,
     limit: f64,
 }
 
-const fn plain(name: &'static str, way: Way, target: f64, paper: f64) -> Setting {
-    Setting { name, trees: 600, way, target, levels: false, paper, limit: 0.03 }
+const fn plain(name: &'static str, path: CameraPath, target: f64, paper: f64) -> Setting {
+    Setting { name, trees: 600, path, target, levels: false, paper, limit: 0.03 }
 }
 
 const SETTINGS: [Setting; 13] = [
-    plain("linear, 12.5 ms", Way::Linear, 12.5e3, 0.0651),
-    plain("linear, 25 ms", Way::Linear, 25e3, 0.0738),
-    plain("linear, 50 ms", Way::Linear, 50e3, 0.0551),
-    plain("linear, 100 ms", Way::Linear, 100e3, 0.0296),
-    plain("linear, 200 ms", Way::Linear, 200e3, 0.0094),
-    plain("zigzag, 12.5 ms", Way::Zigzag, 12.5e3, 0.0735),
-    plain("zigzag, 25 ms", Way::Zigzag, 25e3, 0.0674),
-    plain("zigzag, 50 ms", Way::Zigzag, 50e3, 0.0485),
-    plain("zigzag, 100 ms", Way::Zigzag, 100e3, 0.0243),
-    plain("zigzag, 200 ms", Way::Zigzag, 200e3, 0.0109),
-    Setting { name: "linear with levels, 40 ms", levels: true, limit: 0.04, ..plain("", Way::Linear, 40e3, 0.0887) },
-    Setting { name: "linear, 1000 trees, 50 ms", trees: 1000, ..plain("", Way::Linear, 50e3, f64::NAN) },
-    Setting { name: "linear, 2000 trees, 50 ms", trees: 2000, ..plain("", Way::Linear, 50e3, f64::NAN) },
+    plain("linear, 12.5 ms", CameraPath::Linear, 12.5e3, 0.0651),
+    plain("linear, 25 ms", CameraPath::Linear, 25e3, 0.0738),
+    plain("linear, 50 ms", CameraPath::Linear, 50e3, 0.0551),
+    plain("linear, 100 ms", CameraPath::Linear, 100e3, 0.0296),
+    plain("linear, 200 ms", CameraPath::Linear, 200e3, 0.0094),
+    plain("zigzag, 12.5 ms", CameraPath::Zigzag, 12.5e3, 0.0735),
+    plain("zigzag, 25 ms", CameraPath::Zigzag, 25e3, 0.0674),
+    plain("zigzag, 50 ms", CameraPath::Zigzag, 50e3, 0.0485),
+    plain("zigzag, 100 ms", CameraPath::Zigzag, 100e3, 0.0243),
+    plain("zigzag, 200 ms", CameraPath::Zigzag, 200e3, 0.0109),
+    Setting {
+        name: "linear with levels, 40 ms",
+        levels: true,
+        limit: 0.04,
+        ..plain("", CameraPath::Linear, 40e3, 0.0887)
+    },
+    Setting { name: "linear, 1000 trees, 50 ms", trees: 1000, ..plain("", CameraPath::Linear, 50e3, f64::NAN) },
+    Setting { name: "linear, 2000 trees, 50 ms", trees: 2000, ..plain("", CameraPath::Linear, 50e3, f64::NAN) },
 ];
 const QUICK: [&str; 3] = ["linear, 12.5 ms", "zigzag, 100 ms", "linear with levels, 40 ms"];
 /// Frames of the two paths; the quick run takes the same paths in steps four times as long.
@@ -63,7 +68,7 @@ impl Setting {
     }
 
     fn frames(&self, quick: bool) -> usize {
-        FRAMES[usize::from(self.way == Way::Zigzag)] / if quick { QUICK_PART } else { 1 }
+        FRAMES[usize::from(self.path == CameraPath::Zigzag)] / if quick { QUICK_PART } else { 1 }
     }
 
     fn show(&self, policy: Policy, frames: usize) -> Show {
@@ -72,7 +77,7 @@ impl Setting {
             (false, Policy::RobinHood(_)) => Forms::Whole,
             (false, _) => Forms::Prefixes,
         };
-        forest::show(self.trees, self.way, self.target, forms, frames)
+        forest::show(self.trees, self.path, self.target, forms, frames)
     }
 }
 
@@ -80,7 +85,7 @@ impl Experiment for Grove {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "grove";
-    const TITLE: &'static str = "600 trees and more, five targets, two paths, with levels and without";
+    const TITLE: &'static str = "600 to 2000 trees, five targets, two paths, with levels and without";
 
     fn cases(quick: bool) -> Vec<Case> {
         let asked = |s: &&Setting| !quick || QUICK.contains(&s.name);
@@ -115,7 +120,7 @@ impl Experiment for Grove {
             primitives(&levels.show(hood, frames), hood),
             primitives(&levels.show(ours, frames), ours),
         ];
-        figure("Walks through the grove (RH05, fig. 3, 6 and 7)", panels, 2)
+        figure("Fly-throughs of the grove (RH05, fig. 3, 6 and 7)", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -151,7 +156,7 @@ fn primitives(show: &Show, policy: Policy) -> Panel {
     show.watch(policy, 1, &mut |frame, seen, choice| {
         let mut sums = [0.0; 3];
         for (s, pick) in seen.iter().zip(&choice.picks) {
-            if let Some(form) = pick.level.and_then(|l| show.scene.things[s.thing].forms.get(l as usize)) {
+            if let Some(form) = pick.level.and_then(|l| show.scene.objects[s.object].forms.get(l as usize)) {
                 sums[form.algorithm] += pick.part * form.polygons;
             }
         }
@@ -162,6 +167,6 @@ fn primitives(show: &Show, policy: Policy) -> Panel {
     let layers = named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) });
     let x = Axis::linear("frame", 0.0, show.frames as f64);
     let (title, y) =
-        (format!("primitives, {}", policy.name()), Axis::linear("primitives in a frame", low.max(0.0), high));
+        (format!("primitives, {}", policy.name()), Axis::linear("primitives per frame", low.max(0.0), high));
     Panel { title, x, y, layers: layers.collect() }
 }

@@ -61,19 +61,19 @@ fn text(levels: &str) -> String {
     text
 }
 
-fn setting((name, _): (&str, &str), times_over: f64) -> String {
+fn setting(name: &str, times_over: f64) -> String {
     format!("levels {name}, full detail / {times_over:.0}")
 }
 
 fn settings() -> impl Iterator<Item = (String, &'static str, f64)> {
-    TIMES_OVER.into_iter().flat_map(|over| LEVELS.map(|levels| (setting(levels, over), levels.1, over)))
+    TIMES_OVER.into_iter().flat_map(|over| LEVELS.map(|levels| (setting(levels.0, over), levels.1, over)))
 }
 
 impl Experiment for Levels {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "levels";
-    const TITLE: &'static str = "woods that may be drawn as one each: what levels of groups gain";
+    const TITLE: &'static str = "impostors for whole woods: benefit of levels of groups";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES[usize::from(quick)];
@@ -95,7 +95,7 @@ impl Experiment for Levels {
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |over: f64| {
-            let here = LEVELS.map(|levels| setting(levels, over));
+            let here = LEVELS.map(|(name, _)| setting(name, over));
             curves(
                 &format!("full detail / {over:.0}"),
                 rows.iter().filter(|row| row.policy == "adaptive" && here.contains(&row.setting)),
@@ -110,7 +110,7 @@ impl Experiment for Levels {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |levels: usize, over: f64, what: fn(&Row) -> f64| {
-            number(rows, &setting(LEVELS[levels], over), "adaptive", what)
+            number(rows, &setting(LEVELS[levels].0, over), "adaptive", what)
         };
         let claims = TIMES_OVER.into_iter().flat_map(|over| {
             let claim = |words: &str| format!("adaptive, four levels, full detail / {over:.0}: {words}");
@@ -118,7 +118,7 @@ impl Experiment for Levels {
             [
                 Finding::at_most(claim("frames past 1.05 T"), of(3, over, |row| row.misses), 0.01),
                 Finding::at_most(claim("objects left out"), of(3, over, |row| row.holes), 0.0),
-                at_least(claim("SSIM less that of the better one level"), of(3, over, |row| row.ssim) - single, -0.01),
+                at_least(claim("SSIM minus the better single level's"), of(3, over, |row| row.ssim) - single, -0.01),
             ]
         });
         claims.collect()

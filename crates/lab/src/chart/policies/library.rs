@@ -7,9 +7,9 @@ use super::camera::{Path, key};
 use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::common::{Case, at_least, curves, figure};
-use super::machine::{Fault, Noise};
+use super::machine::{Fault, RandomSource};
 use super::metrics::Row;
-use super::scene::{Form, Scene, Thing, Worth};
+use super::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -44,33 +44,33 @@ fn show(target: f64) -> Show {
         keys: vec![key(0, [-7.0, -0.5, 1.7], 0.0, -4.0), key(FRAMES, [-6.5, 0.5, 1.7], 4.0, -4.0)],
         fov_y_deg: 60.0,
     };
-    let scene = Scene { things: things(), stages: STAGES.to_vec() };
+    let scene = Scene { objects: objects(), stages: STAGES.to_vec() };
     Show { scene, path, fault: Fault::NONE, target, frames: FRAMES, lap: FRAMES, delay: 1, logic: 0.0, overlap: 1.0 }
 }
 
-fn things() -> Vec<Thing> {
-    let mut noise = Noise::new(11);
-    let mut things = Vec::new();
+fn objects() -> Vec<SceneObject> {
+    let mut noise = RandomSource::new(11);
+    let mut objects = Vec::new();
     for (count, polygons, radius_m, textured) in FURNITURE {
         for _ in 0..count {
             let centre_m =
                 DVec3::new(noise.uniform() * 10.0 - 2.0, noise.uniform() * 6.0 - 3.0, 0.4 + 1.6 * noise.uniform());
             let forms = forms(polygons, textured);
-            things.push(Thing { centre_m, radius_m, fill: 0.6, importance: 1.0, complexity: polygons, forms });
+            objects.push(SceneObject { centre_m, radius_m, fill: 0.6, importance: 1.0, complexity: polygons, forms });
         }
     }
-    things
+    objects
 }
 
 /// Every level with every shading; for an untextured thing Gouraud shading is as accurate as texture is for a textured one.
-fn forms(polygons: f64, textured: bool) -> Vec<Form> {
+fn forms(polygons: f64, textured: bool) -> Vec<ObjectLevel> {
     let mut forms = Vec::new();
     for (algorithm, shows) in SHOWS.into_iter().enumerate().take(if textured { 3 } else { 2 }) {
         let shows = if textured { shows } else { shows / SHOWS[1] };
         forms.extend(PARTS.map(|part| {
             let polygons = (part * polygons).round().max(2.0);
             // base error of one half, reduced by the samples, as for flat polygons (FS93, §5)
-            Form { polygons, algorithm, worth: Worth::Part(shows * (1.0 - 0.5 / polygons.sqrt())) }
+            ObjectLevel { polygons, algorithm, worth: BenefitModel::Part(shows * (1.0 - 0.5 / polygons.sqrt())) }
         }));
     }
     forms
@@ -80,8 +80,7 @@ impl Experiment for Library {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "library";
-    const TITLE: &'static str =
-        "a textured room of some 20,000 polygons: levels and the way of drawing are chosen together";
+    const TITLE: &'static str = "textured room of about 20,000 polygons: levels and shading chosen together";
 
     fn cases(_: bool) -> Vec<Case> {
         TARGETS.iter().flat_map(|t| POLICIES.map(|policy| Case::new(t.0, policy, 1, FRAMES))).collect()
@@ -99,7 +98,7 @@ impl Experiment for Library {
     fn figure(_: &[Row]) -> Figure {
         let mut panels: Vec<Panel> = TARGETS.iter().map(|t| shares(t.0, &show(t.1))).collect();
         panels.extend(TARGETS.iter().map(|t| curves(t.0, &show(t.1), &[Policy::Greedy, Policy::Adaptive], 1.5)));
-        figure("The library: what is drawn in which way (FS93, fig. 11)", panels, 2)
+        figure("The library: shading of the drawn objects (FS93, fig. 11)", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -144,7 +143,7 @@ fn shares(title: &str, show: &Show) -> Panel {
         let ways = seen
             .iter()
             .zip(&choice.picks)
-            .filter_map(|(s, p)| show.scene.things[s.thing].forms.get(p.level? as usize).map(|form| form.algorithm));
+            .filter_map(|(s, p)| show.scene.objects[s.object].forms.get(p.level? as usize).map(|form| form.algorithm));
         let mut sums = [0.0; 3];
         ways.for_each(|way| sums[way] += 1.0);
         counts.iter_mut().zip(sums).for_each(|(line, sum)| line.push((frame as f64, sum)));
@@ -152,7 +151,7 @@ fn shares(title: &str, show: &Show) -> Panel {
     let named = ["flat", "Gouraud", "textured"].into_iter().zip(Colour::LINES).zip(counts);
     let layers =
         named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) }).collect();
-    let (x, y) = (Axis::linear("frame", 0.0, FRAMES as f64), Axis::linear("things drawn so", 0.0, 170.0));
+    let (x, y) = (Axis::linear("frame", 0.0, FRAMES as f64), Axis::linear("objects drawn", 0.0, 170.0));
     Panel { title: format!("{title}, adaptive"), x, y, layers }
 }
 
@@ -162,8 +161,8 @@ mod tests {
 
     #[test]
     fn room_has_about_the_papers_polygons_and_takes_four_and_six_targets() {
-        let things = things();
-        let all: f64 = things.iter().map(|t| t.complexity).sum();
+        let objects = objects();
+        let all: f64 = objects.iter().map(|t| t.complexity).sum();
         assert!((all / 19_821.0 - 1.0).abs() < 0.01, "{all}");
         let seen = show(1e5).seen(0).0;
         let full = 1e-6 * Scene::full(&seen);

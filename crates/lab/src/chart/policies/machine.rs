@@ -7,9 +7,9 @@ use std::ops::Range;
 
 /// Uniform and normal numbers from a seed: xorshift, and the sum of twelve uniforms.
 #[derive(Debug, Clone)]
-pub(super) struct Noise(u64);
+pub(super) struct RandomSource(u64);
 
-impl Noise {
+impl RandomSource {
     pub(super) fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
@@ -51,7 +51,7 @@ impl Fault {
 /// The state of a machine during a run.
 #[derive(Debug, Clone)]
 pub(super) struct Machine {
-    noise: Noise,
+    noise: RandomSource,
     wander: f64,
     fault: Fault,
 }
@@ -63,7 +63,7 @@ const SPIKE: f64 = 1.5;
 
 impl Machine {
     pub(super) fn new(seed: u64, fault: Fault) -> Self {
-        Self { noise: Noise::new(seed), wander: 0.0, fault }
+        Self { noise: RandomSource::new(seed), wander: 0.0, fault }
     }
 
     /// Time of the next frame over that of the table.
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn table_errs_by_five_parts_in_a_hundred_that_stay_for_ten_frames() {
+    fn the_cost_table_errs_by_five_percent_correlated_over_ten_frames() {
         let mut machine = Machine::new(7, Fault::NONE);
         let errors: Vec<f64> = (0..20_000).map(|frame| machine.slower(frame) - 1.0).collect();
         let product =

@@ -4,12 +4,9 @@
 
 use super::super::experiment::worst;
 use super::closed_loop::Frame;
+use metachron_session::report::{BINDING, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN};
 use serde::{Deserialize, Serialize};
 
-/// A frame is binding where full detail would take more than this part of T.
-const BINDING: f64 = 1.15;
-/// A frame that takes more than this part of T is a miss.
-const MISS: f64 = 1.05;
 /// A choice whose certificate is within this of the best counts as proven best.
 const CERTIFIED: f64 = 0.01;
 
@@ -80,8 +77,8 @@ impl Row {
         let times = |keep: fn(&&Frame) -> bool| frames.iter().filter(keep).map(|f| f.time).collect::<Vec<_>>();
         let (all, binding) = (times(|_| true), times(|f| f.full > BINDING));
         let part = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { f64::NAN };
-        let things = frames.iter().map(|f| f.things).sum();
-        let each = |of: fn(&Frame) -> usize| part(frames.iter().map(of).sum(), things);
+        let objects = frames.iter().map(|f| f.objects).sum();
+        let each = |of: fn(&Frame) -> usize| part(frames.iter().map(of).sum(), objects);
         let known = |of: fn(&Frame) -> f64| frames.iter().map(of).filter(|x| x.is_finite()).collect::<Vec<_>>();
         let gaps = known(|f| f.gap);
         let errors = known(|f| (f.predicted - f.time).abs() / f.time);
@@ -159,22 +156,16 @@ pub(super) fn stddev(x: &[f64]) -> f64 {
     (x.iter().map(|x| (x - middle) * (x - middle)).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-/// Greatest relative deviation of the median of nine frames from the mean of the later ones, and the number of frames for which
-/// it must hold.
-const NEAR: f64 = 0.06;
-const STAYS: usize = 20;
-const MEDIAN_OF: usize = 9;
-
 /// Frames after `step` until the median of nine stays within 6 % of the mean of `later` for twenty frames; NaN where it never does.
 pub(super) fn settled(times: &[f64], step: usize, later: std::ops::Range<usize>) -> f64 {
     let goal = mean(&times[later.clone()]);
     let median = |at: usize| {
-        let mut near = times[at - MEDIAN_OF / 2..=at + MEDIAN_OF / 2].to_vec();
+        let mut near = times[at - SETTLE_MEDIAN / 2..=at + SETTLE_MEDIAN / 2].to_vec();
         near.sort_by(f64::total_cmp);
-        near[MEDIAN_OF / 2]
+        near[SETTLE_MEDIAN / 2]
     };
-    let calm = |k: &usize| (0..STAYS).all(|j| (median(step + k + j) / goal - 1.0).abs() <= NEAR);
-    (0..later.end - step - STAYS - MEDIAN_OF).find(calm).map_or(f64::NAN, |k| k as f64)
+    let calm = |k: &usize| (0..SETTLE_HOLD).all(|j| (median(step + k + j) / goal - 1.0).abs() <= SETTLE_BAND);
+    (0..later.end - step - SETTLE_HOLD - SETTLE_MEDIAN).find(calm).map_or(f64::NAN, |k| k as f64)
 }
 
 #[cfg(test)]
@@ -183,14 +174,14 @@ mod tests {
 
     fn frame(time: f64, full: f64) -> Frame {
         let none = f64::NAN;
-        let (things, polygons) = (4, 10.0);
+        let (objects, polygons) = (4, 10.0);
         Frame {
             time,
             full,
             predicted: 1.1 * time,
             gap: none,
             quality: none,
-            things,
+            objects,
             holes: 1,
             changes: 2,
             reversals: 0,
@@ -200,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn only_binding_frames_tell_how_near_a_policy_keeps_to_its_time() {
+    fn only_binding_frames_enter_the_error() {
         let row = Row::of("", "", &[vec![frame(0.9, 2.0), frame(1.1, 3.0), frame(0.2, 0.2), frame(1.0, 1.1)]]);
         assert!((row.binding - 0.5).abs() < 1e-15 && (row.avg_err - 0.1).abs() < 1e-12);
         assert!((row.binding_stddev - 0.1).abs() < 1e-12 && (row.mean - 0.8).abs() < 1e-12);

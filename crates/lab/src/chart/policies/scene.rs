@@ -13,7 +13,7 @@ pub(super) const SCREEN: Size = Size { width: 1280, height: 1024 };
 
 /// The accuracy of a level, as a part of the best.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Worth {
+pub(super) enum BenefitModel {
     /// From the samples of its shading (FS93, §5).
     Shaded(Shading),
     /// This part, 0 … 1, at any distance.
@@ -22,17 +22,17 @@ pub(super) enum Worth {
 
 /// One level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Form {
+pub(super) struct ObjectLevel {
     /// Polygons, lines or points.
     pub(super) polygons: f64,
     /// Index of the scene's rendering algorithm that draws it.
     pub(super) algorithm: usize,
-    pub(super) worth: Worth,
+    pub(super) worth: BenefitModel,
 }
 
 /// A thing that can be drawn at several levels.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Thing {
+pub(super) struct SceneObject {
     pub(super) centre_m: DVec3,
     pub(super) radius_m: f64,
     /// Share of the disc around it that it covers, 0 … 1.
@@ -42,22 +42,22 @@ pub(super) struct Thing {
     /// Time of its best form at one fixed area, for the order of (RH05).
     pub(super) complexity: f64,
     /// Its levels, coarsest first.
-    pub(super) forms: Vec<Form>,
+    pub(super) forms: Vec<ObjectLevel>,
 }
 
 /// Things, and the costs of drawing them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Scene {
-    pub(super) things: Vec<Thing>,
+    pub(super) objects: Vec<SceneObject>,
     /// Costs of every rendering algorithm, microseconds.
     pub(super) stages: Vec<Stages>,
 }
 
 /// A thing in view.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct VisibleObject {
     /// Index among the scene's things.
-    pub(super) thing: usize,
+    pub(super) object: usize,
     /// Pixels it covers, including hidden parts.
     pub(super) pixels: f64,
     /// Distance along the view and from the eye, metres.
@@ -69,41 +69,46 @@ pub(super) struct Seen {
 
 impl Scene {
     /// Everything that may be in the picture, in the order of the things.
-    pub(super) fn seen(&self, camera: &Camera) -> Vec<Seen> {
+    pub(super) fn seen(&self, camera: &Camera) -> Vec<VisibleObject> {
         let view = camera.frustum(SCREEN);
-        let in_view = |t: &&Thing| view.sees(t.centre_m, t.radius_m);
-        self.things.iter().enumerate().filter(|(_, t)| in_view(t)).map(|(i, t)| self.look(camera, i, t)).collect()
+        let in_view = |t: &&SceneObject| view.sees(t.centre_m, t.radius_m);
+        self.objects
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| in_view(t))
+            .map(|(i, t)| self.visible_object(camera, i, t))
+            .collect()
     }
 
-    fn look(&self, camera: &Camera, thing: usize, of: &Thing) -> Seen {
+    fn visible_object(&self, camera: &Camera, object: usize, of: &SceneObject) -> VisibleObject {
         let from_eye = of.centre_m - camera.eye();
         let depth_m = from_eye.dot(camera.forward());
         // from inside the thing it is seen as from its surface
         let radius_px = of.radius_m * camera.pixels_per_metre(depth_m.max(of.radius_m), SCREEN);
         let pixels = (std::f64::consts::PI * radius_px * radius_px * of.fill).min(SCREEN.pixels());
         let levels = of.forms.iter().map(|f| (self.cost(f, 1.0, pixels), f.gain(1.0, pixels))).collect();
-        Seen { thing, pixels, depth_m, distance_m: from_eye.length(), levels }
+        VisibleObject { object, pixels, depth_m, distance_m: from_eye.length(), levels }
     }
 
     /// Cost of a part of a level, microseconds.
-    pub(super) fn cost(&self, form: &Form, part: f64, pixels: f64) -> f64 {
+    pub(super) fn cost(&self, form: &ObjectLevel, part: f64, pixels: f64) -> f64 {
         let polygons = part * form.polygons;
         // a closed mesh has half as many vertices as triangles
         self.stages[form.algorithm].time(Work { polygons, vertices: 0.5 * polygons, pixels })
     }
 
     /// Cost of everything in view at its finest level, microseconds.
-    pub(super) fn full(seen: &[Seen]) -> f64 {
+    pub(super) fn full(seen: &[VisibleObject]) -> f64 {
         seen.iter().filter_map(|s| s.levels.last()).map(|(cost, _)| cost).sum()
     }
 }
 
-impl Form {
+impl ObjectLevel {
     /// Gain per pixel of a part of the level: the accuracy of a surface grows with the root of its samples (GB99).
     pub(super) fn gain(&self, part: f64, pixels: f64) -> f64 {
         match self.worth {
-            Worth::Part(worth) => worth * libm::sqrt(part),
-            Worth::Shaded(shading) => {
+            BenefitModel::Part(worth) => worth * libm::sqrt(part),
+            BenefitModel::Shaded(shading) => {
                 let (polygons, vertices) = (part * self.polygons, 0.5 * part * self.polygons);
                 accuracy(pixels, &Picture { level: 0, polygons, vertices, shading })
             }

@@ -3,7 +3,7 @@
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
-use super::common::figure;
+use super::common::{LEVEL_PARTS, figure};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ impl Experiment for Selection {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "selection";
-    const TITLE: &'static str = "wall time of one choice, five levels an object, new weights in every frame";
+    const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
 
     fn cases(quick: bool) -> Vec<Case> {
         let counts = if quick { &QUICK_OBJECTS[..] } else { &OBJECTS[..] };
@@ -85,8 +85,8 @@ impl Experiment for Selection {
         let mut layers: Vec<_> = POLICIES.iter().zip(Colour::LINES).map(line).collect();
         let share = vec![(100.0, SHARE * FRAME_MS), (1e5, SHARE * FRAME_MS)];
         layers.push(Layer { label: "1 % of 1/60 s".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(share) });
-        let (x, y) = (Axis::log("objects", 100.0, 1e5), Axis::log("time of a choice, least, ms", 1e-3, 1e3));
-        figure("How long a choice takes", vec![Panel { title: String::new(), x, y, layers }], 1)
+        let (x, y) = (Axis::log("objects", 100.0, 1e5), Axis::log("least selection time, ms", 1e-3, 1e3));
+        figure("Selection time", vec![Panel { title: String::new(), x, y, layers }], 1)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -115,8 +115,6 @@ fn level(id: usize, part: f64) -> (f64, f64) {
     (20.0 + 13.5 * polygons, 1.0 - 0.5 / polygons.max(2.0))
 }
 
-const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
-
 /// Half of the cost of all objects at their finest level, ticks.
 fn target(objects: usize) -> f64 {
     objects as f64 * 0.5 * 13.5 * 550.0
@@ -135,7 +133,7 @@ fn timed<T>(choose: impl FnOnce() -> T) -> (T, f64) {
 fn ours(objects: usize) -> Vec<f64> {
     let mut adaptive = Adaptive::new(Settings::default());
     for id in 0..objects {
-        let offers = PARTS.map(|part| level(id, part)).map(|(cost, gain)| Offer { cost, gain });
+        let offers = LEVEL_PARTS.map(|part| level(id, part)).map(|(cost, gain)| Offer { cost, gain });
         adaptive.set(id as u64, 0, false, &offers);
     }
     let one = |frame: usize| {
@@ -152,7 +150,7 @@ fn papers(objects: usize, choose: fn(&Problem, &[Level]) -> Vec<Level>) -> Vec<f
     let one = |frame: usize| {
         let mut problem = Problem::new(Mode::ExactlyOne, target(objects) as i64);
         for id in 0..objects {
-            let entries = PARTS
+            let entries = LEVEL_PARTS
                 .map(|part| level(id, part))
                 .map(|(cost, gain)| Entry::new(cost as u64, (1e6 * gain * weight(id, frame)) as u64));
             problem.push(id as u64, &entries);

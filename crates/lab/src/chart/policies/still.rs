@@ -38,7 +38,7 @@ impl Experiment for Still {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "still";
-    const TITLE: &'static str = "nothing moves: whose levels stay";
+    const TITLE: &'static str = "static scene: changes of level by policy";
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
@@ -60,7 +60,7 @@ impl Experiment for Still {
 
     fn figure(_: &[Row]) -> Figure {
         let panels = SETTINGS.iter().map(|s| curves(s.0, &still(s.0), &POLICIES, 1.5)).collect();
-        figure("A still picture", panels, 3)
+        figure("A static scene", panels, 3)
     }
 
     fn table(rows: &[Row]) -> Table {

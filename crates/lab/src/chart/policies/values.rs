@@ -6,7 +6,7 @@ use super::super::table::Table;
 use super::chooser::Policy;
 use super::common::{at_least, figure};
 use super::forest;
-use super::forest::{Forms, Way};
+use super::forest::{CameraPath, Forms};
 use super::machine::Fault;
 use super::metrics::mean;
 use metachron_lod::cost::value::Value;
@@ -43,7 +43,7 @@ pub(in super::super) struct Row {
 
 /// Depth in metres and drawn part of everything in view, and the time of the frame as a part of T.
 fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
-    let mut show = forest::show(600, Way::Linear, TARGET, Forms::Whole, FRAMES);
+    let mut show = forest::show(600, CameraPath::Linear, TARGET, Forms::Whole, FRAMES);
     show.fault = Fault { wander: 0.0, tremble: 0.0, ..Fault::NONE };
     let mut parts = Vec::new();
     let frames = show.watch(Policy::RobinHood(value), 1, &mut |frame, seen, choice| {
@@ -59,7 +59,7 @@ impl Experiment for Values {
     type Case = String;
     type Row = Row;
     const NAME: &'static str = "values";
-    const TITLE: &'static str = "the value functions of Robin Hood: what near and far trees are drawn with";
+    const TITLE: &'static str = "Robin Hood's value functions: detail of near and far trees";
 
     fn cases(_: bool) -> Vec<String> {
         VALUES.map(|v| v.0.to_owned()).to_vec()
@@ -89,7 +89,7 @@ impl Experiment for Values {
     fn figure(_: &[Row]) -> Figure {
         let panel = |(name, value): &(&str, Value)| {
             let layer = Layer { label: String::new(), colour: Colour::Blue, mark: Mark::Dots(drawn(*value).0) };
-            let (x, y) = (Axis::linear("depth, m", 0.0, 320.0), Axis::linear("part of its triangles", 0.0, 1.05));
+            let (x, y) = (Axis::linear("depth, m", 0.0, 320.0), Axis::linear("fraction of its triangles", 0.0, 1.05));
             Panel { title: (*name).to_owned(), x, y, layers: vec![layer] }
         };
         figure("One frame of 50 ms by each value function (RH05, fig. 1)", VALUES.iter().map(panel).collect(), 3)
@@ -107,8 +107,8 @@ impl Experiment for Values {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |k: usize, what: fn(&Row) -> f64| rows.iter().find(|r| r.value == VALUES[k].0).map_or(f64::NAN, what);
         vec![
-            at_least("near trees get more by a/z² than by a/√z", of(2, |r| r.near) - of(0, |r| r.near), 0.0),
-            at_least("far trees get less by a/z² than by a/√z", of(0, |r| r.far) - of(2, |r| r.far), 0.0),
+            at_least("near trees get more triangles by a/z² than by a/√z", of(2, |r| r.near) - of(0, |r| r.near), 0.0),
+            at_least("far trees get fewer triangles by a/z² than by a/√z", of(0, |r| r.far) - of(2, |r| r.far), 0.0),
         ]
     }
 }

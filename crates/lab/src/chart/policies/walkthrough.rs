@@ -7,9 +7,9 @@ use super::camera::{Path, key};
 use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::common::{Case, at_least, curves, figure, number, table};
-use super::machine::{Fault, Noise};
+use super::machine::{Fault, RandomSource};
 use super::metrics::Row;
-use super::scene::{Form, Scene, Thing, Worth};
+use super::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -30,16 +30,16 @@ const SETTING: &str = "walk";
 
 fn show(frames: usize) -> Show {
     let path = path(frames);
-    let scene = Scene { things: things(), stages: vec![STAGES] };
+    let scene = Scene { objects: objects(), stages: vec![STAGES] };
     Show { scene, path, fault: Fault::NONE, target: TARGET, frames, lap: frames, delay: 1, logic: 0.0, overlap: 1.0 }
 }
 
 /// Meshes of log-normal triangle counts: 20 in front of the camera, the rest behind it.
-fn things() -> Vec<Thing> {
-    let mut noise = Noise::new(99);
+fn objects() -> Vec<SceneObject> {
+    let mut noise = RandomSource::new(99);
     let counts: Vec<f64> = (0..MESHES).map(|_| libm::exp(noise.normal())).collect();
     let scale = TRIANGLES / counts.iter().sum::<f64>();
-    let mut thing = |(i, count): (usize, &f64)| {
+    let mut object = |(i, count): (usize, &f64)| {
         let ahead = i % 10 == 0;
         let along = noise.uniform();
         let x = if ahead { -4.0 - 26.0 * along } else { 4.0 + 56.0 * along };
@@ -47,12 +47,12 @@ fn things() -> Vec<Thing> {
         let triangles = (scale * count).round();
         let prefix = |k: i32| {
             let part = libm::exp2(-0.5 * f64::from(k));
-            Form { polygons: part * triangles, algorithm: 0, worth: Worth::Part(part.sqrt()) }
+            ObjectLevel { polygons: part * triangles, algorithm: 0, worth: BenefitModel::Part(part.sqrt()) }
         };
         let forms = (0..=STEPS).rev().map(prefix).collect();
-        Thing { centre_m, radius_m: 1.0, fill: 0.7, importance: 1.0, complexity: triangles, forms }
+        SceneObject { centre_m, radius_m: 1.0, fill: 0.7, importance: 1.0, complexity: triangles, forms }
     };
-    counts.iter().enumerate().map(&mut thing).collect()
+    counts.iter().enumerate().map(&mut object).collect()
 }
 
 /// Towards the few meshes, which leave the view one by one; at seven tenths half a turn in ten frames, towards the many.
@@ -72,7 +72,7 @@ impl Experiment for Walkthrough {
     type Row = Row;
     const NAME: &'static str = "walkthrough";
     const TITLE: &'static str =
-        "200 meshes of 1.5 million triangles and a sudden turn: predicted and measured, and the certificate";
+        "200 meshes of 1.5 million triangles and a sudden turn: prediction, measurement and certificate";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES / if quick { QUICK_PART } else { 1 };
@@ -93,7 +93,7 @@ impl Experiment for Walkthrough {
             curves("no choice", &show, &[Policy::Full], 15.0),
             curves("meshes of any resolution", &show, &[Policy::Convex, Policy::Adaptive], 1.5),
         ];
-        figure("A walk among 200 meshes", panels, 2)
+        figure("A walkthrough of 200 meshes", panels, 2)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -120,7 +120,7 @@ mod tests {
         let seen = |frame: usize| show.seen(frame).0.len();
         assert!(seen(0) >= 15 && seen(699) <= 20, "{} {}", seen(0), seen(699));
         assert!(seen(720) >= 150, "{}", seen(720));
-        let all: f64 = show.scene.things.iter().map(|t| t.complexity).sum();
+        let all: f64 = show.scene.objects.iter().map(|t| t.complexity).sum();
         assert!((all / TRIANGLES - 1.0).abs() < 1e-3);
     }
 }

@@ -21,9 +21,9 @@ const RATE_MAX_HZ: f64 = 198.0;
 
 impl Growth for Agents {
     const NAME: &'static str = "agents";
-    const TITLE: &'static str = "What a round of all agents costs by their number";
+    const TITLE: &'static str = "Cost of one step of every agent, by number of agents";
     const COUNTED: &'static str = "agents";
-    const COST: &'static str = "CPU µs a round";
+    const COST: &'static str = "CPU µs per round";
     const FLOOR: &'static str = "their bare steps";
 
     fn cases(quick: bool) -> Vec<Case> {

@@ -3,7 +3,7 @@
 use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace};
-use super::tubes::{folded, holding, step};
+use super::tubes::{folded, gripping_neighbours, step};
 use metachron_core::SimSpan;
 use std::time::Duration;
 
@@ -22,10 +22,10 @@ const HOLDS: u32 = 200;
 
 impl Growth for Contacts {
     const NAME: &'static str = "contacts";
-    const TITLE: &'static str = "What a step of a folded tube costs by its contacts";
+    const TITLE: &'static str = "Cost of a folded tube's step, by number of contacts";
     const COUNTED: &'static str = "contacts";
-    const COST: &'static str = "CPU µs a step";
-    const FLOOR: &'static str = "the same memory once";
+    const COST: &'static str = "CPU µs per step";
+    const FLOOR: &'static str = "one pass over the same memory";
 
     /// Sizes are segments, 14 per strand.
     fn cases(quick: bool) -> Vec<Case> {
@@ -40,7 +40,7 @@ impl Growth for Contacts {
             step(&mut tube, DT, &[])?;
         }
         let held = case.case == HELD;
-        let (dt, neighbours) = if held { (DT_HELD, holding(&tube)?) } else { (DT, vec![]) };
+        let (dt, neighbours) = if held { (DT_HELD, gripping_neighbours(&tube)?) } else { (DT, vec![]) };
         for _ in 0..if held { HOLDS } else { 0 } {
             step(&mut tube, dt, &neighbours)?;
         }
@@ -55,12 +55,12 @@ impl Growth for Contacts {
             pace(rows) * row.map_or(f64::NAN, |row| row.point().1)
         };
         let mut list = vec![Finding::at_most(
-            "100 segments on themselves: µs a step of 4 ms by calibration (10,000 a second)",
+            "100 segments in self-contact: µs per step of 4 ms by calibration (10,000 per second)",
             us(FREE, 100),
             100.0,
         )];
         if rows.iter().any(|row| row.size == 400) {
-            let claim = "400 segments on themselves in a grasp: µs a step of 1 ms by calibration (1 kHz)";
+            let claim = "400 segments in self-contact and in a grasp: µs per step of 1 ms by calibration (1 kHz)";
             list.push(Finding::at_most(claim, us(HELD, 400), 1000.0));
         }
         list

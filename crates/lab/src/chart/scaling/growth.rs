@@ -9,6 +9,10 @@ use super::super::table::Table;
 use super::super::timing::{calibration_us, pace_for_goals};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
+use std::ops::RangeInclusive;
+
+/// Every count.
+const ANY_COUNT: RangeInclusive<f64> = 0.0..=f64::INFINITY;
 
 /// A measurement of how cost grows with a number.
 pub(in super::super) trait Growth: Send + Sync + 'static {
@@ -140,7 +144,7 @@ impl<G: Growth> Experiment for Scaling<G> {
                 (row.ns_each(), 1).into(),
                 (floor_us * 1e3 / count, 1).into(),
                 (row.times_floor(), 2).into(),
-                (power(rows, &row.case, (0.0, f64::INFINITY)), 3).into(),
+                (power(rows, &row.case, ANY_COUNT), 3).into(),
             ]);
         }
         table
@@ -151,9 +155,9 @@ impl<G: Growth> Experiment for Scaling<G> {
     }
 }
 
-/// The power of the count with which the cost of a case grows, between two counts.
-pub(super) fn power(rows: &[Row], case: &str, (least, most): (f64, f64)) -> f64 {
-    let inside = |row: &&Row| row.case == case && row.count.is_some_and(|n| (least..=most).contains(&n));
+/// The power of the count with which the cost of a case grows, over a range of counts.
+pub(super) fn power(rows: &[Row], case: &str, counts: RangeInclusive<f64>) -> f64 {
+    let inside = |row: &&Row| row.case == case && row.count.is_some_and(|n| counts.contains(&n));
     let points: Vec<_> = rows.iter().filter(inside).map(Row::point).collect();
     exponent(&points).unwrap_or(f64::NAN)
 }
@@ -178,7 +182,7 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
         layers.push(Layer { label: (*engine).to_owned(), colour, mark: Mark::Dots(points) });
     }
     for (case, colour) in names(rows).into_iter().zip(Colour::LINES) {
-        let label = format!("{case}: ^{:.2}", power(rows, case, (0.0, f64::INFINITY)));
+        let label = format!("{case}: ^{:.2}", power(rows, case, ANY_COUNT));
         layers.push(Layer { label, colour, mark: Mark::Line(of(case, Row::point)) });
         layers.push(Layer { label: String::new(), colour, mark: Mark::Dashed(of(case, Row::floor)) });
     }
@@ -186,7 +190,7 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
     let all = || rows.iter().flat_map(|row| [row.point(), row.floor()]).chain(peers.iter().map(|p| (p.1, p.2)));
     let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log(G::COST, low, high));
-    Panel { title: "all of them".to_owned(), x, y, layers }
+    Panel { title: "total".to_owned(), x, y, layers }
 }
 
 /// Cost of each item against count.
@@ -197,7 +201,7 @@ fn each<G: Growth>(rows: &[Row]) -> Panel {
     let ((left, right), (low, high)) =
         (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(Row::ns_each), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log("ns each", low, high));
-    Panel { title: "each of them".to_owned(), x, y, layers: layers.collect() }
+    Panel { title: "per item".to_owned(), x, y, layers: layers.collect() }
 }
 
 #[cfg(test)]
@@ -216,7 +220,7 @@ mod tests {
         };
         // a fixed cost below 100, proportional from there on
         let rows = [row(1, 50.0), row(10, 50.0), row(100, 100.0), row(1000, 1000.0)];
-        assert!((power(&rows, "a", (100.0, 1000.0)) - 1.0).abs() < 1e-12);
-        assert!(power(&rows, "a", (0.0, 1e9)) < 0.7 && power(&rows, "b", (0.0, 1e9)).is_nan());
+        assert!((power(&rows, "a", 100.0..=1000.0) - 1.0).abs() < 1e-12);
+        assert!(power(&rows, "a", 0.0..=1e9) < 0.7 && power(&rows, "b", 0.0..=1e9).is_nan());
     }
 }

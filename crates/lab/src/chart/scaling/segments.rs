@@ -4,8 +4,9 @@ use super::super::accuracy::peers;
 use super::super::experiment::{Finding, worst};
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
-use super::tubes::{holding, step, straight};
+use super::tubes::{gripping_neighbours, step, straight};
 use metachron_core::SimSpan;
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 /// The experiment.
@@ -17,7 +18,7 @@ const HELD: &str = "held by a tool";
 /// Claims for the whole step at numbers of segments in the range [`CLAIMED`].
 const CLAIMED_NS: f64 = 160.0;
 const CLAIMED_POWER: f64 = 1.05;
-const CLAIMED: (f64, f64) = (100.0, 4000.0);
+const CLAIMED: RangeInclusive<f64> = 100.0..=4000.0;
 /// How long each case is measured.
 const SPAN: Duration = Duration::from_millis(200);
 /// Steps before the measurement, so that all tubes hang alike: they come to rest in the first half of these.
@@ -26,10 +27,10 @@ const DT: SimSpan = SimSpan::from_nanos(10_000_000);
 
 impl Growth for Segments {
     const NAME: &'static str = "segments";
-    const TITLE: &'static str = "What a step of a tube costs by its segments";
+    const TITLE: &'static str = "Cost of a tube's step, by number of segments";
     const COUNTED: &'static str = "segments";
-    const COST: &'static str = "CPU µs a step";
-    const FLOOR: &'static str = "the same memory once";
+    const COST: &'static str = "CPU µs per step";
+    const FLOOR: &'static str = "one pass over the same memory";
 
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick {
@@ -43,7 +44,7 @@ impl Growth for Segments {
 
     fn measure(case: &Case) -> Option<Cost> {
         let mut tube = straight(case.size, case.case != ALONE)?;
-        let neighbours = if case.case == HELD { holding(&tube)? } else { vec![] };
+        let neighbours = if case.case == HELD { gripping_neighbours(&tube)? } else { vec![] };
         for _ in 0..WARM {
             step(&mut tube, DT, &neighbours)?;
         }
@@ -53,12 +54,11 @@ impl Growth for Segments {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let (least, most) = CLAIMED;
-        let inside = |row: &&Row| row.case == ALONE && (least..=most).contains(&f64::from(row.size));
+        let inside = |row: &&Row| row.case == ALONE && CLAIMED.contains(&f64::from(row.size));
         let slowest = pace(rows) * worst(rows.iter().filter(inside).map(Row::ns_each));
-        let range = format!("{least} … {most} segments");
+        let range = format!("{} … {} segments", CLAIMED.start(), CLAIMED.end());
         vec![
-            Finding::at_most(format!("ns a segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
+            Finding::at_most(format!("ns per segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
             Finding::at_most(format!("exponent, {range}, alone"), power(rows, ALONE, CLAIMED), CLAIMED_POWER),
         ]
     }

@@ -37,10 +37,10 @@ enum Sleeper {
 
 impl Growth for Sleepers {
     const NAME: &'static str = "sleepers";
-    const TITLE: &'static str = "What objects at rest cost ten that are not";
+    const TITLE: &'static str = "Cost of sleeping objects beside ten active ones";
     const COUNTED: &'static str = "asleep";
-    const COST: &'static str = "CPU µs a frame";
-    const FLOOR: &'static str = "the ten alone";
+    const COST: &'static str = "CPU µs per frame";
+    const FLOOR: &'static str = "ten active objects alone";
 
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick { &[1000] } else { &[10, 100, 1000] };
@@ -67,7 +67,7 @@ impl Growth for Sleepers {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let most = rows.iter().filter(|row| row.size == 1000);
         let claim = |row: &Row| {
-            let claim = format!("{}: a thousand asleep and ten awake, times the ten alone", row.case);
+            let claim = format!("{}: a thousand asleep and ten awake, over the ten alone", row.case);
             Finding::at_most(claim, row.times_floor(), LIMIT)
         };
         most.map(claim).collect()

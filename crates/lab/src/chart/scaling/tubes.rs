@@ -73,7 +73,7 @@ pub(super) fn folded(segments: u32) -> Option<Tube> {
 }
 
 /// A tool that grasps the middle of `tube` at its present place, as a neighbour with one fixed state.
-pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
+pub(super) fn gripping_neighbours(tube: &Tube) -> Option<Vec<Neighbour>> {
     let mut seen = Snapshot::default();
     tube.write_snapshot(&mut seen);
     let anchor = Anchor::Arc(0.5 * tube.length_m());
@@ -95,6 +95,6 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
 
 /// One step among `neighbours`; `None` where it fails.
 pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
-    let around = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-    tube.step(dt, &around).ok().map(drop)
+    let context = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+    tube.step(dt, &context).ok().map(drop)
 }

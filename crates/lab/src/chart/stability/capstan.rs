@@ -72,7 +72,7 @@ impl Experiment for Capstan {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "capstan";
-    const TITLE: &'static str = "a tube around a fixed cylinder: the ratio of tensions at which it slips";
+    const TITLE: &'static str = "capstan: tension ratio at which a tube around a fixed cylinder slips";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };
@@ -83,7 +83,7 @@ impl Experiment for Capstan {
 
     fn measure(case: &Case) -> Row {
         let Case { wrap_rad, friction } = *case;
-        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slips_at(case) }
+        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slip_ratio(case) }
     }
 
     fn case_of(row: &Row) -> Case {
@@ -107,7 +107,7 @@ impl Experiment for Capstan {
         }
         let (x, y) = (Axis::linear("angle of wrap φ, rad", 0.0, 8.0), Axis::log("T₂/T₁ at which it slips", 1.0, top));
         let panel = Panel { title: String::new(), x, y, layers };
-        Figure { title: "A tube around a fixed cylinder slips".to_owned(), panels: vec![panel], columns: 1 }
+        Figure { title: "Capstan: slip of a tube around a fixed cylinder".to_owned(), panels: vec![panel], columns: 1 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -172,7 +172,7 @@ fn tube(case: &Case) -> Option<Tube> {
 }
 
 /// Raises the load at the end until the start has moved; returns the ratio of the loads then.
-fn slips_at(case: &Case) -> Option<f64> {
+fn slip_ratio(case: &Case) -> Option<f64> {
     let mut tube = tube(case)?;
     let dt = SimSpan::from_secs_f64(DT_S)?;
     let theory = libm::exp(case.friction * case.wrap_rad);
@@ -188,8 +188,8 @@ fn slips_at(case: &Case) -> Option<f64> {
         }
         let on = (t / (0.5 * SETTLE_S)).min(1.0);
         let hands = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
-        let around = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(dt, &around).ok()?;
+        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        tube.step(dt, &context).ok()?;
         time += dt;
         tube.write_snapshot(&mut snapshot);
         let (start, _) = snapshot.body.probe(0.0)?;

@@ -10,6 +10,7 @@ use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;
 use super::closed_system::{ROOM_M, SYSTEMS, system};
+use super::common::COMMON_ENERGY_MAX;
 use glam::DVec3;
 use metachron_contact::audit::{Audit, audit};
 use metachron_core::{AgentId, SimTime};
@@ -27,7 +28,6 @@ const SECONDS: f64 = 60.0;
 const QUICK_SECONDS: f64 = 2.0;
 /// Clocks agree within this, seconds: sixtieths are not whole nanoseconds.
 const SAME_S: f64 = 1e-5;
-const ENERGY_MAX: f64 = 1.01;
 /// Rounding allowed for the momentum with everything delivered, as a share of the momenta exchanged.
 const ROUNDING: f64 = 1e-9;
 /// Least number of samples that find an impact since the previous sample: the bodies really collide.
@@ -80,7 +80,7 @@ impl Experiment for Closed {
     type Row = Row;
     const NAME: &'static str = "closed";
     const TITLE: &'static str =
-        "three rigid bodies and two tubes, five clocks, nothing from outside: momentum and energy at a common time";
+        "closed system of three rigid bodies and two tubes on five clocks: momentum and energy at a common time";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (turns, seeds, seconds) =
@@ -95,11 +95,11 @@ impl Experiment for Closed {
     }
 
     fn measure(case: &Case) -> Row {
-        let (sums, whole) = play(case).unwrap_or_default();
+        let (extremes, whole) = play(case).unwrap_or_default();
         let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
-            if whole { sums.numbers() } else { [f64::NAN; 8] };
+            if whole { extremes.numbers() } else { [f64::NAN; 8] };
         let Case { system, turn, seed, seconds } = case.clone();
-        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| sums.of_second(k));
+        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
         Row {
             system,
             turn,
@@ -113,9 +113,9 @@ impl Experiment for Closed {
             raw_drift,
             in_flight,
             beyond,
-            looks: sums.looks,
-            blows: sums.blows,
-            pause_s: sums.pause_s.max(seconds - sums.last_blow_s),
+            looks: extremes.looks,
+            blows: extremes.blows,
+            pause_s: extremes.pause_s.max(seconds - extremes.last_blow_s),
             energy_of_second,
             told_of_second,
             in_flight_of_second,
@@ -129,23 +129,23 @@ impl Experiment for Closed {
     fn figure(rows: &[Row]) -> Figure {
         let seconds = rows.iter().map(|r| r.seconds).fold(1.0, f64::max);
         let x = || Axis::linear("time, s", 0.0, seconds);
-        let energies = rows.iter().flat_map(|r| read(&r.energy_of_second)).map(|p| p.1).chain([1.0, ENERGY_MAX]);
+        let energies = rows.iter().flat_map(|r| read(&r.energy_of_second)).map(|p| p.1).chain([1.0, COMMON_ENERGY_MAX]);
         let (low, high) = span(energies, false);
         let limit = Layer {
             label: "start + 1 %".to_owned(),
             colour: Colour::Grey,
-            mark: Mark::Dashed(vec![(0.0, ENERGY_MAX), (seconds, ENERGY_MAX)]),
+            mark: Mark::Dashed(vec![(0.0, COMMON_ENERGY_MAX), (seconds, COMMON_ENERGY_MAX)]),
         };
         let lines = rows.iter().map(|r| {
             let colour = Colour::LINES[r.turn % Colour::LINES.len()];
             let first = r.seed == SEEDS[0] && r.system == SYSTEMS[0];
-            let label = if first { format!("clocks handed on by {}", r.turn) } else { String::new() };
+            let label = if first { format!("rates shifted by {}", r.turn) } else { String::new() };
             Layer { label, colour, mark: Mark::Line(read(&r.energy_of_second)) }
         });
         let energy = Panel {
             title: "energy at a common time".to_owned(),
             x: x(),
-            y: Axis::linear("share of the start's", low, high),
+            y: Axis::linear("energy / energy at the start", low, high),
             layers: [limit].into_iter().chain(lines).collect(),
         };
         let dots = |label: &str, colour, get: fn(&Row) -> &str| Layer {
@@ -159,8 +159,8 @@ impl Experiment for Closed {
             x: x(),
             y: Axis::log("change / momenta at the start", FLOOR, 10.0),
             layers: vec![
-                dots("on its way", Colour::Orange, |r| &r.in_flight_of_second),
-                dots("change as told", Colour::Red, |r| &r.told_of_second),
+                dots("in flight", Colour::Orange, |r| &r.in_flight_of_second),
+                dots("change as published", Colour::Red, |r| &r.told_of_second),
                 Layer {
                     label: "greatest change, delivered".to_owned(),
                     colour: Colour::Blue,
@@ -211,14 +211,14 @@ impl Experiment for Closed {
         let most = |get: fn(&Row) -> f64| worst(rows.iter().map(get));
         let idle = rows.iter().filter(|r| r.blows < BLOWS_MIN).count();
         vec![
-            Finding::at_most("energy at a common time, in that of the start", most(|r| r.energy_peak), ENERGY_MAX),
-            Finding::at_most("momentum, everything delivered: change over the momenta", most(|r| r.drift), ROUNDING),
-            Finding::at_most("momentum as told: change beyond what was on its way", most(|r| r.beyond), ROUNDING),
+            Finding::at_most("energy at a common time over the start's", most(|r| r.energy_peak), COMMON_ENERGY_MAX),
             Finding::at_most(
-                format!("runs in which they struck each other less than {BLOWS_MIN} times"),
-                idle as f64,
-                0.0,
+                "momentum with every impulse delivered: change over the momenta",
+                most(|r| r.drift),
+                ROUNDING,
             ),
+            Finding::at_most("published momentum: change beyond the impulses in flight", most(|r| r.beyond), ROUNDING),
+            Finding::at_most(format!("runs with fewer than {BLOWS_MIN} impacts"), idle as f64, 0.0),
         ]
     }
 }
@@ -234,10 +234,10 @@ fn read(numbers: &str) -> Vec<(f64, f64)> {
 
 /// Extremes and counts over a run; momenta are shares of those at the start.
 #[derive(Debug, Clone, Default)]
-struct Sums {
+struct Extremes {
     energy: [f64; 3],
     drift: [f64; 2],
-    told: [f64; 3],
+    published: [f64; 3],
     looks: u32,
     blows: u32,
     last_blow_s: f64,
@@ -247,10 +247,11 @@ struct Sums {
     seconds: Vec<[f64; 3]>,
 }
 
-impl Sums {
+impl Extremes {
     fn numbers(&self) -> [f64; 8] {
-        let ([peak, end, raw], [drift, angular], [told, flying, beyond]) = (self.energy, self.drift, self.told);
-        [peak, end, raw, drift, angular, told, flying, beyond]
+        let ([peak, end, raw], [drift, angular], [published, flying, beyond]) =
+            (self.energy, self.drift, self.published);
+        [peak, end, raw, drift, angular, published, flying, beyond]
     }
 
     fn of_second(&self, which: usize) -> String {
@@ -259,14 +260,14 @@ impl Sums {
     }
 
     /// Takes in a sample at `at_s`: energies, changes of momenta, impulse in flight.
-    fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [told, flying]: [f64; 2]) {
+    fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [published, flying]: [f64; 2]) {
         self.energy = [worst([self.energy[0], energy]), energy, worst([self.energy[2], raw])];
         self.drift = [0, 1].map(|k| worst([self.drift[k], drift[k]]));
-        let told = [told, flying, told - flying];
-        self.told = [0, 1, 2].map(|k| worst([self.told[k], told[k]]));
+        let published = [published, flying, published - flying];
+        self.published = [0, 1, 2].map(|k| worst([self.published[k], published[k]]));
         self.seconds.resize((at_s as usize + 1).max(self.seconds.len()), [0.0; 3]);
         if let Some(second) = self.seconds.last_mut() {
-            let now = [energy, told[0], told[1]];
+            let now = [energy, published[0], published[1]];
             *second = [0, 1, 2].map(|k| worst([second[k], now[k]]));
         }
         self.looks += 1;
@@ -289,12 +290,12 @@ impl Sums {
 }
 
 /// Plays the case; returns its results and whether it reached its end.
-fn play(case: &Case) -> Option<(Sums, bool)> {
+fn play(case: &Case) -> Option<(Extremes, bool)> {
     let (play, ids) = system(&case.system, case.turn, case.seed)?;
     let start = play.common(SimTime::ZERO);
     let size: f64 = momenta(&play, ids);
-    let (raw_start, told_start) = (play.raw_j(), told(&play));
-    let mut sums = Sums::default();
+    let (raw_start, published_start) = (play.raw_j(), published_momentum(&play));
+    let mut extremes = Extremes::default();
     let ended = play.run(case.seconds, |play, _| {
         let times = ids.map(|id| play.stage.own(id).time);
         let (first, last) = (times.iter().min().copied(), times.iter().max().copied());
@@ -305,15 +306,15 @@ fn play(case: &Case) -> Option<(Sums, bool)> {
         let (now, at_s) = (play.common(first), first.as_secs_f64());
         let energy = [now.energy_j / start.energy_j, play.raw_j() / raw_start];
         let drift = [
-            (told(play) + on_its_way(play, ids) - told_start).length(),
+            (published_momentum(play) + momentum_in_flight(play, ids) - published_start).length(),
             (now.angular - start.angular).length() / ROOM_M,
         ];
-        let told = [(told(play) - told_start).length(), now.in_flight_n_s];
-        sums.add(at_s, energy, drift.map(|d| d / size), told.map(|t| t / size));
-        sums.strike(at_s, play, ids);
+        let published = [(published_momentum(play) - published_start).length(), now.in_flight_n_s];
+        extremes.add(at_s, energy, drift.map(|d| d / size), published.map(|t| t / size));
+        extremes.strike(at_s, play, ids);
         energy[0] < 1e3
     });
-    Some((sums, ended.time().as_secs_f64() >= case.seconds - 1e-3))
+    Some((extremes, ended.time().as_secs_f64() >= case.seconds - 1e-3))
 }
 
 /// Sum of the magnitudes of all momenta, kg·m/s.
@@ -324,12 +325,12 @@ fn momenta(play: &Play, ids: [AgentId; 5]) -> f64 {
 }
 
 /// The linear impulses that were given and not yet taken, kg·m/s.
-fn on_its_way(play: &Play, ids: [AgentId; 5]) -> DVec3 {
+fn momentum_in_flight(play: &Play, ids: [AgentId; 5]) -> DVec3 {
     ids.iter().map(|id| play.in_flight(*id)).sum()
 }
 
 /// Momentum as the agents publish it, nothing delivered, kg·m/s.
-fn told(play: &Play) -> DVec3 {
+fn published_momentum(play: &Play) -> DVec3 {
     let members = play.stage.members();
     let one = |k: usize| audit(&members[k..=k], members[k].snapshot.time, &mut |_, _| 0.0).momentum;
     (0..members.len()).map(one).sum()

@@ -4,7 +4,7 @@
 
 use super::super::bench::Faults;
 use super::super::energy_bench::Play;
-use super::common::{plain_body, plain_tube};
+use super::common::{TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::DVec3;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor};
@@ -28,7 +28,6 @@ const BALL_M_S: f64 = 0.4;
 /// Amplitude of the deviation of the ball's starting velocity in each direction, m/s.
 const SWAY_M_S: f64 = 0.01;
 const TUBE_M: f64 = 0.3;
-const TUBE_RADIUS_M: f64 = 0.015;
 const SEGMENTS: usize = 12;
 /// The ring: masses of the balls, radius of the ring, length of its tubes, stiffness and length of its springs.
 const MASSES_KG: [f64; 3] = [1.0, 0.5, 0.2];
@@ -39,11 +38,11 @@ const SPRING_REST_M: f64 = 0.05;
 
 /// The system with a name; the rates are shifted cyclically by `turn` places.
 pub(super) fn system(name: &str, turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
-    if name == SYSTEMS[0] { company(turn, seed) } else { ring(turn, seed) }
+    if name == SYSTEMS[0] { colliding_row(turn, seed) } else { ring(turn, seed) }
 }
 
 /// Plate, tube, ball, tube, plate along x; the ball flies, the plates approach, the tubes are hit.
-fn company(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
+fn colliding_row(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let mut play = Play::new(Law::Ledger, Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
     let sway = |k: u64| libm::sin((31 * seed + 7 * k) as f64) * SWAY_M_S;

@@ -8,7 +8,13 @@ use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
 
 /// Gravity of the Earth, m/s².
-pub(in super::super) const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
+
+/// Radius of the tubes that touch other bodies, metres.
+pub(in super::super) const TUBE_RADIUS_M: f64 = 0.015;
+
+/// Greatest energy at a common time, as a multiple of the start's: one percent for the error of integration.
+pub(super) const COMMON_ENERGY_MAX: f64 = 1.01;
 
 /// A free tube of 1 MPa with a wall of an eighth of its radius, no weight, no damping, no friction.
 pub(in super::super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: usize) -> TubeSpec {

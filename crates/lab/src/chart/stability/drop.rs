@@ -4,11 +4,11 @@
 //! some of its states are lost. In 1d two balls; in 3d a tilted box that turns and slides lands on a plate with friction.
 
 use super::super::bench::Faults;
-use super::super::energy_bench::{Given, Play};
+use super::super::energy_bench::{ContactImpulse, Play};
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
-use super::common::{GRAVITY, plain_body};
+use super::common::{COMMON_ENERGY_MAX, GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_contact::Law;
@@ -57,7 +57,6 @@ const REST_S: f64 = 2.5;
 const BLOWN_UP: f64 = 1e6;
 /// Bounds of the findings.
 const RAW_MAX: f64 = 1.3;
-const COMMON_MAX: f64 = 1.01;
 const MOMENTUM_MAX: f64 = 0.005;
 const DEPTH_MAX_M: f64 = 0.002;
 
@@ -96,7 +95,7 @@ impl Experiment for Drop {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "drop";
-    const TITLE: &'static str = "50 g fall on 100 g on springs, clocks apart: peak energy of every law";
+    const TITLE: &'static str = "50 g fall on 100 g on springs, separate clocks: peak energy of every contact law";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (rates, losses) = if quick { (&RATES_HZ[2..3], &LOSSES[1..2]) } else { (&RATES_HZ[..], &LOSSES[..]) };
@@ -145,13 +144,14 @@ impl Experiment for Drop {
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let peak = |space| panel(space, rows, ("peak energy / start, at a common time", 0.5, 1e4), |r| r.common_peak);
+        let peak =
+            |space| panel(space, rows, Axis::log("peak energy / start, at a common time", 0.5, 1e4), |r| r.common_peak);
         // a body that was thrown off overlaps nothing
         let rests = |r: &Row| if r.common_peak < 2.0 { r.depth_m } else { f64::NAN };
-        let depth = |space| panel(space, rows, ("overlap at rest, m", 1e-7, 0.1), rests);
+        let depth = |space| panel(space, rows, Axis::log("overlap at rest, m", 1e-7, 0.1), rests);
         let panels = SPACES.into_iter().flat_map(|space| [peak(space), depth(space)]).collect();
         Figure {
-            title: format!("50 g fall on 100 g on springs; the worst of {SEEDS} seeds and of all losses"),
+            title: format!("50 g fall on 100 g on springs; the worst of {SEEDS} seeds and all loss rates"),
             panels,
             columns: 2,
         }
@@ -191,7 +191,7 @@ impl Experiment for Drop {
         let at_60 = ours().filter(|r| r.rate_hz == 60.0).map(|r| r.depth_m);
         vec![
             Finding::at_most("ledger: peak of the sum over two clocks", worst(ours().map(|r| r.raw_peak)), RAW_MAX),
-            Finding::at_most("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_MAX),
+            Finding::at_most("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_ENERGY_MAX),
             Finding::at_most("ledger: momentum error", worst(ours().map(|r| r.momentum_error)), MOMENTUM_MAX),
             Finding::at_most("ledger: overlap at rest at 60 Hz, m", worst(at_60), DEPTH_MAX_M),
         ]
@@ -245,7 +245,7 @@ fn mount(at: DVec3, count: f64) -> AnchorSpring {
 }
 
 /// Builds the two bodies, one `fall_m` above the other.
-pub(super) fn pair(space: &str, law: Law, rate_hz: f64, (faults, fall_m): (Faults, f64)) -> Option<Pair> {
+pub(super) fn pair(space: &str, law: Law, rate_hz: f64, faults: Faults, fall_m: f64) -> Option<Pair> {
     let mut play = Play::new(law, faults);
     let gravity = DVec3::NEG_Z * GRAVITY;
     let body = |solid: Solid, height_m: f64, mass: f64, friction: f64| RigidSpec {
@@ -282,19 +282,19 @@ pub(super) fn pair(space: &str, law: Law, rate_hz: f64, (faults, fall_m): (Fault
 fn fall(case: &Case, seed: u64) -> Option<Fall> {
     let faults = Faults { jitter: JITTER, loss: case.loss, seed, due: false };
     let law = law(&case.law, case.stiffness_n_m, DAMPING_RATIO);
-    let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, (faults, FALL_M))?;
+    let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, faults, FALL_M)?;
     let start_j = play.raw_j() - zero_j;
     let mut out = Fall { raw: 1.0, common: 1.0, momentum_error: 0.0, depth_m: 0.0 };
-    let mut given = [Given::default(); 2];
+    let mut contact = [ContactImpulse::default(); 2];
     let (mut room, mut pages) = (NarrowPhaseScratch::default(), 0_u32);
     let gravity = DVec3::NEG_Z * GRAVITY;
-    let ended = play.run(SECONDS, |play, who| {
+    let ended = play.run(SECONDS, |play, id| {
         let at = play.time();
         out.raw = worst([out.raw, (play.raw_j() - zero_j) / start_j]);
         out.common = worst([out.common, (play.common(at).energy_j - zero_j) / start_j]);
-        let side = usize::from(who == falling);
+        let side = usize::from(id == falling);
         let mass = [MOUNTED_KG, FALLING_KG][side];
-        given[side].look(play.stage.own(who), (mass, gravity), play.stage.last_s(who));
+        contact[side].add(play.stage.own(id), mass, gravity, play.stage.last_s(id));
         pages += 1;
         if at.as_secs_f64() > REST_S && pages.is_multiple_of(8) {
             out.depth_m = out.depth_m.max(play.depth_m([mounted, falling], at, &mut room));
@@ -302,13 +302,13 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
         out.raw < BLOWN_UP
     });
     let flying: DVec3 = [mounted, falling].iter().map(|id| ended.in_flight(*id)).sum();
-    let exchanged = given[1].size + ended.in_flight(falling).length();
-    out.momentum_error = (given[0].sum + given[1].sum + flying).length() / exchanged.max(f64::MIN_POSITIVE);
+    let exchanged = contact[1].size + ended.in_flight(falling).length();
+    out.momentum_error = (contact[0].sum + contact[1].sum + flying).length() / exchanged.max(f64::MIN_POSITIVE);
     Some(out)
 }
 
 /// A quantity over the slow body's rate, one line per law.
-fn panel(space: &str, rows: &[Row], (label, low, high): (&'static str, f64, f64), get: fn(&Row) -> f64) -> Panel {
+fn panel(space: &str, rows: &[Row], y: Axis, get: fn(&Row) -> f64) -> Panel {
     let mut layers: Vec<Layer> = LAWS
         .into_iter()
         .zip(Colour::LINES)
@@ -316,15 +316,15 @@ fn panel(space: &str, rows: &[Row], (label, low, high): (&'static str, f64, f64)
             let at = |rate_hz: f64| {
                 let same = |r: &&Row| r.law == law && r.stiffness_n_m == k && r.space == space && r.rate_hz == rate_hz;
                 let worst = worst(rows.iter().filter(same).map(get));
-                (rate_hz, worst.max(low) + 0.0 * worst)
+                (rate_hz, worst.max(y.low) + 0.0 * worst)
             };
             let label = if k > 0.0 { format!("{law}, {k} N/m") } else { law.to_owned() };
             Layer { label, colour, mark: Mark::Line(RATES_HZ.into_iter().map(at).collect()) }
         })
         .collect();
-    let limit = if high > 1.0 { COMMON_MAX } else { DEPTH_MAX_M };
+    let limit = if y.high > 1.0 { COMMON_ENERGY_MAX } else { DEPTH_MAX_M };
     let ends = vec![(8.0, limit), (300.0, limit)];
     layers.push(Layer { label: "limit".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(ends) });
     let x = Axis::log("rate of the slow body, Hz", 8.0, 300.0);
-    Panel { title: format!("{space}: {label}"), x, y: Axis::log(label, low, high), layers }
+    Panel { title: format!("{space}: {}", y.label), x, y, layers }
 }

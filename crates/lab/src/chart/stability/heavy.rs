@@ -101,7 +101,7 @@ impl Experiment for Heavy {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "heavy-on-light";
-    const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, beside other engines";
+    const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, compared with other engines";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (tests, ratios) = if quick { (&TESTS[..], &RATIOS[2..]) } else { (&TESTS[..], &RATIOS[..]) };
@@ -117,9 +117,9 @@ impl Experiment for Heavy {
 
     fn measure(case: &Case) -> Row {
         let Case { test, ratio, rate_hz } = case.clone();
-        let went = if test.starts_with("stack") { stacked(case) } else { hung(case) };
-        let Went { value, aside_m, gain, led } =
-            went.unwrap_or(Went { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
+        let result = if test.starts_with("stack") { cube_stack(case) } else { hanging_chain(case) };
+        let MassRatioResult { value, aside_m, gain, led } =
+            result.unwrap_or(MassRatioResult { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
         let holds = if test.starts_with("stack") {
             value.abs() <= SINK_MAX_M && aside_m <= ASIDE_MAX_M
         } else {
@@ -168,9 +168,9 @@ impl Experiment for Heavy {
                 rows.iter().filter(fails).count() as f64,
                 0.0,
             ),
-            Finding::at_most("cases that fail at all", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
+            Finding::at_most("cases that fail", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
             Finding::at_most(
-                "cases that sink or stretch by more than 0.001 and more than the best",
+                "cases that sink or stretch by more than 0.001 and more than the best engine",
                 rows.iter().filter(worse).count() as f64,
                 0.0,
             ),
@@ -179,7 +179,7 @@ impl Experiment for Heavy {
 }
 
 /// The results of a stack or a chain.
-struct Went {
+struct MassRatioResult {
     value: f64,
     aside_m: f64,
     gain: f64,
@@ -194,7 +194,7 @@ fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
 }
 
 /// Stacks cubes a millimetre apart; the top one is heavier.
-fn stacked(case: &Case) -> Option<Went> {
+fn cube_stack(case: &Case) -> Option<MassRatioResult> {
     let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
     let ground = Obstacle {
         name: "floor".to_owned(),
@@ -213,20 +213,20 @@ fn stacked(case: &Case) -> Option<Went> {
         let spec = RigidSpec { friction: 0.5, gravity, obstacles: [ground.clone()].into(), ..plain };
         spawns.push(AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
     }
-    let mut company = LockstepRun::start(spawns).ok()?;
-    company.run_to(SECONDS);
-    let states: Vec<RigidState> = company.snapshots().iter().filter_map(|s| rigid(s)).collect();
+    let mut run = LockstepRun::start(spawns).ok()?;
+    run.run_to(SECONDS);
+    let states: Vec<RigidState> = run.snapshots().iter().filter_map(|s| rigid(s)).collect();
     let top = states.last()?.position.z;
-    Some(Went {
+    Some(MassRatioResult {
         value: f64::from(count) - 0.5 - top,
         aside_m: worst(states.iter().map(|s| s.position.truncate().length())),
         gain: 0.0,
-        led: company.steps().iter().filter(|(_, leader)| leader.is_some()).count(),
+        led: run.steps().iter().filter(|(_, leader)| leader.is_some()).count(),
     })
 }
 
 /// Hangs a chain from the origin, straight down or horizontal; the last link is heavier.
-fn hung(case: &Case) -> Option<Went> {
+fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
     let along = if case.test.ends_with("swing") { DVec3::X } else { DVec3::NEG_Z };
     let joint = |i: u32| Joint {
         anchor_a_m: DVec3::Z * HALF_LINK_M,
@@ -246,23 +246,23 @@ fn hung(case: &Case) -> Option<Went> {
         one.together = (i > 0).then_some(AgentId(0));
         spawns.push(one);
     }
-    let mut company = LockstepRun::start(spawns).ok()?;
-    let mut went = Went { value: 0.0, aside_m: 0.0, gain: 0.0, led: 0 };
+    let mut run = LockstepRun::start(spawns).ok()?;
+    let mut result = MassRatioResult { value: 0.0, aside_m: 0.0, gain: 0.0, led: 0 };
     let length = 2.0 * HALF_LINK_M * f64::from(LINKS);
     let scale = GRAVITY * length * (case.ratio + 0.5 * f64::from(LINKS - 1));
     let (mut start_j, mut t) = (None, 0.0);
     while t < SECONDS {
-        let snapshots = company.snapshots();
+        let snapshots = run.snapshots();
         let gap = gaps_m(&snapshots)?;
         let energy_j: f64 = snapshots.iter().map(|s| s.energy_j).sum();
         let start_j = *start_j.get_or_insert(energy_j);
-        went.value = worst([went.value, gap / length]);
-        went.gain = worst([went.gain, (energy_j - start_j) / scale]);
+        result.value = worst([result.value, gap / length]);
+        result.gain = worst([result.gain, (energy_j - start_j) / scale]);
         t += LOOK_S;
-        company.run_to(t);
+        run.run_to(t);
     }
-    went.led = company.steps().iter().filter(|(_, leader)| leader.is_some()).count();
-    Some(went)
+    result.led = run.steps().iter().filter(|(_, leader)| leader.is_some()).count();
+    Some(result)
 }
 
 /// Sum of the gaps of all joints, metres.
@@ -304,7 +304,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_case_has_the_others_beside_it() {
+    fn every_case_has_values_of_other_engines() {
         for case in Heavy::cases(false) {
             let here = |p: &&Peer| p.test == case.test && p.ratio == case.ratio && p.inv_dt == case.rate_hz;
             assert!(peers().iter().filter(here).count() >= 2, "{case:?}");

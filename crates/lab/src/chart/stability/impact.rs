@@ -61,7 +61,7 @@ impl Experiment for Impact {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "impact";
-    const TITLE: &'static str = "two balls of different clocks meet: velocities after the blow against the closed form";
+    const TITLE: &'static str = "impact of two balls on different clocks: velocities against the closed form";
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &[1.0, 10.0, 1000.0][..] } else { &MASS_RATIOS[..] };
@@ -76,9 +76,9 @@ impl Experiment for Impact {
     }
 
     fn measure(case: &Case) -> Row {
-        let met = meet(case).unwrap_or_default();
+        let result = collide(case).unwrap_or_default();
         let Case { restitution, mass_ratio, rates_hz: [rate_hitting_hz, rate_hit_hz] } = *case;
-        let Met { error, momentum_error, kind, steps: [steps_hitting, steps_hit], led } = met;
+        let ImpactResult { error, momentum_error, kind, steps: [steps_hitting, steps_hit], led } = result;
         Row {
             restitution,
             mass_ratio,
@@ -118,7 +118,7 @@ impl Experiment for Impact {
             let y = Axis::log("error of the velocity / closing speed", low, high);
             Panel { title: format!("e = {e}"), x, y, layers }
         });
-        Figure { title: "Two balls between two clocks".to_owned(), panels: panels.collect(), columns: 3 }
+        Figure { title: "Impact of two balls on two clocks".to_owned(), panels: panels.collect(), columns: 3 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -148,17 +148,17 @@ impl Experiment for Impact {
         let other = rows.iter().filter(|r| r.kind != PairKind::Ledger.name() || r.led).count();
         vec![
             Finding::at_most(
-                "velocities after the blow, error over the closing speed",
+                "velocities after the impact: error over the closing speed",
                 worst(rows.iter().map(|r| r.error)),
                 TOLERANCE,
             ),
-            Finding::at_most("pairs that met otherwise than by the ledger, or in one world", other as f64, 0.0),
+            Finding::at_most("pairs not coupled by the ledger, or stepped in one island", other as f64, 0.0),
         ]
     }
 }
 
 /// The results of a pair.
-struct Met {
+struct ImpactResult {
     error: f64,
     momentum_error: f64,
     kind: String,
@@ -166,13 +166,13 @@ struct Met {
     led: bool,
 }
 
-impl Default for Met {
+impl Default for ImpactResult {
     fn default() -> Self {
         Self { error: f64::NAN, momentum_error: f64::NAN, kind: String::new(), steps: [0; 2], led: false }
     }
 }
 
-fn meet(case: &Case) -> Option<Met> {
+fn collide(case: &Case) -> Option<ImpactResult> {
     let masses = [0.1, 0.1 * case.mass_ratio];
     let ball = |x: f64, speed: f64, mass: f64| {
         let plain = plain_body(Solid::Ball { radius_m: RADIUS_M }, DVec3::X * x, mass);
@@ -185,9 +185,9 @@ fn meet(case: &Case) -> Option<Met> {
         AgentSpawn::alone("hitting", Box::new(hitting), rate_hitting),
         AgentSpawn::alone("hit", Box::new(hit), rate_hit),
     ];
-    let mut company = LockstepRun::start(spawns).ok()?;
-    company.run_to(SECONDS);
-    let snapshots = company.snapshots();
+    let mut run = LockstepRun::start(spawns).ok()?;
+    run.run_to(SECONDS);
+    let snapshots = run.snapshots();
     let members = members(&snapshots);
     let at = SimTime::ZERO + SimSpan::from_secs_f64(SECONDS)?;
     let speeds = [settled(&members[0], &members, at)?.velocity, settled(&members[1], &members, at)?.velocity];
@@ -196,12 +196,12 @@ fn meet(case: &Case) -> Option<Met> {
     let error = speeds.iter().zip(closed).map(|(v, c)| v.distance(DVec3::X * (c * CLOSING_M_S)) / CLOSING_M_S);
     let momentum = speeds[0] * masses[0] + speeds[1] * masses[1];
     let pair = snapshots.iter().flat_map(|s| &s.pairs).next();
-    let fared = company.steps();
-    Some(Met {
+    let steps = run.steps();
+    Some(ImpactResult {
         error: worst(error),
         momentum_error: momentum.distance(DVec3::X * (masses[0] * CLOSING_M_S)) / (masses[0] * CLOSING_M_S),
         kind: pair.map_or_else(String::new, |pair| pair.kind.name().to_owned()),
-        steps: [fared.first()?.0, fared.get(1)?.0],
-        led: fared.iter().any(|(_, leader)| leader.is_some()),
+        steps: [steps.first()?.0, steps.get(1)?.0],
+        led: steps.iter().any(|(_, leader)| leader.is_some()),
     })
 }

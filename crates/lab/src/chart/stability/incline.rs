@@ -52,7 +52,7 @@ impl Experiment for Incline {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "incline";
-    const TITLE: &'static str = "a box and a tube on a slope: where they begin to slide, μ = 0.3";
+    const TITLE: &'static str = "box and tube on a slope: angle at which sliding begins, μ = 0.3";
 
     fn cases(quick: bool) -> Vec<Case> {
         let slopes = if quick { &QUICK_SLOPES[..] } else { &SLOPES[..] };
@@ -81,7 +81,8 @@ impl Experiment for Incline {
             layers.push(Layer { label: body.to_owned(), colour, mark: Mark::Dots(points.collect()) });
         }
         let (low, high) = span(theory.iter().map(|p| p.1), false);
-        let (x, y) = (Axis::linear("tan(angle)/μ", 0.89, 1.11), Axis::linear("way in the first second, mm", low, high));
+        let (x, y) =
+            (Axis::linear("tan(angle)/μ", 0.89, 1.11), Axis::linear("displacement in the first second, mm", low, high));
         let panel = Panel { title: String::new(), x, y, layers };
         Figure { title: "On a slope, μ = 0.3".to_owned(), panels: vec![panel], columns: 1 }
     }
@@ -103,7 +104,7 @@ impl Experiment for Incline {
             let stuck_above = here().filter(|r| !slides(r)).map(|r| r.slope - 1.0);
             let off = worst(slid_below.chain(stuck_above).chain([0.0]));
             Finding::at_most(
-                format!("{body}: stick and slip change at tan(angle) = μ, relative error below"),
+                format!("{body}: transition from stick to slip at tan(angle) = μ, relative error"),
                 off,
                 TOLERANCE * 0.999,
             )

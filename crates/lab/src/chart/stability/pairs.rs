@@ -5,6 +5,7 @@ use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::scenes::{Scene, WITH_TUBES, scene};
 use super::super::table::Table;
+use super::common::COMMON_ENERGY_MAX;
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -17,7 +18,6 @@ const FAST_HZ: f64 = 1000.0;
 const SECONDS: f64 = 2.5;
 /// From here on everything is at rest.
 const REST_S: f64 = 2.0;
-const COMMON_MAX: f64 = 1.01;
 const DEPTH_MAX_M: f64 = 0.005;
 
 /// A scene, the ratio of its clocks, and which agent has the fast one.
@@ -49,7 +49,7 @@ impl Experiment for Pairs {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "tubes";
-    const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, clocks 1:1 to 1:100";
+    const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, step rates 1:1 to 1:100";
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &RATIOS[3..4] } else { &RATIOS[..] };
@@ -67,7 +67,7 @@ impl Experiment for Pairs {
     fn measure(case: &Case) -> Row {
         let Case { scene, ratio, first_is_fast } = case.clone();
         let slow_hz = FAST_HZ / ratio;
-        let [peak, depth_m, creep_m_s, contacts] = lie(case, slow_hz).unwrap_or([f64::NAN; 4]);
+        let [peak, depth_m, creep_m_s, contacts] = settle_pair(case, slow_hz).unwrap_or([f64::NAN; 4]);
         Row { scene, ratio, first_is_fast, slow_hz, peak, depth_m, creep_m_s, contacts: contacts as u32 }
     }
 
@@ -91,17 +91,17 @@ impl Experiment for Pairs {
             layers.push(Layer { label: "limit".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(ends) });
             Panel {
                 title: String::new(),
-                x: Axis::log("ratio of the clocks", 0.8, 125.0),
+                x: Axis::log("ratio of step rates", 0.8, 125.0),
                 y: Axis::log(label, low, high),
                 layers,
             }
         };
         let panels = vec![
-            panel("peak energy / start, at a common time", (0.5, 100.0), COMMON_MAX, |r| r.peak),
+            panel("peak energy / start, at a common time", (0.5, 100.0), COMMON_ENERGY_MAX, |r| r.peak),
             panel("overlap at rest, m", (1e-7, 0.1), DEPTH_MAX_M, |r| r.depth_m),
             panel("creep at rest, m/s", (1e-7, 1.0), 1e-3, |r| r.creep_m_s),
         ];
-        Figure { title: "Tubes between two clocks, the faster at 1 kHz".to_owned(), panels, columns: 3 }
+        Figure { title: "Tubes coupled across two clocks, the faster at 1 kHz".to_owned(), panels, columns: 3 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -125,18 +125,18 @@ impl Experiment for Pairs {
         let apart = rows.iter().filter(|r| r.contacts == 0).count() as f64;
         vec![
             Finding::at_most(
-                "peak energy at a common time, in that of the start",
+                "peak energy at a common time over the start's",
                 worst(rows.iter().map(|r| r.peak)),
-                COMMON_MAX,
+                COMMON_ENERGY_MAX,
             ),
             Finding::at_most("overlap at rest at 50 Hz and more, m", worst(at_60), DEPTH_MAX_M),
-            Finding::at_most("pairs that do not touch at the end", apart, 0.0),
+            Finding::at_most("pairs without contact at the end", apart, 0.0),
         ]
     }
 }
 
 /// Peak, depth, creep, contacts.
-fn lie(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
+fn settle_pair(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
     let rates_hz = if case.first_is_fast { [FAST_HZ, slow_hz] } else { [slow_hz, FAST_HZ] };
     let Scene { play, points, zero_j } = scene(&case.scene, rates_hz, Faults::default())?;
     let start_j = play.raw_j() - zero_j;

@@ -57,7 +57,7 @@ impl Experiment for PenaltyLimit {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "penalty-limit";
-    const TITLE: &'static str = "how stiff a penalty contact from stale states may be, beside 0.55 μ/τ²";
+    const TITLE: &'static str = "stability limit of penalty contact from stale states, compared with 0.55 μ/τ²";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (rates, halvings) = if quick { (&RATES_HZ[2..3], 8) } else { (&RATES_HZ[..], HALVINGS) };
@@ -69,7 +69,7 @@ impl Experiment for PenaltyLimit {
         let [mut low, mut high] = STIFFNESS_N_M.map(libm::log);
         for _ in 0..case.halvings {
             let middle = 0.5 * (low + high);
-            if dies_away(case, libm::exp(middle)) { low = middle } else { high = middle }
+            if decays(case, libm::exp(middle)) { low = middle } else { high = middle }
         }
         let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
         let tau_s = 0.5 / case.rate_hz;
@@ -97,7 +97,11 @@ impl Experiment for PenaltyLimit {
         }
         let (x, y) = (Axis::log("rate of the slow body, Hz", 8.0, 300.0), Axis::log("stiffest contact, N/m", 0.5, 1e5));
         let panel = Panel { title: String::new(), x, y, layers };
-        Figure { title: "Penalty from stale states is stable below".to_owned(), panels: vec![panel], columns: 1 }
+        Figure {
+            title: "Stability limit of penalty contact from stale states".to_owned(),
+            panels: vec![panel],
+            columns: 1,
+        }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -112,14 +116,15 @@ impl Experiment for PenaltyLimit {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let factor = |r: &Row| (r.measured_n_m / r.theory_n_m).max(r.theory_n_m / r.measured_n_m);
         let apart = worst(rows.iter().map(factor));
-        vec![Finding::at_most("measured limit and 0.55 μ/τ², τ = H/2, apart by a factor", apart, APART_MAX)]
+        vec![Finding::at_most("measured limit over 0.55 μ/τ², τ = H/2, or its inverse", apart, APART_MAX)]
     }
 }
 
 /// Whether the motion decays at this stiffness.
-fn dies_away(case: &Case, stiffness_n_m: f64) -> bool {
+fn decays(case: &Case, stiffness_n_m: f64) -> bool {
     let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
-    let set = pair("1d", law, case.rate_hz, (Faults { seed: 1, due: true, ..Faults::default() }, FALL_M));
+    let faults = Faults { seed: 1, due: true, ..Faults::default() };
+    let set = pair("1d", law, case.rate_hz, faults, FALL_M);
     let Some(Pair { play, zero_j, .. }) = set else { return false };
     let start_j = play.raw_j() - zero_j;
     // under the weight springs and contact sag below the zero of energy: energy above it is kinetic

@@ -108,7 +108,7 @@ impl Experiment for TubeMap {
 
     fn figure(rows: &[Row]) -> Figure {
         let panels = Integrator::ALL.into_iter().map(|integrator| panel(integrator.name(), rows)).collect();
-        Figure { title: "A clamped tube let go from the horizontal, 6 s".to_owned(), panels, columns: 3 }
+        Figure { title: "Clamped tube released from the horizontal, 6 s".to_owned(), panels, columns: 3 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -153,8 +153,12 @@ impl Experiment for TubeMap {
         let bad = rows.iter().filter(|r| implicit.contains(&r.integrator.as_str()) && r.verdict != Verdict::Stable);
         let unsaid = rows.iter().filter(|r| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp));
         vec![
-            Finding::at_most("implicit methods: squares of the map that are not stable", bad.count() as f64, 0.0),
-            Finding::at_most("all methods: squares that fail without a word beforehand", unsaid.count() as f64, 0.0),
+            Finding::at_most("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
+            Finding::at_most(
+                "all methods: cells that fail without being refused beforehand",
+                unsaid.count() as f64,
+                0.0,
+            ),
         ]
     }
 }
@@ -237,7 +241,7 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
     };
     let (young, dt) = (edges(|r| r.young_pa), edges(|r| r.dt_ms));
     let cell = |r: &Row| {
-        let ([a, b], [c, d]) = (around(&young, r.young_pa), around(&dt, r.dt_ms));
+        let ([a, b], [c, d]) = (cell_bounds(&young, r.young_pa), cell_bounds(&dt, r.dt_ms));
         [a, b, c, d]
     };
     let squares = |label: &str, colour, verdict| Layer {
@@ -255,14 +259,15 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
     ];
     let axis = |label, values: &[f64]| {
         let ends = |v: Option<&f64>| v.copied().unwrap_or(1.0);
-        let ([low, _], [_, high]) = (around(values, ends(values.first())), around(values, ends(values.last())));
+        let ([low, _], [_, high]) =
+            (cell_bounds(values, ends(values.first())), cell_bounds(values, ends(values.last())));
         Axis::log(label, low, high)
     };
     Panel { title: integrator.to_owned(), x: axis("Young's modulus, Pa", &young), y: axis("dt, ms", &dt), layers }
 }
 
 /// The range of a value's square: half way to its neighbours, in ratios.
-fn around(values: &[f64], value: f64) -> [f64; 2] {
+fn cell_bounds(values: &[f64], value: f64) -> [f64; 2] {
     let k = values.iter().position(|v| *v == value).unwrap_or(0);
     let up = values.get(k + 1).map(|next| (next / value).sqrt());
     let down = k.checked_sub(1).and_then(|k| values.get(k)).map(|last| (value / last).sqrt());

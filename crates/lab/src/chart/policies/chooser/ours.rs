@@ -3,7 +3,7 @@
 //! In: things in view, measured times. Out: levels with a prediction and a certificate. Never here: its arithmetic.
 
 use super::{Choice, Chooser, Pick, Time};
-use crate::chart::policies::scene::{Scene, Seen};
+use crate::chart::policies::scene::{Scene, VisibleObject};
 use metachron_lod::adaptive;
 use metachron_lod::adaptive::{Adaptive, Offer, Settings};
 
@@ -24,11 +24,11 @@ impl Default for Ours {
 }
 
 impl Chooser for Ours {
-    fn choose(&mut self, frame: u64, scene: &Scene, seen: &[Seen], time: Time) -> Choice {
-        self.meet(scene, seen);
+    fn choose(&mut self, frame: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
+        self.update_objects(scene, seen);
         let fixed = time.target - time.drawing();
         let plan = self.adaptive.choose(frame, adaptive::Time { target: TICKS * time.target, fixed: TICKS * fixed });
-        let picks = seen.iter().map(|s| Pick::whole(self.adaptive.level(s.thing as u64))).collect();
+        let picks = seen.iter().map(|s| Pick::whole(self.adaptive.level(s.object as u64))).collect();
         Choice { picks, predicted: plan.predicted / TICKS, gap: plan.gap() }
     }
 
@@ -40,18 +40,18 @@ impl Chooser for Ours {
 }
 
 impl Ours {
-    fn meet(&mut self, scene: &Scene, seen: &[Seen]) {
+    fn update_objects(&mut self, scene: &Scene, seen: &[VisibleObject]) {
         let Self { adaptive, present, offers } = self;
-        for gone in present.iter().filter(|thing| seen.binary_search_by_key(*thing, |s| s.thing).is_err()) {
+        for gone in present.iter().filter(|object| seen.binary_search_by_key(*object, |s| s.object).is_err()) {
             adaptive.remove(*gone as u64);
         }
         for s in seen {
             offers.clear();
             offers.extend(s.levels.iter().map(|&(cost, gain)| Offer { cost: TICKS * cost, gain }));
-            adaptive.set(s.thing as u64, 0, false, offers);
-            adaptive.weigh(s.thing as u64, s.pixels * scene.things[s.thing].importance);
+            adaptive.set(s.object as u64, 0, false, offers);
+            adaptive.weigh(s.object as u64, s.pixels * scene.objects[s.object].importance);
         }
         present.clear();
-        present.extend(seen.iter().map(|s| s.thing));
+        present.extend(seen.iter().map(|s| s.object));
     }
 }

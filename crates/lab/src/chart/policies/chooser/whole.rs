@@ -3,7 +3,7 @@
 //! In: things in view. Out: levels. Never here: parts of a level, any state but a threshold.
 
 use super::{Choice, Chooser, MARGIN, Pick, Time};
-use crate::chart::policies::scene::{Scene, Seen};
+use crate::chart::policies::scene::{Scene, VisibleObject};
 use metachron_lod::select::threshold;
 use metachron_lod::select::threshold::Feedback;
 use metachron_lod::select::{Entry, Mode, Problem, Selection, funkhouser, marginal};
@@ -12,22 +12,22 @@ use metachron_lod::select::{Entry, Mode, Problem, Selection, funkhouser, margina
 const BENEFIT: f64 = 1000.0;
 
 /// The knapsack of a frame: `budget` in microseconds, costs in nanoseconds.
-pub(in super::super) fn problem(scene: &Scene, seen: &[Seen], budget: f64) -> Problem {
+pub(in super::super) fn problem(scene: &Scene, seen: &[VisibleObject], budget: f64) -> Problem {
     let mut problem = Problem::new(Mode::ExactlyOne, (1e3 * budget) as i64);
     for s in seen {
-        let weight = BENEFIT * s.pixels * scene.things[s.thing].importance;
+        let weight = BENEFIT * s.pixels * scene.objects[s.object].importance;
         let entries: Vec<_> = s.levels.iter().map(|(c, g)| Entry::measured(1e3 * c, weight * g, 0.0).0).collect();
-        problem.push(s.thing as u64, &entries);
+        problem.push(s.object as u64, &entries);
     }
     problem
 }
 
 /// The benefit of a choice, in the unit of [`problem`].
-pub(in super::super) fn worth(scene: &Scene, seen: &[Seen], picks: &[Pick]) -> f64 {
-    let of = |(s, p): (&Seen, &Pick)| {
-        let thing = &scene.things[s.thing];
-        let gain = p.level.map_or(0.0, |l| thing.forms[l as usize].gain(p.part, s.pixels));
-        BENEFIT * s.pixels * thing.importance * gain
+pub(in super::super) fn benefit(scene: &Scene, seen: &[VisibleObject], picks: &[Pick]) -> f64 {
+    let of = |(s, p): (&VisibleObject, &Pick)| {
+        let object = &scene.objects[s.object];
+        let gain = p.level.map_or(0.0, |l| object.forms[l as usize].gain(p.part, s.pixels));
+        BENEFIT * s.pixels * object.importance * gain
     };
     seen.iter().zip(picks).map(of).sum()
 }
@@ -36,8 +36,8 @@ pub(in super::super) fn worth(scene: &Scene, seen: &[Seen], picks: &[Pick]) -> f
 pub(super) struct Full;
 
 impl Chooser for Full {
-    fn choose(&mut self, _: u64, _: &Scene, seen: &[Seen], time: Time) -> Choice {
-        let finest = |s: &Seen| Pick::whole((s.levels.len() as u32).checked_sub(1));
+    fn choose(&mut self, _: u64, _: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
+        let finest = |s: &VisibleObject| Pick::whole((s.levels.len() as u32).checked_sub(1));
         let predicted = time.frame(Scene::full(seen));
         Choice { picks: seen.iter().map(finest).collect(), predicted, gap: f64::NAN }
     }
@@ -47,7 +47,7 @@ impl Chooser for Full {
 pub(super) struct Static(pub(super) f64);
 
 impl Chooser for Static {
-    fn choose(&mut self, _: u64, scene: &Scene, seen: &[Seen], _: Time) -> Choice {
+    fn choose(&mut self, _: u64, scene: &Scene, seen: &[VisibleObject], _: Time) -> Choice {
         by_size(scene, seen, self.0)
     }
 }
@@ -57,7 +57,7 @@ impl Chooser for Static {
 pub(super) struct Threshold(Feedback);
 
 impl Chooser for Threshold {
-    fn choose(&mut self, _: u64, scene: &Scene, seen: &[Seen], _: Time) -> Choice {
+    fn choose(&mut self, _: u64, scene: &Scene, seen: &[VisibleObject], _: Time) -> Choice {
         by_size(scene, seen, self.0.threshold_px())
     }
 
@@ -66,11 +66,11 @@ impl Chooser for Threshold {
     }
 }
 
-fn by_size(scene: &Scene, seen: &[Seen], threshold_px: f64) -> Choice {
+fn by_size(scene: &Scene, seen: &[VisibleObject], threshold_px: f64) -> Choice {
     let mut polygons = Vec::new();
-    let mut level = |s: &Seen| {
+    let mut level = |s: &VisibleObject| {
         polygons.clear();
-        polygons.extend(scene.things[s.thing].forms.iter().map(|f| f.polygons as u32));
+        polygons.extend(scene.objects[s.object].forms.iter().map(|f| f.polygons as u32));
         Pick::whole(threshold::level(s.pixels, &polygons, threshold_px))
     };
     Choice { picks: seen.iter().map(&mut level).collect(), predicted: f64::NAN, gap: f64::NAN }
@@ -80,9 +80,9 @@ fn by_size(scene: &Scene, seen: &[Seen], threshold_px: f64) -> Choice {
 pub(super) struct Greedy;
 
 impl Chooser for Greedy {
-    fn choose(&mut self, _: u64, scene: &Scene, seen: &[Seen], time: Time) -> Choice {
+    fn choose(&mut self, _: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
         let budget = time.drawing_within(MARGIN);
-        told(funkhouser::greedy(&problem(scene, seen, budget), funkhouser::Scan::Skip), time)
+        choice_of(funkhouser::greedy(&problem(scene, seen, budget), funkhouser::Scan::Skip), time)
     }
 }
 
@@ -90,13 +90,13 @@ impl Chooser for Greedy {
 pub(super) struct Marginal;
 
 impl Chooser for Marginal {
-    fn choose(&mut self, _: u64, scene: &Scene, seen: &[Seen], time: Time) -> Choice {
+    fn choose(&mut self, _: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
         let budget = time.drawing_within(MARGIN);
-        told(marginal::marginal(&problem(scene, seen, budget), marginal::Fit::Fill), time)
+        choice_of(marginal::marginal(&problem(scene, seen, budget), marginal::Fit::Fill), time)
     }
 }
 
-fn told(selection: Selection, time: Time) -> Choice {
+fn choice_of(selection: Selection, time: Time) -> Choice {
     let gap = selection.gap();
     let predicted = time.frame(1e-3 * selection.cost as f64);
     Choice { picks: selection.levels.into_iter().map(Pick::whole).collect(), predicted, gap }

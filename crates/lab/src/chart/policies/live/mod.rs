@@ -30,8 +30,7 @@ impl<const P: usize> Experiment for Live<P> {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = PLAYS[P].paper.name();
-    const TITLE: &'static str =
-        "the papers' scene on this adapter: who keeps to the time, and how like full detail it looks";
+    const TITLE: &'static str = "the papers' scene on this adapter: frame-time control and similarity to full detail";
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -64,7 +63,7 @@ impl<const P: usize> Experiment for Live<P> {
         vec![
             Finding::at_most("adaptive: longest frame / T", of(|row| row.max), 1.3),
             Finding::at_most("adaptive: stddev / T of binding frames", of(|row| row.binding_stddev), 0.08),
-            Finding::at_most("adaptive: objects left out, to an object and frame", of(|row| row.holes), 0.0),
+            Finding::at_most("adaptive: objects left out per object and frame", of(|row| row.holes), 0.0),
         ]
     }
 }

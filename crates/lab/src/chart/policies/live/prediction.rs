@@ -7,9 +7,9 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use super::super::machine::Noise;
+use super::super::machine::RandomSource;
 use super::super::played::walk;
-use super::super::played::walk::Predicted;
+use super::super::played::walk::{PathPoint, Predicted};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -58,9 +58,11 @@ pub(in super::super::super) struct Row {
 
 impl Row {
     fn of(case: &Case, adapter: String, pictures: &[Predicted]) -> Self {
-        let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.told_ms, *p.took_ms.first()?))).collect();
-        let factor = quantile(pairs.iter().map(|(told, took)| took / told).collect(), 0.5);
-        let errors = |by: f64| pairs.iter().map(|(told, took)| (by * told / took - 1.0).abs()).collect::<Vec<_>>();
+        let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.predicted_ms, *p.measured_ms.first()?))).collect();
+        let factor = quantile(pairs.iter().map(|(predicted, measured)| measured / predicted).collect(), 0.5);
+        let errors = |by: f64| {
+            pairs.iter().map(|(predicted, measured)| (by * predicted / measured - 1.0).abs()).collect::<Vec<_>>()
+        };
         let plain = errors(1.0);
         Self {
             scene: case.scene.clone(),
@@ -72,7 +74,11 @@ impl Row {
             scaled_error95: quantile(errors(factor), 0.95),
             factor,
             scatter95: scatter95(pictures),
-            pairs: pairs.iter().map(|(told, took)| format!("{told:.3}:{took:.3}")).collect::<Vec<_>>().join(" "),
+            pairs: pairs
+                .iter()
+                .map(|(predicted, measured)| format!("{predicted:.3}:{measured:.3}"))
+                .collect::<Vec<_>>()
+                .join(" "),
         }
     }
 
@@ -85,8 +91,8 @@ impl Row {
 /// Deviation from their median that 19 of 20 times of the same picture keep.
 fn scatter95(pictures: &[Predicted]) -> f64 {
     let about = |picture: &Predicted| {
-        let middle = quantile(picture.took_ms.clone(), 0.5);
-        picture.took_ms.iter().map(|took| (took / middle - 1.0).abs()).collect::<Vec<_>>()
+        let middle = quantile(picture.measured_ms.clone(), 0.5);
+        picture.measured_ms.iter().map(|measured| (measured / middle - 1.0).abs()).collect::<Vec<_>>()
     };
     quantile(pictures.iter().flat_map(about).collect(), 0.95)
 }
@@ -100,7 +106,7 @@ impl Experiment for Prediction {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "prediction";
-    const TITLE: &'static str = "what pictures were to take by the adapter's prices, and took";
+    const TITLE: &'static str = "predicted and measured drawing times, by the adapter's cost model";
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -113,14 +119,14 @@ impl Experiment for Prediction {
     }
 
     fn measure(case: &Case) -> Row {
-        let mut noise = Noise::new(SEED);
+        let mut noise = RandomSource::new(SEED);
         let (low, high) = TARGETS_S;
-        let mut places = || (noise.uniform(), low * libm::pow(high / low, noise.uniform()));
-        let asked: Vec<_> = (0..case.pictures).map(|_| places()).collect();
+        let mut point = || PathPoint { part: noise.uniform(), target_s: low * libm::pow(high / low, noise.uniform()) };
+        let asked: Vec<_> = (0..case.pictures).map(|_| point()).collect();
         let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
         let policy = PRICES.into_iter().find(|(name, _)| *name == case.prices).map(|(_, policy)| policy);
-        let told = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, (&asked, TIMES)).ok());
-        let (adapter, pictures) = told.unwrap_or_default();
+        let predicted = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, &asked, TIMES).ok());
+        let (adapter, pictures) = predicted.unwrap_or_default();
         Row::of(case, adapter, &pictures)
     }
 
@@ -130,12 +136,12 @@ impl Experiment for Prediction {
 
     fn figure(rows: &[Row]) -> Figure {
         let adapter = rows.first().map_or("", |row| &row.adapter);
-        let (low, high) = span(rows.iter().flat_map(Row::pairs).flat_map(|(told, took)| [told, took]), true);
+        let (low, high) =
+            span(rows.iter().flat_map(Row::pairs).flat_map(|(predicted, measured)| [predicted, measured]), true);
         let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
         let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
         let panel = |prices: &str| {
-            let mut layers =
-                vec![grey("as told, and ten per cent off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
+            let mut layers = vec![grey("exact, and 10 % off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
             let here = rows.iter().filter(|row| row.prices == prices);
             layers.extend(here.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
                 label: row.scene.clone(),
@@ -143,7 +149,7 @@ impl Experiment for Prediction {
                 mark: Mark::Dots(row.pairs()),
             }));
             let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
-            Panel { title: format!("prices by {prices}"), x, y, layers }
+            Panel { title: format!("cost model: {prices}"), x, y, layers }
         };
         let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
         Figure { title, panels: PRICES.map(|(prices, _)| panel(prices)).to_vec(), columns: 2 }
@@ -172,8 +178,8 @@ impl Experiment for Prediction {
         let all = |of: fn(&Row) -> f64| worst(by_areas().map(of));
         vec![
             Finding::at_most("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
-            Finding::at_most("the same with one factor a scene", all(|r| r.scaled_error95), WANTED),
-            Finding::at_most("19 of 20 times of one and the same picture: scatter", all(|r| r.scatter95), WANTED),
+            Finding::at_most("the same with one factor per scene", all(|r| r.scaled_error95), WANTED),
+            Finding::at_most("19 of 20 drawings of the same picture: scatter", all(|r| r.scatter95), WANTED),
         ]
     }
 }
@@ -183,11 +189,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_machine_that_is_a_third_slower_than_its_prices_is_told_from_one_that_errs() {
+    fn a_uniformly_slower_machine_is_distinguished_from_prediction_errors() {
         let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
-        let took = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
-        let picture =
-            |k: u32| Predicted { told_ms: f64::from(k), took_ms: vec![took(k), 0.98 * took(k), 1.01 * took(k)] };
+        let measured = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
+        let picture = |k: u32| Predicted {
+            predicted_ms: f64::from(k),
+            measured_ms: vec![measured(k), 0.98 * measured(k), 1.01 * measured(k)],
+        };
         let row = Row::of(&case, String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
         assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
         assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");

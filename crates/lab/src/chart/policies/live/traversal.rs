@@ -44,7 +44,7 @@ impl Experiment for Traversal {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "traversal";
-    const TITLE: &'static str = "how fast the triangles of a cut are found, by resolution";
+    const TITLE: &'static str = "traversal speed of a cut's triangles, by resolution";
     const ALONE: bool = true;
 
     fn cases(_: bool) -> Vec<Case> {
@@ -76,7 +76,7 @@ impl Experiment for Traversal {
         let layers = vec![Layer { label: String::new(), colour: Colour::Blue, mark: Mark::Line(line) }];
         let (x, y) = (
             Axis::log("triangles of the cut / all", low, high),
-            Axis::log("millions of triangles a second", least, most),
+            Axis::log("millions of triangles per second", least, most),
         );
         let title = "Traversal of a mesh of 100,000 triangles (GB99)".to_owned();
         let of = "the whole mesh, at 1, is a plain list".to_owned();
@@ -94,10 +94,6 @@ impl Experiment for Traversal {
         // in the full mesh no vertex is replaced by a substitute
         let cuts = || rows.iter().filter(|row| row.asked < TRIANGLES).map(|row| row.rate);
         let spread = worst(cuts()) / cuts().reduce(f64::min).unwrap_or(f64::NAN);
-        vec![Finding::at_most(
-            "triangles a second of the fastest cut over the slowest, the full mesh left out",
-            spread,
-            4.0,
-        )]
+        vec![Finding::at_most("triangles per second, fastest over slowest cut, without the full mesh", spread, 4.0)]
     }
 }

@@ -8,7 +8,7 @@ use super::super::super::experiment::{Experiment, Finding};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, headings};
 use super::super::super::table::Table;
 use super::super::played::walk;
-use super::super::played::walk::{Still, Stood};
+use super::super::played::walk::{Still, StillRequest};
 use metachron_render::{PictureFile, psnr_db, ssim};
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -91,8 +91,8 @@ fn drawn(case: &Case, target_s: f64) -> Option<Arc<Still>> {
         return Some(Arc::clone(still));
     }
     let view = VIEWS.iter().find(|view| view.name == case.view)?;
-    let stood = Stood { part: view.part, target_s, frames: case.frames };
-    let still = Arc::new(walk::still(view.paper, &case.policy, stood).ok()?);
+    let request = StillRequest { part: view.part, target_s, frames: case.frames };
+    let still = Arc::new(walk::still(view.paper, &case.policy, request).ok()?);
     known().push((case.clone(), Arc::clone(&still)));
     Some(still)
 }
@@ -115,7 +115,7 @@ impl Experiment for Views {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "views";
-    const TITLE: &'static str = "what policies make of one view: triangles, likeness to full detail, pictures";
+    const TITLE: &'static str = "one view by every policy: triangles, similarity to full detail, pictures";
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
@@ -164,7 +164,7 @@ impl Experiment for Views {
             let y = Axis::linear("SSIM against full detail", (least - 0.02).max(0.0), 1.005);
             Panel { title: view.name.to_owned(), x, y, layers: dots.collect() }
         };
-        let title = "Triangles and likeness of one view (FS93, fig. 10 and 11)".to_owned();
+        let title = "Triangles and similarity of one view (FS93, fig. 10 and 11)".to_owned();
         Figure { title, panels: VIEWS.iter().map(panel).collect(), columns: VIEWS.len() }
     }
 
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quick_run_draws_less_of_the_same_and_no_run_takes_the_rows_of_the_other() {
+    fn quick_and_full_runs_do_not_share_rows() {
         let (long, quick) = (Views::cases(false), Views::cases(true));
         assert_eq!(long.len(), quick.len());
         assert!(long.iter().zip(&quick).all(|(long, quick)| quick.frames < long.frames && quick.view == long.view));

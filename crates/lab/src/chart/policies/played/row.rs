@@ -23,9 +23,9 @@ pub(super) struct Played<'a> {
 impl Played<'_> {
     pub(super) fn row(&self) -> Row {
         let Self { scene, policy, adapter, target_ms, frames, full_ms, likeness } = *self;
-        let told: Vec<Frame> =
+        let frames_of_row: Vec<Frame> =
             frames.iter().zip(full_ms).map(|(row, full)| frame(row, full / target_ms, target_ms)).collect();
-        let times = told.iter().map(|f| format!("{:.3}", f.time)).collect::<Vec<_>>().join(" ");
+        let times = frames_of_row.iter().map(|f| format!("{:.3}", f.time)).collect::<Vec<_>>().join(" ");
         let column = |of: fn(&(f64, f64)) -> f64| likeness.iter().map(of).collect::<Vec<_>>();
         Row {
             adapter: adapter.to_owned(),
@@ -34,7 +34,7 @@ impl Played<'_> {
             ssim_least: column(|l| l.0).into_iter().reduce(f64::min).unwrap_or(f64::NAN),
             psnr_db: mean(&column(|l| l.1)),
             times,
-            ..Row::of(scene, policy, &[told])
+            ..Row::of(scene, policy, &[frames_of_row])
         }
     }
 }
@@ -52,7 +52,7 @@ fn frame(row: &FrameRecord, full: f64, target_ms: f64) -> Frame {
         predicted: row.predicted_ms.map_or(f64::NAN, |ms| ms / target_ms),
         gap: row.value_over_bound.map_or(f64::NAN, |part| 1.0 - part),
         quality: row.value_over_bound.unwrap_or(f64::NAN),
-        things: row.objects as usize,
+        objects: row.objects as usize,
         holes: row.holes as usize,
         changes: row.changes as usize,
         reversals: row.reversals as usize,

@@ -12,7 +12,7 @@ use metachron_lod::control::Policy;
 use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
 use metachron_scene::papers::{Choices, Paper};
 use metachron_scene::{Source, load};
-use metachron_session::{Drawing, FrameRecord, Walk};
+use metachron_session::{Drawing, FlyThrough, FrameRecord};
 use std::sync::{Arc, Mutex, PoisonError};
 
 const SIZE: Size = Size { width: 640, height: 480 };
@@ -52,14 +52,14 @@ const LEAD_IN: usize = 20;
 pub(in super::super) const ALIKE_DB: f64 = 99.0;
 
 /// A walk that has been played.
-struct Walked {
+struct PlayedPath {
     adapter: String,
     frames: Vec<FrameRecord>,
     pictures: Vec<PictureFile>,
 }
 
 /// Full detail of a scene in so many frames.
-type Reference = (&'static str, usize, Times, Arc<Walked>);
+type Reference = (&'static str, usize, Times, Arc<PlayedPath>);
 
 static REFERENCES: Mutex<Vec<Reference>> = Mutex::new(Vec::new());
 
@@ -78,10 +78,10 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     let measured = reference(shown, case.frames, times).and_then(|full| {
         let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
         let full_itself = case.policy == "full";
-        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(shown, case, (target_s, times))?) };
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(played(shown, case, target_s, times)?) };
         Ok((full, own, target_s))
     });
-    let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
+    let (full, own, target_s) = measured.unwrap_or_else(|_| (empty_path(), empty_path(), f64::NAN));
     let pairs = own.pictures.iter().zip(&full.pictures);
     let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
     let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
@@ -97,89 +97,96 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     played.row()
 }
 
-fn nothing() -> Arc<Walked> {
-    Arc::new(Walked { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
+fn empty_path() -> Arc<PlayedPath> {
+    Arc::new(PlayedPath { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
 }
 
-fn mean_ms(walked: &Walked) -> f64 {
-    walked.frames.iter().map(|row| row.frame_ms).sum::<f64>() / walked.frames.len() as f64
+fn mean_ms(played: &PlayedPath) -> f64 {
+    played.frames.iter().map(|row| row.frame_ms).sum::<f64>() / played.frames.len() as f64
 }
 
 /// Full detail of a scene, played if it was not yet.
-fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
+fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<Arc<PlayedPath>> {
     let mut known = REFERENCES.lock().unwrap_or_else(PoisonError::into_inner);
     let here = |r: &&Reference| (r.0, r.1, r.2) == (shown.name, frames, times);
-    if let Some((.., walked)) = known.iter().find(here) {
-        return Ok(Arc::clone(walked));
+    if let Some((.., played)) = known.iter().find(here) {
+        return Ok(Arc::clone(played));
     }
     let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
     // the target has no effect on full detail
-    let full = Arc::new(walked(shown, &case, (1.0, times))?);
+    let full = Arc::new(played(shown, &case, 1.0, times)?);
     known.push((shown.name, frames, times, Arc::clone(&full)));
     Ok(full)
 }
 
-fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
-    let (adapter, mut walk) = opened((shown.name, shown.text), times)?;
-    let control = walk.session().control();
+fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow::Result<PlayedPath> {
+    let (adapter, mut fly_through) = opened(shown.name, shown.text, times)?;
+    let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
     for _ in 0..LEAD_IN {
-        walk.step(0.0)?;
+        fly_through.step(0.0)?;
     }
-    let mut walked = Walked { adapter, frames: Vec::with_capacity(case.frames), pictures: Vec::new() };
+    let mut played = PlayedPath { adapter, frames: Vec::with_capacity(case.frames), pictures: Vec::new() };
     for frame in 0..case.frames {
-        walked.frames.push(walk.step(frame as f64 / case.frames as f64)?);
+        played.frames.push(fly_through.step(frame as f64 / case.frames as f64)?);
         if frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
-            walked.pictures.extend(walk.picture()?);
+            played.pictures.extend(fly_through.picture()?);
         }
     }
-    Ok(walked)
+    Ok(played)
 }
 
 /// Predicted time of one picture, and its time at each drawing, milliseconds.
 pub(in super::super) struct Predicted {
-    pub(in super::super) told_ms: f64,
-    pub(in super::super) took_ms: Vec<f64>,
+    pub(in super::super) predicted_ms: f64,
+    pub(in super::super) measured_ms: Vec<f64>,
 }
 
 /// Frames until a picture is final: meshes of levels drawn for the first time are built, and all transitions have ended.
 const SETTLED: usize = 8;
 
-/// Pictures at places of a scene's path under targets in seconds, predicted and chosen by `policy` and each drawn several times; and
-/// the adapter.
+/// A point of a scene's path, as a fraction 0 … 1 of it, and the target time of a frame there, seconds.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct PathPoint {
+    pub(in super::super) part: f64,
+    pub(in super::super) target_s: f64,
+}
+
+/// Pictures at points of a scene's path, predicted and chosen by `policy`, each drawn `drawings` times; and the adapter.
 ///
 /// # Errors
 /// Errors of the scene and of the adapter.
 pub(in super::super) fn predicted(
     paper: Paper,
     policy: Policy,
-    (asked, times): (&[(f64, f64)], usize),
+    asked: &[PathPoint],
+    drawings: usize,
 ) -> anyhow::Result<(String, Vec<Predicted>)> {
-    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
-    walk.session().control().set_policy(policy);
+    let (adapter, mut fly_through) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
+    fly_through.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
-        walk.step(0.0)?;
+        fly_through.step(0.0)?;
     }
     let mut pictures = Vec::with_capacity(asked.len());
-    for (part, target_s) in asked {
-        walk.session().control().set_target_hz(1.0 / target_s);
-        walk.step(*part)?;
-        let told = walk.step(*part)?.predicted_ms;
-        walk.session().control().freeze(true);
+    for PathPoint { part, target_s } in asked {
+        fly_through.session().control().set_target_hz(1.0 / target_s);
+        fly_through.step(*part)?;
+        let predicted_ms = fly_through.step(*part)?.predicted_ms;
+        fly_through.session().control().freeze(true);
         for _ in 2..SETTLED {
-            walk.step(*part)?;
+            fly_through.step(*part)?;
         }
-        let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
-        walk.session().control().freeze(false);
-        let took_ms = took?.iter().map(|record| record.frame_ms).collect();
-        pictures.extend(told.map(|told_ms| Predicted { told_ms, took_ms }));
+        let measured: Result<Vec<_>, _> = (0..drawings).map(|_| fly_through.step(*part)).collect();
+        fly_through.session().control().freeze(false);
+        let measured_ms = measured?.iter().map(|record| record.frame_ms).collect();
+        pictures.extend(predicted_ms.map(|predicted_ms| Predicted { predicted_ms, measured_ms }));
     }
     Ok((adapter, pictures))
 }
 
 /// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
-fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, Walk)> {
+fn opened(name: &str, text: &str, times: Times) -> anyhow::Result<(String, FlyThrough)> {
     let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
     let scene = load(&Source::memory(name, text.as_bytes())?, overrides)?;
@@ -197,7 +204,7 @@ fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, W
         (Some(screen), Times::Declared) => Drawing::Last(screen),
         (None, _) => Drawing::Nothing,
     };
-    Ok((adapter, Walk::open(scene, drawing, SIZE)?))
+    Ok((adapter, FlyThrough::open(scene, drawing, SIZE)?))
 }
 
 /// One view of a scene after a policy has settled.
@@ -211,7 +218,7 @@ pub(in super::super) struct Still {
 
 /// A place on a scene's path, the target time of a frame, and the number of frames drawn there; the last half of them counts.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Stood {
+pub(in super::super) struct StillRequest {
     pub(in super::super) part: f64,
     pub(in super::super) target_s: f64,
     pub(in super::super) frames: usize,
@@ -221,15 +228,15 @@ pub(in super::super) struct Stood {
 ///
 /// # Errors
 /// Errors of the scene and of the adapter.
-pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
-    let Stood { part, target_s, frames } = stood;
-    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
-    let control = walk.session().control();
+pub(in super::super) fn still(paper: Paper, policy: &str, request: StillRequest) -> anyhow::Result<Still> {
+    let StillRequest { part, target_s, frames } = request;
+    let (adapter, mut fly_through) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
+    let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(policy).context("no such policy")?);
-    let mut records = (0..frames).map(|_| walk.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(frames / 2);
+    let mut records = (0..frames).map(|_| fly_through.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(frames / 2);
     let triangles = records.last().map_or(0, |row| row.triangles);
     records.sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
     let frame_ms = records.get(records.len() / 2).context("no frames")?.frame_ms;
-    Ok(Still { adapter, frame_ms, triangles, picture: walk.picture()?.context("nothing draws")? })
+    Ok(Still { adapter, frame_ms, triangles, picture: fly_through.picture()?.context("nothing draws")? })
 }
