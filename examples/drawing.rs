@@ -78,13 +78,14 @@ fn measure(gpu: &Gpu) -> Result<(), GpuError> {
     }
     let small = Size { width: 64, height: 36 };
     let (few, many) = (cost(gpu, small, 0.1, 0)?, cost(gpu, small, 0.005, 4)?);
-    report("wall", &points, (few, many), |cost| cost.wall_ms);
-    report("cpu", &points, (few, many), |cost| cost.cpu_ms);
+    report("wall", &points, few, many, |cost| cost.wall_ms);
+    report("cpu", &points, few, many, |cost| cost.cpu_ms);
     Ok(())
 }
 
-/// Prints what a frame, a triangle and a pixel cost of one kind of time.
-fn report(name: &str, points: &[Cost], (few, many): (Cost, Cost), ms: fn(&Cost) -> f64) {
+/// Prints what a frame, a triangle and a pixel cost of one kind of time; `few` and `many` are pictures of few pixels, with few and
+/// many triangles.
+fn report(name: &str, points: &[Cost], few: Cost, many: Cost, ms: fn(&Cost) -> f64) {
     let pairs: Vec<_> = points.iter().map(|cost| (cost.triangles as f64, ms(cost))).collect();
     let (base, slope) = line(&pairs);
     let triangle_ms = (ms(&many) - ms(&few)) / (many.triangles - few.triangles) as f64;

@@ -67,7 +67,7 @@ fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::
             let some = [(scenery, "scenic object"), (joints, "joint"), (couplings, "coupling")]
                 .into_iter()
                 .filter(|(count, _)| *count > 0);
-            let list = always.chain(some).map(counted).collect::<Vec<_>>().join(", ");
+            let list = always.chain(some).map(|(count, what)| counted(count, what)).collect::<Vec<_>>().join(", ");
             data(&format!("{name}: ok ({list})\n"))?;
             tell_overlaps(scene);
         }
@@ -75,7 +75,7 @@ fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::
     Ok(())
 }
 
-fn counted((count, what): (usize, &str)) -> String {
+fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
 }

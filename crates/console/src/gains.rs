@@ -67,9 +67,9 @@ pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
 }
 
 fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Candidate> {
-    let gain = |shown: &str, name: &str, own: f64, range: (f64, f64)| {
+    let gain = |shown: &str, name: &str, own: f64, (low, high): (f64, f64)| {
         let gain = value(name).unwrap_or(own);
-        inside(shown, gain, range).map(|()| gain)
+        check_range(shown, gain, low, high).map(|()| gain)
     };
     let beta = || gain("β", "beta", 5.0, (1e-6, 1e3));
     let lead = if law == "pi" { 0.2 } else { 0.0 };
@@ -98,7 +98,7 @@ fn no_law(name: &str) -> anyhow::Error {
     BadInput(format!("there is no law `{name}` (there are: {laws})")).into()
 }
 
-fn inside(name: &str, value: f64, (low, high): (f64, f64)) -> anyhow::Result<()> {
+fn check_range(name: &str, value: f64, low: f64, high: f64) -> anyhow::Result<()> {
     if (low..=high).contains(&value) {
         return Ok(());
     }

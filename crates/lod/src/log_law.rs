@@ -40,9 +40,9 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 1.99)) } else { Self::default().kappa };
+        let kappa = if self.kappa.is_finite() { within(self.kappa, 0.01, 1.99) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, lead: within(width(self.lead), (0.0, 1.99)), early: width(self.early), late: width(self.late) }
+        Self { kappa, lead: within(width(self.lead), 0.0, 1.99), early: width(self.early), late: width(self.late) }
     }
 }
 
@@ -79,7 +79,7 @@ impl LogLaw {
         Self {
             gains: gains.sound(),
             range,
-            value: within(start, range),
+            value: within(start, range.0, range.1),
             before: None,
             believed: None,
             rest: Rest::Moving,
@@ -113,12 +113,12 @@ impl LogLaw {
         let seen_before = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > SURPRISE_MAX);
         self.before = Some(error);
         let most = if seen_before { LESSON_MAX } else { SURPRISE_MAX };
-        within(error, (-most, most))
+        within(error, -most, most)
     }
 
     fn coarsen_by(&mut self, step: f64, granted: Option<f64>) -> Rest {
         let from = granted.map_or(self.value, |g| g.max(self.value));
-        self.value = within(from + step, self.range);
+        self.value = within(from + step, self.range.0, self.range.1);
         if from + step > self.range.1 { Rest::Clamped(Bound::Coarsest) } else { Rest::Moving }
     }
 
@@ -126,7 +126,7 @@ impl LogLaw {
         let wish = self.value + self.gains.kappa * (error + self.gains.early) + change;
         // if all of the time were work that ε scales, anything finer than this would be late
         let soonest = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
-        self.value = within(wish.max(soonest), self.range);
+        self.value = within(wish.max(soonest), self.range.0, self.range.1);
         match (wish < self.range.0, wish < soonest) {
             (true, _) if self.value == self.range.0 => Rest::Clamped(Bound::Finest),
             (_, true) if error < -NEAR => Rest::BetweenLevels,
@@ -156,12 +156,12 @@ impl LogLaw {
     /// Sets another range (finest, coarsest; finite); the value moves inside it.
     pub fn set_range(&mut self, range: (f64, f64)) {
         self.range = range;
-        self.value = within(self.value, range);
+        self.value = within(self.value, range.0, range.1);
     }
 
     /// Moves to `value`, or the end of the range nearest to it: a start, or a disturbance from outside.
     pub fn set_value(&mut self, value: f64) {
-        self.value = within(value, self.range);
+        self.value = within(value, self.range.0, self.range.1);
     }
 
     /// Sets other gains from the next update on; the value stays. κ is clamped to 0.01 … 1.99.

@@ -178,9 +178,9 @@ impl<'d, 't> Checker<'d, 't> {
         if value.is_nan() { least } else { value.clamp(least, greatest) }
     }
 
-    /// As [`Self::number`], for a value that may be left out: `(given, default)`.
-    pub(super) fn number_or(&mut self, place: &Place, key: &str, value: (Option<f64>, f64), allowed: &Allowed) -> f64 {
-        value.0.map_or(value.1, |given| self.number(place, key, given, allowed))
+    /// As [`Self::number`], for a value that may be left out.
+    pub(super) fn optional(&mut self, place: &Place, key: &str, value: Option<f64>, allowed: &Allowed) -> Option<f64> {
+        value.map(|given| self.number(place, key, given, allowed))
     }
 
     /// A point or direction, every coordinate within ± `most`.

@@ -76,7 +76,7 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     }
     let around = Around { source, gravity, faults };
     let objects = build::read_objects(&mut c, document.root().get("object"), &around);
-    let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
+    let scene = file.map(|file| assemble(&mut c, source, file, gravity, objects));
     match (scene, c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
             scene.resolve_initial_overlaps();
@@ -100,12 +100,7 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
     given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
 }
 
-fn assemble(
-    c: &mut Checker<'_, '_>,
-    source: &Source,
-    file: SceneFile,
-    (gravity, mut objects): (DVec3, Objects),
-) -> Scene {
+fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this program does not know", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
@@ -123,7 +118,7 @@ fn assemble(
     let joints: Arc<[Joint]> = joints.into();
     objects.hold(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
-    let groups = if sound { build::groups(c, &file.group, (&mut objects, source)) } else { Vec::new() };
+    let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),

@@ -89,7 +89,7 @@ impl Trim {
     /// nothing to spend it on (eq. 40).
     pub fn observe(&mut self, left_over: f64, all_at_most: bool) {
         if left_over.is_finite() && !(all_at_most && left_over > 0.0) {
-            self.part = crate::within(self.part + 0.03 * left_over, (-0.10, 0.05));
+            self.part = crate::within(self.part + 0.03 * left_over, -0.10, 0.05);
         }
     }
 

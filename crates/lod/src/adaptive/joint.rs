@@ -104,7 +104,7 @@ impl Worker {
     #[must_use]
     pub fn part(&self, lambda: f64) -> f64 {
         let part = libm::sqrt(self.loss / (lambda * self.full));
-        let least = crate::within(self.least, (0.0, 1.0));
+        let least = crate::within(self.least, 0.0, 1.0);
         if part.is_nan() { 1.0 } else { part.min(1.0).max(least) }
     }
 
@@ -125,7 +125,7 @@ fn prices(workers: &[Worker]) -> (f64, f64) {
     let sound = workers.iter().filter(|worker| worker.full > 0.0 && worker.loss > 0.0);
     let of = |worker: &Worker, part: f64| worker.loss / (worker.full * part * part);
     sound.fold((f64::MAX, f64::MIN_POSITIVE), |(low, high), worker| {
-        let least = crate::within(worker.least, (LEAST, 1.0));
+        let least = crate::within(worker.least, LEAST, 1.0);
         (low.min(of(worker, 1.0)), high.max(of(worker, least)))
     })
 }
@@ -190,7 +190,7 @@ impl Market {
             // drawing gets what it requests, but at most half of the capacity
             None => price(workers, (capacity - drawing.wants).max(0.5 * capacity)),
             Some(held) if drawing.lambda > 0.0 => {
-                held * libm::exp(PACE * crate::within(libm::log(drawing.lambda / held), (-FAR, FAR)))
+                held * libm::exp(PACE * crate::within(libm::log(drawing.lambda / held), -FAR, FAR))
             }
             Some(held) => held * (1.0 - FALL),
         };

@@ -69,8 +69,8 @@ impl Default for Settings {
 
 impl Settings {
     fn sound(self) -> Self {
-        let (margin, sigmas) = (crate::within(self.margin, (0.0, 0.5)), crate::within(self.sigmas, (0.0, 5.0)));
-        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, (0.0, 2.0)), ..self }
+        let (margin, sigmas) = (crate::within(self.margin, 0.0, 0.5), crate::within(self.sigmas, 0.0, 5.0));
+        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
     }
 }
 

@@ -101,7 +101,7 @@ impl Gauge {
         let noise = self.sigma2 / (table * table);
         self.variance += self.wander;
         let gain = self.variance / (self.variance + noise);
-        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE);
+        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE.0, KAPPA_RANGE.1);
         self.variance *= 1.0 - gain;
         if lesson == Lesson::Learned {
             self.sigma2 = (FORGET * self.sigma2 + (1.0 - FORGET) * error * error).max(SIGMA_LEAST * SIGMA_LEAST);
@@ -114,8 +114,8 @@ impl Gauge {
     fn follow(&mut self, error: f64) {
         self.common = FORGET * self.common + (1.0 - FORGET) * error * self.before;
         self.before = error;
-        let correlation = within(self.common / self.sigma2, (-1.0, 1.0));
-        self.wander = within(self.wander * libm::exp(HASTE * (correlation - CHANCE)), WANDER);
+        let correlation = within(self.common / self.sigma2, -1.0, 1.0);
+        self.wander = within(self.wander * libm::exp(HASTE * (correlation - CHANCE)), WANDER.0, WANDER.1);
     }
 
     fn doubt(&mut self, error: f64) -> Lesson {

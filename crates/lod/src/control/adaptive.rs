@@ -84,7 +84,7 @@ impl AdaptiveChoice {
     /// Chooses; `levels` has one entry per object.
     pub fn choose(&mut self, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         self.set_margin(ask);
-        self.closing.decide(ask, groups, (self.plan.lambda, self.kappa()));
+        self.closing.decide(ask, groups, self.plan.lambda, self.kappa());
         self.lay(ask, groups);
         self.fixed_s = ask.fixed_s;
         let time = Time { target: TICKS * ask.target_s, fixed: TICKS * ask.fixed_s };
@@ -102,7 +102,7 @@ impl AdaptiveChoice {
 
     /// Reports times of the frame that was drawn, seconds: `drawn_s` for drawing the choice, `work_s` in all, `others_s` reserved for
     /// others.
-    pub fn observe(&mut self, drawn_s: f64, (work_s, others_s): (f64, f64), target_s: f64) {
+    pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) {
         let Drawn { frame, plan, fixed_s } = self.drawn;
         self.law.observe(frame, DRAWING, TICKS * drawn_s);
         self.law.finished(frame, TICKS * work_s);
@@ -153,10 +153,10 @@ impl AdaptiveChoice {
     /// Gives the objects in view to the law, and removes the others.
     fn lay(&mut self, ask: &Ask<'_>, groups: &Groups) {
         let same = self.dishes.len() == ask.views.len();
-        if !same || self.dishes.iter().zip(ask.views).any(|(dish, (view, _))| dish.id != view.id) {
+        if !same || self.dishes.iter().zip(ask.views).any(|(dish, seen)| dish.id != seen.view.id) {
             self.clear();
-            self.dishes.extend(ask.views.iter().map(|(view, _)| Dish {
-                id: view.id,
+            self.dishes.extend(ask.views.iter().map(|seen| Dish {
+                id: seen.view.id,
                 version: 0,
                 rungs: 0,
                 weight: None,
@@ -164,7 +164,7 @@ impl AdaptiveChoice {
         }
         for at in 0..self.dishes.len() {
             let within = groups.parent(at).is_some() && groups.is_within(at, |group| self.closing.is_closed(group));
-            let (view, ladder) = (&ask.views[at].0, ask.ladders.of(at));
+            let (view, ladder) = (&ask.views[at].view, ask.ladders.of(at));
             let (rungs, weight) = match view.is_group() {
                 false => (ladder.rungs.as_slice(), ask.weight(at)),
                 true if self.closing.is_closed(at) => self.closing.impostors(ask, at),
@@ -174,12 +174,12 @@ impl AdaptiveChoice {
                 self.take_off(at);
                 continue;
             }
-            self.put_on(at, (ladder, rungs), weight);
+            self.put_on(at, ladder, rungs, weight);
         }
     }
 
     /// Offers the given rungs of a ladder: of a group, only its useful impostors.
-    fn put_on(&mut self, at: usize, (ladder, rungs): (&Ladder, &[Rung]), weight: f64) {
+    fn put_on(&mut self, at: usize, ladder: &Ladder, rungs: &[Rung], weight: f64) {
         let dish = &mut self.dishes[at];
         let id = u64::from(dish.id.0);
         if (dish.version, dish.rungs) != (ladder.version, rungs.len()) {

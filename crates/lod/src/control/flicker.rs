@@ -2,7 +2,7 @@
 //!
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
-use super::plan::{LevelDemand, Seen};
+use super::plan::{LevelDemand, SizedView};
 use metachron_core::AgentId;
 
 /// A level that returns within this many frames is a reversal.
@@ -23,11 +23,11 @@ pub(super) struct Changes {
 
 impl Changes {
     /// Stores the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
-    pub fn count(&mut self, views: &[Seen], levels: &[LevelDemand]) -> (u32, u32) {
+    pub fn count(&mut self, views: &[SizedView], levels: &[LevelDemand]) -> (u32, u32) {
         let unknown = Past { id: AgentId(0), levels: [None; REMEMBERED] };
         self.past.resize(views.len(), unknown);
         let (mut changes, mut reversals) = (0, 0);
-        for (((view, _), level), past) in views.iter().zip(levels).zip(&mut self.past) {
+        for ((SizedView { view, .. }, level), past) in views.iter().zip(levels).zip(&mut self.past) {
             if past.id != view.id || !view.visible {
                 *past = Past { id: view.id, ..unknown };
             }
@@ -47,7 +47,6 @@ impl Changes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::Span;
     use super::super::view::{Kind, ObjectView, Shading};
     use super::*;
     use metachron_core::{Resolution, ResolutionRange};
@@ -71,7 +70,7 @@ mod tests {
         let mut changes = Changes::default();
         let mut frame = |n, visible| {
             let level = LevelDemand { id: AgentId(3), resolution: at(n), polygons: 4.0, shading: Shading::Flat };
-            changes.count(&[(view(visible), Span::of(&view(visible)))], &[level])
+            changes.count(&[SizedView::of(view(visible))], &[level])
         };
         assert_eq!(frame(1, true), (0, 0));
         assert_eq!(frame(2, true), (1, 0));

@@ -4,7 +4,7 @@
 //! Theory: `docs/theory/budget.md`, section 4 (MB97, §3).
 
 use super::ladder::Rung;
-use super::plan::Seen;
+use super::plan::SizedView;
 use super::query::Ask;
 use super::view::Kind;
 
@@ -23,11 +23,11 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Reads the groups anew. An object belongs to the first group that names it; an object given after its group belongs to none.
-    pub fn update(&mut self, views: &[Seen]) {
+    pub fn update(&mut self, views: &[SizedView]) {
         self.parent.clear();
         self.parent.resize(views.len(), None);
         self.groups.clear();
-        for (at, (view, _)) in views.iter().enumerate() {
+        for (at, SizedView { view, .. }) in views.iter().enumerate() {
             let Kind::Group { members: (first, count), .. } = view.kind else { continue };
             self.groups.push(at);
             let end = first.saturating_add(count).min(at);
@@ -87,7 +87,7 @@ impl Impostors {
 
     /// Benefit and cost of an object in its lowest form: a group by its coarsest impostor, or its members if it has no cheaper impostor.
     fn lowest(&self, ask: &Ask<'_>, at: usize) -> (f64, f64) {
-        if !ask.views[at].0.is_group() {
+        if !ask.views[at].view.is_group() {
             return (self.worth[at], self.least_s[at]);
         }
         let coarsest = self.rungs(ask, at).first();
@@ -120,13 +120,11 @@ impl Impostors {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::Span;
     use super::super::view::ObjectView;
     use super::*;
 
-    fn object(id: usize, kind: Kind) -> Seen {
-        let view = ObjectView::plain(id as u32, kind);
-        (view, Span::of(&view))
+    fn object(id: usize, kind: Kind) -> SizedView {
+        SizedView::of(ObjectView::plain(id as u32, kind))
     }
 
     #[test]

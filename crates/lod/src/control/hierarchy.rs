@@ -39,18 +39,18 @@ impl Hierarchy {
             return Promise { budget_s: ask.budget_s(), predicted_s, feasible: true, ..Promise::default() };
         }
         let Ok(tree) = Tree::new(ask.budget(), &forest.nodes) else { return Promise::default() };
-        let cut = self.cut(policy, ask, (&tree, &forest));
+        let cut = self.cut(policy, ask, &tree, &forest);
         self.last.clear();
         for (object, level) in forest.objects.iter().zip(&cut.levels) {
             let Some(at) = *object else { continue };
-            self.last.insert(ask.views[at].0.id, *level);
+            self.last.insert(ask.views[at].view.id, *level);
             select::set(ask, at, *level, levels);
         }
         leave_out_members(ask, groups, levels);
         promise(ask, &cut)
     }
 
-    fn cut(&self, policy: Policy, ask: &Ask<'_>, (tree, forest): (&Tree, &Forest)) -> Cut {
+    fn cut(&self, policy: Policy, ask: &Ask<'_>, tree: &Tree, forest: &Forest) -> Cut {
         match policy {
             Policy::HierarchicalFlat => mason_flat::flat(tree),
             Policy::MacielShirley => {
@@ -58,7 +58,7 @@ impl Hierarchy {
                 maciel::choose(tree, &forest.objects.iter().map(importance).collect::<Vec<_>>())
             }
             _ => {
-                let last = |at: &Option<usize>| self.last.get(&ask.views[(*at)?].0.id).copied().flatten();
+                let last = |at: &Option<usize>| self.last.get(&ask.views[(*at)?].view.id).copied().flatten();
                 let known =
                     |(node, level): (usize, Level)| level.filter(|l| (*l as usize) < tree.impostors(node).len());
                 let last: Vec<_> = forest.objects.iter().map(last).enumerate().map(known).collect();
@@ -119,8 +119,7 @@ mod tests {
     use super::super::adaptive::AdaptiveChoice;
     use super::super::feedback::unseen;
     use super::super::ladder::Ladders;
-    use super::super::level::Span;
-    use super::super::plan::Seen;
+    use super::super::plan::SizedView;
     use super::super::price::Prices;
     use super::super::view::{Kind, ObjectView};
     use super::*;
@@ -130,7 +129,7 @@ mod tests {
     use metachron_core::ResolutionRange;
 
     /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a separate mesh.
-    fn rows() -> Vec<Seen> {
+    fn rows() -> Vec<SizedView> {
         let row =
             |first: usize| Kind::Group { radius_m: 1.0, members: (first, 4), impostors: [12, 48, 0, 0, 0, 0, 0, 0] };
         let mesh = |most| Kind::Counted { radius_m: 0.2, least: 16, most };
@@ -147,11 +146,11 @@ mod tests {
             ..ObjectView::plain(at as u32, kind)
         };
         let views = kinds.into_iter().enumerate().map(view);
-        views.map(|view| (view, Span::of(&view))).collect()
+        views.map(SizedView::of).collect()
     }
 
     /// The input of a frame with `budget_s` seconds, all available for the choice, with everything in view.
-    fn ask<'a>(views: &'a [Seen], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> Ask<'a> {
+    fn ask<'a>(views: &'a [SizedView], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> Ask<'a> {
         let value = Value::Plain;
         Ask { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
     }
@@ -173,7 +172,7 @@ mod tests {
             let tree = Tree::new(ask.budget(), &Forest::of(&ask, &groups, &impostors).nodes).unwrap();
             let best = exact(&tree, 2_000_000).unwrap();
             for (policy, least) in policies.into_iter().zip(&mut least) {
-                let mut levels: Vec<_> = views.iter().map(|(view, _)| unseen(view)).collect();
+                let mut levels: Vec<_> = views.iter().map(|seen| unseen(&seen.view)).collect();
                 let promise = match policy {
                     Policy::Adaptive => settled(&ask, &groups, &mut levels),
                     _ => Hierarchy::default().choose(policy, &ask, &groups, &mut levels),
@@ -210,20 +209,20 @@ mod tests {
             levels.copy_from_slice(&usual);
             promise = choice.choose(ask, groups, levels);
             choice.take_up();
-            choice.observe(promise.predicted_s, (promise.predicted_s, 0.0), ask.target_s);
+            choice.observe(promise.predicted_s, promise.predicted_s, 0.0, ask.target_s);
         }
         Promise { value: 4096.0 * promise.value, ..promise }
     }
 
     /// The number of pictures that show each mesh: its own, its row's, that of both rows.
-    fn covered(views: &[Seen], levels: &[LevelDemand]) -> Vec<usize> {
+    fn covered(views: &[SizedView], levels: &[LevelDemand]) -> Vec<usize> {
         let of = |at: usize| {
-            let holds = |group: &usize| match views[*group].0.kind {
+            let holds = |group: &usize| match views[*group].view.kind {
                 Kind::Group { members: (first, count), .. } => (first..first + count).contains(&at),
                 _ => *group == at,
             };
             (0..views.len()).filter(holds).filter(|it| levels[*it].polygons > 0.0).count()
         };
-        (0..views.len()).filter(|at| !views[*at].0.is_group()).map(of).collect()
+        (0..views.len()).filter(|at| !views[*at].view.is_group()).map(of).collect()
     }
 }

@@ -51,7 +51,7 @@ pub(super) struct ImpostorChoice {
 
 impl ImpostorChoice {
     /// Decides at `lambda` (gain of a tick) and `kappa` (measured ticks per tick by the prices).
-    pub fn decide(&mut self, ask: &Ask<'_>, groups: &Groups, (lambda, kappa): (f64, f64)) {
+    pub fn decide(&mut self, ask: &Ask<'_>, groups: &Groups, lambda: f64, kappa: f64) {
         self.doors.resize(ask.views.len(), None);
         if groups.all().is_empty() {
             return;
@@ -70,7 +70,7 @@ impl ImpostorChoice {
             let door = self.doors[group].get_or_insert(Door { closed: false, still: u32::MAX, patience: PATIENCE.0 });
             door.still = door.still.saturating_add(1);
             let taken = match closed {
-                Some(closed) => door.pass((open, closed), WORTH_IT * price * open.least, &mut spare),
+                Some(closed) => door.pass(open, closed, WORTH_IT * price * open.least, &mut spare),
                 None => {
                     // the members cost less than any impostor
                     if door.closed {
@@ -142,7 +142,7 @@ impl ImpostorChoice {
             let hidden = groups.parent(at).is_some() && groups.is_within(at, |group| self.is_closed(group));
             match () {
                 () if hidden => 0.0,
-                () if !ask.views[at].0.is_group() => self.sums[at].least,
+                () if !ask.views[at].view.is_group() => self.sums[at].least,
                 () if self.is_closed(at) => self.impostors.rungs(ask, at).first().map_or(0.0, |it| TICKS * it.cost_s),
                 () => 0.0,
             }
@@ -172,7 +172,7 @@ impl Sum {
 
 impl Door {
     /// Closes or opens the group if that gains more than `bar` and `spare` ticks allow it; gives the resulting totals.
-    fn pass(&mut self, (open, closed): (Sum, Sum), bar: f64, spare: &mut f64) -> Sum {
+    fn pass(&mut self, open: Sum, closed: Sum, bar: f64, spare: &mut f64) -> Sum {
         let more = open.least - closed.least;
         if !self.closed && closed.net > open.net + bar {
             self.close();

@@ -14,8 +14,7 @@ use super::groups::Groups;
 use super::hierarchy::Hierarchy;
 use super::ladder::Ladders;
 use super::level;
-use super::level::Span;
-use super::plan::{FrameWork, LevelDemand, Plan, Seen, in_view, steers};
+use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
 use super::quality_boost::Raise;
@@ -78,7 +77,7 @@ pub struct PictureControl {
     changes: Changes,
     /// Speeds on the screen, smoothed, by object.
     speeds: Vec<(AgentId, Option<f64>)>,
-    views: Vec<Seen>,
+    views: Vec<SizedView>,
     plan: Plan,
     /// The choice for the next frame, made while this one is drawn.
     ahead: Option<Ahead>,
@@ -141,7 +140,7 @@ impl PictureControl {
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
                 let drawn_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
-                self.adaptive.observe(self.chosen_part * drawn_s, (work_s, self.others_s), target_s);
+                self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
             }
             _ => {}
         }
@@ -170,7 +169,7 @@ impl PictureControl {
             Policy::Full => self.plan_full(levels),
             Policy::Feedback => self.feedback.plan(&self.views, levels),
             _ => {
-                levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
+                levels.extend(self.views.iter().map(|seen| unseen(&seen.view)));
                 return self.choose_by_cost(levels);
             }
         }
@@ -237,7 +236,7 @@ impl PictureControl {
         self.speeds.resize(objects.len(), (AgentId(0), None));
         for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {
             // an unchanged object that stays out of view has no speed, and its polygon range stays
-            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|(known, _)| known == object) {
+            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|known| known.view == *object) {
                 continue;
             }
             let mut view = *object;
@@ -249,24 +248,23 @@ impl PictureControl {
                 view.speed_px_s = held.map_or(now, |before| before + SPEED_NEWS * (now - before));
                 *held = Some(view.speed_px_s);
             }
-            let seen = (view, Span::of(&view));
             match self.views.get_mut(at) {
-                Some(place) => *place = seen,
-                None => self.views.push(seen),
+                Some(place) => *place = SizedView::of(view),
+                None => self.views.push(SizedView::of(view)),
             }
         }
     }
 
     /// Updates the totals of the plan.
     fn count(&mut self) {
-        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|(seen, _)| seen.view.visible);
         self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
-        self.plan.full_polygons = in_view(&self.views).map(|(_, span)| span.full).sum();
+        self.plan.full_polygons = in_view(&self.views).map(|seen| seen.span.full).sum();
         (self.plan.changes, self.plan.reversals) = self.changes.count(&self.views, &self.plan.levels);
     }
 
     fn plan_full(&self, levels: &mut Vec<LevelDemand>) {
-        levels.extend(self.views.iter().map(|(view, span)| {
+        levels.extend(self.views.iter().map(|SizedView { view, span }| {
             let n = if view.is_group() { level::open(view) } else { view.range.n.1 };
             let resolution = Resolution { eps_m: view.range.eps_m.0, n };
             LevelDemand { id: view.id, resolution, polygons: span.full, shading: view.shading.1 }
@@ -288,8 +286,8 @@ impl PictureControl {
     /// The benefit of object `at` in the last choice at an accuracy of 1, pixels; 0 if unknown.
     #[must_use]
     pub fn weight(&self, at: usize) -> f64 {
-        let Some((view, _)) = self.views.get(at) else { return 0.0 };
-        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(view, &self.sliders, ladder.polygon_px()))
+        let Some(seen) = self.views.get(at) else { return 0.0 };
+        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(&seen.view, &self.sliders, ladder.polygon_px()))
     }
 
     /// The state of the controller; its text is for the viewer and the report.

@@ -3,8 +3,8 @@
 //! In: ladders, a time. Out: a rung for every object in view, and a promise. Never here: trees ([`super::hierarchy`]), policies that are
 //! corrected by measured frames ([`super::adaptive`]). Theory: `docs/theory/budget.md`, sections 2, 3, 5 and 6.
 
-use super::level::Held;
-use super::plan::LevelDemand;
+use super::level::{Cut, Held};
+use super::plan::{LevelDemand, SizedView};
 use super::policy::Policy;
 use super::query::{Ask, Promise, TICKS, demand, left_out};
 use crate::select::barrier::{Limits, interior_point};
@@ -61,23 +61,23 @@ impl Select {
             let entries: Vec<_> = ask.ladders.of(at).rungs.iter().map(|rung| ask.entry(weight, rung)).collect();
             problem.push(id(ask, at), &entries);
         }
-        let selection = self.solve(policy, ask, (&problem, &objects));
+        let selection = self.solve(policy, ask, &problem, &objects);
         self.last.clear();
         for (&at, level) in objects.iter().zip(&selection.levels) {
-            self.last.insert(ask.views[at].0.id, *level);
+            self.last.insert(ask.views[at].view.id, *level);
             set(ask, at, *level, levels);
         }
         promise(ask, &selection)
     }
 
-    fn solve(&self, policy: Policy, ask: &Ask<'_>, (problem, objects): (&Problem, &[usize])) -> Selection {
+    fn solve(&self, policy: Policy, ask: &Ask<'_>, problem: &Problem, objects: &[usize]) -> Selection {
         match policy {
             Policy::Static => by_size(ask, problem, objects, STATIC_PX),
             Policy::Threshold => by_size(ask, problem, objects, self.threshold.threshold_px()),
             Policy::GreedyIncremental => {
                 let rungs = |at: usize| ask.ladders.of(at).rungs.len() as u32;
                 let last = |at: &usize| {
-                    let level = self.last.get(&ask.views[*at].0.id).copied().flatten();
+                    let level = self.last.get(&ask.views[*at].view.id).copied().flatten();
                     level.filter(|level| *level < rungs(*at))
                 };
                 let last: Vec<_> = objects.iter().map(last).collect();
@@ -97,7 +97,7 @@ impl Select {
         let setups: f64 = objects.iter().map(|&at| setup_s(ask, at)).sum();
         let budget_s = ask.budget_s();
         let found = if by_barrier {
-            let last = |at: &usize| self.last_r.get(&ask.views[*at].0.id).copied();
+            let last = |at: &usize| self.last_r.get(&ask.views[*at].view.id).copied();
             // a warm start needs all objects: a single new one has no resolution to start from
             let last: Option<Vec<_>> = objects.iter().map(last).collect();
             interior_point(budget_s, setups, &meshes, &last.unwrap_or_default(), limits(ask, objects.len()))
@@ -107,11 +107,11 @@ impl Select {
         let before = std::mem::take(&mut self.last_r);
         let mut spent_s = 0.0;
         for (&at, r) in objects.iter().zip(&found.r) {
-            let (view, span) = &ask.views[at];
+            let SizedView { view, span } = &ask.views[at];
             let held = before.get(&view.id).filter(|held| by_barrier && (r / **held - 1.0).abs() <= SAME_R);
             let r = held.unwrap_or(r);
             self.last_r.insert(view.id, *r);
-            let (resolution, polygons) = Held::default().choose(view, *span, r * span.full);
+            let Cut { resolution, polygons } = Held::default().choose(view, *span, r * span.full);
             let best = ask.ladders.of(at).rungs.last().map_or(levels[at].shading, |rung| rung.shading);
             levels[at] = LevelDemand { id: view.id, resolution, polygons, shading: best };
             spent_s += cost_s(ask, at, polygons);
@@ -130,7 +130,7 @@ fn limits(ask: &Ask<'_>, meshes: usize) -> Limits {
 }
 
 fn id(ask: &Ask<'_>, at: usize) -> u64 {
-    u64::from(ask.views[at].0.id.0)
+    u64::from(ask.views[at].view.id.0)
 }
 
 /// Draws an object at a rung, or leaves it out.
@@ -145,7 +145,7 @@ pub(super) fn set(ask: &Ask<'_>, at: usize, level: Level, levels: &mut [LevelDem
 fn by_size(ask: &Ask<'_>, problem: &Problem, objects: &[usize], threshold_px: f64) -> Selection {
     let level = |&at: &usize| {
         let polygons: Vec<_> = ask.ladders.of(at).rungs.iter().map(|rung| rung.polygons as u32).collect();
-        threshold::level(ask.views[at].0.pixels, &polygons, threshold_px)
+        threshold::level(ask.views[at].view.pixels, &polygons, threshold_px)
     };
     problem.judge(objects.iter().map(level).collect())
 }
@@ -187,13 +187,13 @@ fn robin_hood(ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
 
 /// Value of an instance for Robin Hood: its surface is the area, its distance the depth.
 fn value(ask: &Ask<'_>, at: usize) -> f64 {
-    let view = &ask.views[at].0;
+    let view = &ask.views[at].view;
     ask.value.of(view.surface_m2(), view.distance_m, view.from_focus_m, view.importance)
 }
 
 /// A mesh of continuous resolution, from its least to one triangle per pixel.
 fn mesh(ask: &Ask<'_>, at: usize) -> Mesh {
-    let span = &ask.views[at].1;
+    let span = &ask.views[at].span;
     let full_s = cost_s(ask, at, span.full) - setup_s(ask, at);
     let part = |polygons: f64| if span.full > 0.0 { polygons / span.full } else { 1.0 };
     Mesh { weight: ask.weight(at), time: full_s, least: part(span.least), most: part(span.most) }.sound(full_s)

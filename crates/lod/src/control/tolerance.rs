@@ -46,13 +46,26 @@ const PATIENCE: (u32, u32) = (1, 32);
 /// A coarsening counts as confirmed after this many times the patience: a motion that comes and goes within it does not confirm it.
 const PROOF: u32 = 16;
 
+/// How the error grows with a value: bounds of the exponent of its power law.
+#[derive(Debug, Clone, Copy)]
+struct Orders {
+    /// The greatest possible, used to coarsen.
+    greatest: f64,
+    /// The least possible, used to refine.
+    least: f64,
+}
+
+/// A spacing ε makes an error of second order.
+const ORDERS_OF_EPS: Orders = Orders { greatest: 2.0, least: 2.0 };
+/// Steps dt make an error of first order, or of second with an integrator of second order (control.md, eq. 35 and 36).
+const ORDERS_OF_DT: Orders = Orders { greatest: 2.0, least: 1.0 };
+
 /// One controlled value, and how the error grows with it.
 #[derive(Debug, Clone, Copy)]
 struct Stair {
     range: (f64, f64),
     value: f64,
-    /// Orders of the error: the greatest possible, used to coarsen, and the least, used to refine.
-    orders: (f64, f64),
+    orders: Orders,
     calm: u32,
     patience: u32,
     /// The value before the last coarsening, if that is not confirmed yet.
@@ -73,8 +86,8 @@ pub struct ErrorControl {
 }
 
 impl Stair {
-    fn new((fine, coarse): (f64, f64), start: f64, orders: (f64, f64)) -> Self {
-        let range = (fine, coarse.max(fine));
+    fn new(range: (f64, f64), start: f64, orders: Orders) -> Self {
+        let range = (range.0, range.1.max(range.0));
         let value = start.clamp(range.0, range.1);
         Self { range, value, orders, calm: 0, patience: PATIENCE.0, coarsened_from: None }
     }
@@ -112,7 +125,7 @@ impl Stair {
 
     fn refine(&mut self, error_m: f64, allowed_m: f64) {
         self.calm = 0;
-        let wanted = libm::pow(SET * allowed_m / error_m, 1.0 / self.orders.1).max(1.0 / REFINE_MAX);
+        let wanted = libm::pow(SET * allowed_m / error_m, 1.0 / self.orders.least).max(1.0 / REFINE_MAX);
         self.value = (self.value * wanted).max(self.range.0);
         if let Some(from) = self.coarsened_from.take() {
             self.patience = (2 * self.patience).min(PATIENCE.1);
@@ -126,7 +139,7 @@ impl Stair {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
         if error_m < LEAST * allowed_m && self.calm >= self.patience {
-            let wanted = libm::pow(SET * allowed_m / error_m.max(f64::MIN_POSITIVE), 1.0 / self.orders.0);
+            let wanted = libm::pow(SET * allowed_m / error_m.max(f64::MIN_POSITIVE), 1.0 / self.orders.greatest);
             self.value = (self.value * wanted.min(COARSEN_MAX)).min(self.range.1);
         }
     }
@@ -136,10 +149,10 @@ impl ErrorControl {
     /// A controller of an agent with the present dt and ε of `now`.
     #[must_use]
     pub fn new(limits: &ErrorLimits, now: RateDemand) -> Self {
-        let eps = limits.eps_m.zip(now.eps_m).map(|(range, eps)| Stair::new(range, eps, (2.0, 2.0)));
+        let eps = limits.eps_m.zip(now.eps_m).map(|(range, eps)| Stair::new(range, eps, ORDERS_OF_EPS));
         Self {
             tolerance_m: limits.tolerance_m,
-            dt: Stair::new(limits.dt_s, now.dt_s, (2.0, 1.0)),
+            dt: Stair::new(limits.dt_s, now.dt_s, ORDERS_OF_DT),
             eps,
             turns: 0,
             span_s: 0.0,

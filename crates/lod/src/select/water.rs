@@ -25,7 +25,7 @@ impl Tap {
         if self.price == 0.0 && self.growth > 0.0 {
             return self.most;
         }
-        if self.growth == 0.0 { self.least } else { crate::within(self.growth * mu, (self.least, self.most)) }
+        if self.growth == 0.0 { self.least } else { crate::within(self.growth * mu, self.least, self.most) }
     }
 
     fn ends(&self) -> (f64, f64) {
@@ -73,5 +73,5 @@ pub fn level(budget: f64, taps: &[Tap]) -> Option<f64> {
         });
     }
     let mu = if slope > 0.0 { (budget - settled) / slope } else { low };
-    Some(crate::within(mu, (low, high)))
+    Some(crate::within(mu, low, high))
 }

@@ -140,7 +140,7 @@ impl Explanation {
             );
         }
         if !near.is_stable() || self.cycle.is_some() {
-            return self.tell_of_a_swing(near, (name, value, margin));
+            return self.tell_of_a_swing(near, name, value);
         }
         if let [first, .., last] = &self.rests[..] {
             return format!(
@@ -198,10 +198,11 @@ impl Explanation {
         }
     }
 
-    fn tell_of_a_swing(&self, near: Loop, (name, value, margin): (&str, f64, f64)) -> String {
+    fn tell_of_a_swing(&self, near: Loop, name: &str, value: f64) -> String {
         let swing = self.cycle.map_or_else(String::new, |c| {
             format!(" by {:.0} % of its time every {:.2} s", 100.0 * c.amplitude, c.period_s)
         });
+        let margin = near.gain_margin();
         let safe = value * margin / LITTLE_ROOM;
         if near.is_stable() {
             return format!(

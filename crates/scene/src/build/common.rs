@@ -57,7 +57,8 @@ pub(super) fn tolerance(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &CommonFile,
-    (pace, range): (PaceWish, Option<ResolutionRange>),
+    pace: PaceWish,
+    range: Option<ResolutionRange>,
 ) -> Option<f64> {
     let Some(tolerance_m) = file.tolerance_m else {
         if file.hold == Some(HoldKind::Error) {
@@ -111,14 +112,15 @@ pub(super) fn rounded(value: f64) -> f64 {
 pub(super) fn faults(
     c: &mut Checker<'_, '_>,
     place: &Place,
-    (own, world): (Option<&FaultsFile>, Option<&FaultsFile>),
+    own: Option<&FaultsFile>,
+    world: Option<&FaultsFile>,
 ) -> Faults {
     let (none, own_place) = (FaultsFile::default(), place.table("faults"));
     let (own, world) = (own.unwrap_or(&none), world.unwrap_or(&none));
     let world_jitter = world.jitter.unwrap_or(0.0);
     Faults {
-        jitter: c.number_or(&own_place, "jitter", (own.jitter, world_jitter), &JITTER),
-        loss: c.number_or(&own_place, "loss", (own.loss, world.loss.unwrap_or(0.0)), &LOSS),
+        jitter: c.optional(&own_place, "jitter", own.jitter, &JITTER).unwrap_or(world_jitter),
+        loss: c.optional(&own_place, "loss", own.loss, &LOSS).unwrap_or(world.loss.unwrap_or(0.0)),
         seed: u64::from(own.seed.or(world.seed).unwrap_or(0)),
     }
 }
@@ -126,8 +128,8 @@ pub(super) fn faults(
 /// Checks the values of `[world.faults]`.
 pub(crate) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
     let place = Place::new("world.faults", "of `[world.faults]`");
-    c.number_or(&place, "jitter", (file.jitter, 0.0), &JITTER);
-    c.number_or(&place, "loss", (file.loss, 0.0), &LOSS);
+    c.optional(&place, "jitter", file.jitter, &JITTER);
+    c.optional(&place, "loss", file.loss, &LOSS);
 }
 
 /// The levels of the drawn primitive.
@@ -164,7 +166,7 @@ pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &Common
             colour_of(material)
         }),
     };
-    let importance = c.number_or(place, "importance", (file.importance, 1.0), &IMPORTANCE);
+    let importance = c.optional(place, "importance", file.importance, &IMPORTANCE).unwrap_or(1.0);
     Look { colour, material, importance, shading: file.shading.unwrap_or_default() }
 }
 

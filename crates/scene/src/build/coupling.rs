@@ -46,7 +46,7 @@ pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects
 }
 
 fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
-    let (a, b) = (end(c, place, ("a", &file.a), objects), end(c, place, ("b", &file.b), objects));
+    let (a, b) = (end(c, place, "a", &file.a, objects), end(c, place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a == b {
         c.wrong(place, "b", "is the object that `a` is", "expected another object: a coupling has two");
@@ -67,7 +67,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
-        Kind::Attach => attach(c, place, file, (a, b), objects),
+        Kind::Attach => attach(c, place, file, [a, b], objects),
     };
     if c.count() > before {
         return None;
@@ -76,7 +76,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
 }
 
 /// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
-fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<Named> {
+fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &Objects) -> Option<Named> {
     let (what, expected) = match objects.names.get(name) {
         None => {
             let moves = |named| !matches!(named, Named::Fixed | Named::Scenery | Named::Synthetic(_));
@@ -139,64 +139,80 @@ fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<La
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {
     let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS);
-    Some((stiffness, c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 0.0), &DAMPING)))
+    Some((stiffness, c.optional(place, "damping_n_s_m", file.damping_n_s_m, &DAMPING).unwrap_or(0.0)))
 }
 
 fn attach(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &CouplingFile,
-    (a, b): (Named, Named),
+    [a, b]: [Named; 2],
     objects: &Objects,
 ) -> Option<CouplingKind> {
-    let at_a = anchor(c, place, ("at_a", file.at_a?), a, objects);
-    let at_b = anchor(c, place, ("at_b", file.at_b?), b, objects);
+    let at_a = Attachment { key: "at_a", object: a, spot: file.at_a? }.anchor(c, place, objects);
+    let at_b = Attachment { key: "at_b", object: b, spot: file.at_b? }.anchor(c, place, objects);
     let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
-    let rest_m = c.number_or(place, "rest_m", (file.rest_m, 0.0), &REST);
+    let rest_m = c.optional(place, "rest_m", file.rest_m, &REST).unwrap_or(0.0);
     Some(CouplingKind::Attach { at_a: at_a?, at_b: at_b?, stiffness_n_m, damping_n_s_m, rest_m })
 }
 
-/// The material point of the object `named` that `spot` denotes.
-fn anchor(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (key, spot): (&str, Spot),
-    named: Named,
-    objects: &Objects,
-) -> Option<Anchor> {
-    let id = named.agent()?;
-    if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
-        let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
-        return match spot {
-            Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, ""))),
-            Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
-            Spot::Share(_) => {
-                let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
-                c.wrong(place, key, "is a share of a length", expected);
+/// One end of an attachment: an object, and the spot on it that the key of the coupling gives.
+struct Attachment {
+    key: &'static str,
+    object: Named,
+    spot: Spot,
+}
+
+impl Attachment {
+    /// The material point of the attached object that its spot denotes.
+    fn anchor(self, c: &mut Checker<'_, '_>, place: &Place, objects: &Objects) -> Option<Anchor> {
+        let Self { key, object, spot } = self;
+        let id = object.agent()?;
+        if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
+            let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
+            return match spot {
+                Spot::Share(share) if is_rope => {
+                    soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, "")))
+                }
+                Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
+                Spot::Share(_) => {
+                    let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
+                    c.wrong(place, key, "is a share of a length", expected);
+                    None
+                }
+                Spot::Point(_) => {
+                    c.wrong(
+                        place,
+                        key,
+                        "is a point, but the object is a rope",
+                        "expected a share of its length, 0 … 1",
+                    );
+                    None
+                }
+            };
+        }
+        match (spot, matches!(object, Named::Tube(_))) {
+            (Spot::Share(share), true) => {
+                let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
+                Some(Anchor::Arc(share * tube_length_m(objects, id)?))
+            }
+            (Spot::Point(at), false) => {
+                let at = c.point(place, key, at, POSITION_MAX_M);
+                Some(Anchor::Local(at - centre_of_mass(objects, id)))
+            }
+            (Spot::Point(_), true) => {
+                c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
                 None
             }
-            Spot::Point(_) => {
-                c.wrong(place, key, "is a point, but the object is a rope", "expected a share of its length, 0 … 1");
+            (Spot::Share(_), false) => {
+                c.wrong(
+                    place,
+                    key,
+                    "is a share of a length",
+                    "expected a point [x, y, z] in the object's axes, metres",
+                );
                 None
             }
-        };
-    }
-    match (spot, matches!(named, Named::Tube(_))) {
-        (Spot::Share(share), true) => {
-            let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
-            Some(Anchor::Arc(share * tube_length_m(objects, id)?))
-        }
-        (Spot::Point(at), false) => {
-            let at = c.point(place, key, at, POSITION_MAX_M);
-            Some(Anchor::Local(at - centre_of_mass(objects, id)))
-        }
-        (Spot::Point(_), true) => {
-            c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
-            None
-        }
-        (Spot::Share(_), false) => {
-            c.wrong(place, key, "is a share of a length", "expected a point [x, y, z] in the object's axes, metres");
-            None
         }
     }
 }

@@ -74,7 +74,8 @@ pub(super) fn copies(
     c: &mut Checker<'_, '_>,
     place: &Place,
     common: &CommonFile,
-    (can_move, most): (bool, usize),
+    can_move: bool,
+    most: usize,
 ) -> Copies {
     let Some(grid) = common.grid else {
         let scatter = common.scatter_m.is_some();

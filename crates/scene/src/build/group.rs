@@ -17,7 +17,8 @@ const GROUPS_MAX: usize = 1000;
 pub(crate) fn groups(
     c: &mut Checker<'_, '_>,
     files: &[GroupFile],
-    (objects, source): (&mut Objects, &Source),
+    objects: &mut Objects,
+    source: &Source,
 ) -> Vec<Group> {
     if files.len() > GROUPS_MAX {
         let expected = format!("expected at most {GROUPS_MAX}");
@@ -26,11 +27,11 @@ pub(crate) fn groups(
     }
     let mut owner = vec![None; objects.scenery.len()];
     for (number, file) in files.iter().enumerate() {
-        let place = Place::new(format!("group.{number}"), format!("of group `{}`", file.name));
+        let place = group_place(number, file);
         if objects.names.is_known(&file.name) || files[..number].iter().any(|other| other.name == file.name) {
             c.wrong(&place, "name", format_args!("`{}` is taken", file.name), "expected a name of its own");
         }
-        claim(c, &place, (number, file), (objects, &mut owner));
+        claim(c, number, file, objects, &mut owner);
     }
     let mut order: Vec<usize> = (0..owner.len()).collect();
     // scenery of no group first, then group by group
@@ -40,8 +41,8 @@ pub(crate) fn groups(
     let mut made = Vec::with_capacity(files.len());
     for (number, file) in files.iter().enumerate() {
         let end = start + owner.iter().filter(|group| **group == Some(number)).count();
-        let place = Place::new(format!("group.{number}"), format!("of group `{}`", file.name));
-        if let Some((proxy, levels)) = impostors(c, &place, file, (&objects.scenery[start..end], source)) {
+        let place = group_place(number, file);
+        if let Some((proxy, levels)) = impostors(c, &place, file, &objects.scenery[start..end], source) {
             made.push(Group { proxy, levels, members: start..end });
         }
         start = end;
@@ -49,13 +50,14 @@ pub(crate) fn groups(
     made
 }
 
-/// Assigns the members to group `number`.
-fn claim(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (number, file): (usize, &GroupFile),
-    (objects, owner): (&Objects, &mut [Option<usize>]),
-) {
+/// The place of group `number` in the scene file.
+fn group_place(number: usize, file: &GroupFile) -> Place {
+    Place::new(format!("group.{number}"), format!("of group `{}`", file.name))
+}
+
+/// Assigns its members to group `number`; `owner` holds the group of every object of the scenery.
+fn claim(c: &mut Checker<'_, '_>, number: usize, file: &GroupFile, objects: &Objects, owner: &mut [Option<usize>]) {
+    let place = &group_place(number, file);
     if file.members.is_empty() {
         c.wrong(place, "members", "is empty", "expected names of meshes and trees");
     }

@@ -23,7 +23,8 @@ pub(super) fn impostors(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &GroupFile,
-    (members, source): (&[Scenery], &Source),
+    members: &[Scenery],
+    source: &Source,
 ) -> Option<(Scenery, Vec<u32>)> {
     let before = c.count();
     let wanted = file.levels.as_deref();
@@ -48,7 +49,7 @@ pub(super) fn impostors(
         return None;
     }
     let levels = match wanted {
-        Some(levels) => cuts(c, place, (levels, &tom))?,
+        Some(levels) => cuts(c, place, levels, &tom)?,
         None => usual(&tom),
     };
     let importance = members.iter().map(|m| m.look.importance).fold(0.0, f64::max);
@@ -99,7 +100,7 @@ fn made_of(
 }
 
 /// The triangles that the mesh has at each level; `None` where two levels are equal or one is below its coarsest, which is reported.
-fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &ProgressiveMesh)) -> Option<Vec<u32>> {
+fn cuts(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32], tom: &ProgressiveMesh) -> Option<Vec<u32>> {
     let (least, most) = tom.range();
     let mut made: Vec<u32> = Vec::with_capacity(levels.len());
     for (at, count) in levels.iter().enumerate() {

@@ -38,6 +38,13 @@ impl End {
     }
 }
 
+/// One end of a joint with its anchor in world coordinates, metres.
+#[derive(Debug, Clone, Copy)]
+struct Anchored {
+    end: End,
+    anchor: DVec3,
+}
+
 /// The joints of the scene.
 pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Objects) -> Vec<Joint> {
     if files.len() > JOINTS_MAX {
@@ -54,7 +61,7 @@ fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objec
     let place = Place::new(format!("joint.{index}"), format!("of the joint of `{}` and `{}`", file.a, file.b));
     let before = c.count();
     let free = leaves(c, &place, file);
-    let (a, b) = (end(c, &place, ("a", &file.a), objects), end(c, &place, ("b", &file.b), objects));
+    let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a.agent == b.agent {
         let (what, expected) = match a.agent {
@@ -66,7 +73,7 @@ fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objec
     }
     let at_a_m = file.at_a_m.map_or(DVec3::ZERO, |at| c.point(&place, "at_a_m", at, POSITION_MAX_M));
     let from = a.to_world(at_a_m);
-    let to = other_anchor(c, &place, file, (b, from))?;
+    let to = other_anchor(c, &place, file, b, from)?;
     if c.count() > before {
         return None;
     }
@@ -75,7 +82,7 @@ fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objec
 }
 
 /// One end of a joint: a rigid object, the world, or a fixed object, which becomes a pose in the world.
-fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<End> {
+fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &Objects) -> Option<End> {
     if name == WORLD {
         if key == "a" {
             c.wrong(place, key, "is the world", "expected a rigid object; the world is written as `b`");
@@ -123,7 +130,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
 }
 
 /// The anchor on `b`, in the world: `at_b_m` if given; else the anchor on `a`, or for springs and ropes the origin of `b`.
-fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, (b, from): (End, DVec3)) -> Option<DVec3> {
+fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, b: End, from: DVec3) -> Option<DVec3> {
     let given = |c: &mut Checker<'_, '_>, at: Point| b.to_world(c.point(place, "at_b_m", at, POSITION_MAX_M));
     match (file.at_b_m, file.kind) {
         (Some(at), _) => Some(given(c, at)),
@@ -146,20 +153,17 @@ impl Held {
     /// to a about `axis` is a's relative to b about the opposite axis.
     fn joint(self) -> Option<Joint> {
         let Self { ends: [a, b], anchors: [from, to], .. } = self;
-        match (a.agent, b.agent) {
-            (Some(id), other) => Some(self.between((id, other), (a, from), (b, to), 1.0)),
-            (None, Some(id)) => Some(self.between((id, None), (b, to), (a, from), -1.0)),
+        let (a, b) = (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to });
+        match (a.end.agent, b.end.agent) {
+            (Some(id), _) => Some(self.between(id, a, b, 1.0)),
+            (None, Some(id)) => Some(self.between(id, b, a, -1.0)),
             (None, None) => None,
         }
     }
 
-    fn between(
-        &self,
-        (id, other): (AgentId, Option<AgentId>),
-        (a, from): (End, DVec3),
-        (b, to): (End, DVec3),
-        sign: f64,
-    ) -> Joint {
+    /// The joint of the agent `id`, which is at `a`; `sign` is that of the axis.
+    fn between(&self, id: AgentId, a: Anchored, b: Anchored, sign: f64) -> Joint {
+        let (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to }) = (a, b);
         let axis = |world: DVec3| a.rotation.conjugate() * world * sign;
         let length = from.distance(to);
         let kind = match self.leaves {
@@ -173,11 +177,11 @@ impl Held {
             Leaves::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
         };
         // a joint to the world is given in the world's axes
-        let (anchor_b_m, rotation_b) = match other {
+        let (anchor_b_m, rotation_b) = match b.agent {
             Some(_) => (b.to_local(to), b.rotation),
             None => (to, DQuat::IDENTITY),
         };
         let rest = (a.rotation.conjugate() * rotation_b).normalize();
-        Joint { a: id, b: other, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide: self.collide }
+        Joint { a: id, b: b.agent, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide: self.collide }
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -
         Kind::Fixed => Leaves::Nothing,
         Kind::Spherical => Leaves::Turns,
         Kind::Revolute => {
-            let range = range(c, place, ("range_deg", file.range_deg), 180.0);
+            let range = range(c, place, "range_deg", file.range_deg, 180.0);
             let around_start = range.is_none_or(|[least, greatest]| least <= 0.0 && greatest >= 0.0);
             if !around_start {
                 c.wrong(place, "range_deg", "does not contain the start", "expected a range with 0 among it");
@@ -50,19 +50,16 @@ pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -
             Leaves::Turn { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
         }
         Kind::Prismatic => {
-            let range_m = range(c, place, ("range_m", file.range_m), LENGTH_MAX_M);
+            let range_m = range(c, place, "range_m", file.range_m, LENGTH_MAX_M);
             Leaves::Slide { axis: axis(c, place, file)?, range_m }
         }
         Kind::Spring => {
             let length = allowed(0.0..=LENGTH_MAX_M, "m");
             Leaves::Spring {
                 stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, &allowed(1e-6..=1e9, "N/m")),
-                damping_n_s_m: c.number_or(
-                    place,
-                    "damping_n_s_m",
-                    (file.damping_n_s_m, 0.0),
-                    &allowed(0.0..=1e7, "N·s/m"),
-                ),
+                damping_n_s_m: c
+                    .optional(place, "damping_n_s_m", file.damping_n_s_m, &allowed(0.0..=1e7, "N·s/m"))
+                    .unwrap_or(0.0),
                 rest_m: file.rest_m.map(|rest| c.number(place, "rest_m", rest, &length)),
             }
         }
@@ -115,12 +112,7 @@ fn axis(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<DVec
 }
 
 /// A range with both ends within ± `most`, in order.
-fn range(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (key, given): (&str, Option<[f64; 2]>),
-    most: f64,
-) -> Option<[f64; 2]> {
+fn range(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<[f64; 2]>, most: f64) -> Option<[f64; 2]> {
     let [least, greatest] = given?;
     let within = |end: f64| end.abs() <= most;
     if !(within(least) && within(greatest) && least <= greatest) {

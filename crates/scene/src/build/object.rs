@@ -200,7 +200,7 @@ pub(crate) fn read_objects(
         entry.fixed |= entry.model.is_scenery();
         let can_move = !matches!(entry.model, ModelFile::Tool(_) | ModelFile::Synthetic(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
-        entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
+        entry.copies = copies(c, &entry.place, &entry.common, can_move, most);
     }
     let names = name_all(c, &entries);
     let (obstacles, obstacle_looks) = fixed_objects(c, &entries, around.source);
@@ -352,7 +352,7 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Sta
     let mut firsts = Vec::with_capacity(moving.len());
     let mut next = 0;
     for entry in moving {
-        if let Some(member) = member(c, entry, AgentId(next), (names, stage)) {
+        if let Some(member) = member(c, entry, AgentId(next), names, stage) {
             firsts.push((entry, members.len()));
             members.extend(entry.copies.members(&member));
         }
@@ -393,7 +393,7 @@ fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
     }
 }
 
-fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (&Names, &Stage<'_>)) -> Option<Member> {
+fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, names: &Names, stage: &Stage<'_>) -> Option<Member> {
     let Entry { place, common, model, .. } = entry;
     let given = Given {
         place,
@@ -404,7 +404,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
         sleep: common.sleep.unwrap_or(true),
     };
     let pace = pace(c, place, common);
-    let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
+    let faults = faults(c, place, common.faults.as_ref(), stage.around.faults);
     let material = match model {
         ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
         ModelFile::Tool(_) => Material::Metal,
@@ -433,7 +433,8 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
     let (name, links) = (common.name.clone(), Vec::new());
-    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Tool(_))).then_some(simulation)));
+    let range = (!matches!(spec, Spec::Tool(_))).then_some(simulation);
+    let tolerance_m = tolerance(c, place, common, pace, range);
     Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 

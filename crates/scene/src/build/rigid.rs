@@ -94,8 +94,8 @@ fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQu
 }
 
 fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f64) {
-    let restitution = c.number_or(place, "restitution", (file.restitution, 0.2), &allowed(0.0..=1.0, ""));
-    (restitution, c.number_or(place, "friction", (file.friction, 0.5), &allowed(0.0..=10.0, "")))
+    let restitution = c.optional(place, "restitution", file.restitution, &allowed(0.0..=1.0, "")).unwrap_or(0.2);
+    (restitution, c.optional(place, "friction", file.friction, &allowed(0.0..=10.0, "")).unwrap_or(0.5))
 }
 
 /// The keys that each shape takes, of those that describe shapes.
@@ -173,7 +173,7 @@ type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
 
 fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
     let name = file.file.as_deref()?;
-    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
+    let scale = c.optional(place, "scale", file.scale, &allowed(1e-6..=1e6, "")).unwrap_or(1.0);
     let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read {
         Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
@@ -208,8 +208,9 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid)
         }
         return c.number(place, "mass_kg", mass, &MASS);
     }
-    let density =
-        c.number_or(place, "density_kg_m3", (file.density_kg_m3, DENSITY_DEFAULT_KG_M3), &allowed(1e-3..=1e6, "kg/m³"));
+    let density = c
+        .optional(place, "density_kg_m3", file.density_kg_m3, &allowed(1e-3..=1e6, "kg/m³"))
+        .unwrap_or(DENSITY_DEFAULT_KG_M3);
     let volume = volume_m3(solid);
     if is_flat(solid, volume) {
         let what = format!(

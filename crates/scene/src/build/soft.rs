@@ -55,7 +55,7 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, given: &Given<'_>
         held: file.hold.iter().flatten().map(side).collect(),
     };
     let half = DVec3::new(0.5 * size_m[0], 0.5 * size_m[1], 0.0);
-    let pose = pose(c, place, (file.position_m, file.rotation_deg), half);
+    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
     spec(c, given, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
 }
 
@@ -85,7 +85,7 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, given: &Given<'_>
         held,
     };
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
-    let pose = pose(c, place, (file.position_m, file.rotation_deg), half);
+    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
     Some(spec(c, given, shape, pose, shared))
 }
 
@@ -136,42 +136,49 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, given: &Given<'_>) 
     };
     let radius_m = c.number(place, "radius_m", file.radius_m, &LENGTH);
     let segments = segments(c, place, "segments", file.segments);
-    spec(c, given, SoftShape::Rope { path_m, radius_m, segments }, (DVec3::ZERO, DQuat::IDENTITY), shared)
+    let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
+    spec(c, given, SoftShape::Rope { path_m, radius_m, segments }, pose, shared)
 }
 
 fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {
     c.number(place, key, f64::from(count), &SEGMENTS) as u32
 }
 
-/// Position of the first corner, and rotation, of a body whose middle is `half` from that corner in its own axes.
-fn pose(c: &mut Checker<'_, '_>, place: &Place, at: (Option<Point>, Option<Point>), half: DVec3) -> (DVec3, DQuat) {
-    let position = at.0.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
-    let rotation = at.1.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6)));
-    (position - rotation * half, rotation)
+/// Position of the first corner and rotation of a body at the start.
+struct Pose {
+    position: DVec3,
+    rotation: DQuat,
 }
 
-fn spec(
+/// The pose of a body whose middle is `half` from its first corner in its own axes.
+fn pose(
     c: &mut Checker<'_, '_>,
-    given: &Given<'_>,
-    shape: SoftShape,
-    (position, rotation): (DVec3, DQuat),
-    shared: Shared,
-) -> SoftSpec {
+    place: &Place,
+    position_m: Option<Point>,
+    rotation_deg: Option<Point>,
+    half: DVec3,
+) -> Pose {
+    let position = position_m.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
+    let rotation = rotation_deg.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6)));
+    Pose { position: position - rotation * half, rotation }
+}
+
+fn spec(c: &mut Checker<'_, '_>, given: &Given<'_>, shape: SoftShape, pose: Pose, shared: Shared) -> SoftSpec {
     let place = given.place;
     let matter = SoftMatter {
         young_pa: c.number(place, "young_pa", shared.young_pa, &YOUNG),
-        poisson: c.number_or(place, "poisson", (shared.poisson, 0.4), &POISSON),
-        density_kg_m3: c.number_or(place, "density_kg_m3", (shared.density_kg_m3, 1050.0), &DENSITY),
-        damping_per_s: c.number_or(place, "damping_per_s", (shared.damping_per_s, 0.0), &DAMPING),
+        poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(0.4),
+        density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
+        damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING).unwrap_or(0.0),
     };
     SoftSpec {
         shape,
         matter,
-        position,
-        rotation,
+        position: pose.position,
+        rotation: pose.rotation,
         velocity: shared.velocity_m_s.map_or(DVec3::ZERO, |v| c.point(place, "velocity_m_s", v, SPEED_MAX)),
         held: shared.held,
-        friction: c.number_or(place, "friction", (shared.friction, 0.3), &FRICTION),
+        friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
         gravity: given.gravity,
         obstacles: Arc::clone(given.obstacles),
         sleep: given.sleep,

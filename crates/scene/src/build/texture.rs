@@ -26,17 +26,29 @@ const SIDE_MAX: u32 = 4096;
 #[cfg(feature = "images")]
 const BYTES_MAX: u64 = 1 << 28;
 
-/// Textures already made, by what they were made from and the bits of their size.
-pub(super) type Textures = BTreeMap<(String, u64), Option<Arc<Texture>>>;
+/// Textures already made: equal ones are shared.
+pub(super) struct Textures<'s> {
+    /// Where their files are.
+    source: &'s Source,
+    /// By what they were made from and the bits of their size.
+    made: BTreeMap<(String, u64), Option<Arc<Texture>>>,
+}
+
+impl<'s> Textures<'s> {
+    pub(super) fn new(source: &'s Source) -> Self {
+        Self { source, made: BTreeMap::new() }
+    }
+}
 
 /// Applies the texture of a mesh, if it has one, to its parts.
 pub(super) fn painted(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
-    (file, mut parts): (&MeshFile, Parts),
-    from: (&Source, &mut Textures),
+    file: &MeshFile,
+    mut parts: Parts,
+    textures: &mut Textures<'_>,
 ) -> Parts {
-    let (before, found) = (c.count(), texture_of(c, entry, (file, &parts), from));
+    let (before, found) = (c.count(), texture_of(c, entry, file, &parts, textures));
     let bare = found.is_none() && c.count() == before && !parts.is_empty();
     if bare && entry.common.shading == Some(ShadingKind::Textured) {
         c.wrong(&entry.place, "shading", "has nothing to draw", "expected `texture` beside it");
@@ -55,14 +67,15 @@ pub(super) fn painted(
 fn texture_of(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
-    (file, parts): (&MeshFile, &Parts),
-    (source, textures): (&Source, &mut Textures),
+    file: &MeshFile,
+    parts: &Parts,
+    textures: &mut Textures<'_>,
 ) -> Option<Arc<Texture>> {
     let place = &entry.place;
     if file.texture_m.is_some() && file.texture.is_none() {
         c.wrong(place, "texture_m", "has nothing to act on", "expected `texture` beside it");
     }
-    let metres = c.number_or(place, "texture_m", (file.texture_m, 1.0), &allowed(1e-3..=1e3, "m"));
+    let metres = c.optional(place, "texture_m", file.texture_m, &allowed(1e-3..=1e3, "m")).unwrap_or(1.0);
     let (key, name) = match (&file.texture, &file.file) {
         (Some(name), _) => ("texture", name),
         // errors of a file that gave no mesh have been reported
@@ -74,21 +87,22 @@ fn texture_of(
         false => Wrap::Sides(metres as f32),
     };
     let made_from = (name.clone(), if wrap == Wrap::Corners { 0 } else { metres.to_bits() });
-    if let Some(known) = textures.get(&made_from) {
+    if let Some(known) = textures.made.get(&made_from) {
         return known.clone();
     }
-    let made = if key == "file" { own(name, source) } else { named(name, (metres, wrap), source).map(Some) };
+    let source = textures.source;
+    let made = if key == "file" { own(name, source) } else { named(name, metres, wrap, source).map(Some) };
     let texture = made.unwrap_or_else(|why| {
         let patterns = Pattern::ALL.map(|pattern| format!("`{}`", pattern.name())).join(", ");
         let what = format!("cannot be painted: {name}: {why}");
         c.wrong(place, key, what, format!("expected {patterns} or a PNG or JPEG image beside the scene"));
         None
     });
-    textures.entry(made_from).or_insert(texture.map(Arc::new)).clone()
+    textures.made.entry(made_from).or_insert(texture.map(Arc::new)).clone()
 }
 
 /// A pattern, or an image file next to the scene.
-fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Texture, String> {
+fn named(name: &str, metres: f64, wrap: Wrap, source: &Source) -> Result<Texture, String> {
     if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
         return Ok(pattern.texture(metres as f32));
     }

@@ -28,15 +28,16 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, given: &Given<'_>,
     ToolSpec {
         keyframes: keyframes(c, place, &file.keyframe),
         repeat: file.repeat.unwrap_or(false),
-        reach_m: c.number_or(place, "reach_m", (file.reach_m, REACH_DEFAULT_M), &allowed(1e-6..=100.0, "m")),
-        stiffness_n_m: c.number_or(place, "stiffness_n_m", (file.stiffness_n_m, 200.0), &allowed(1e-3..=1e7, "N/m")),
-        damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
-        max_force_n: c.number_or(
-            place,
-            "max_force_n",
-            (file.max_force_n, FORCE_DEFAULT_N),
-            &allowed(FORCES_N, FORCES_WHY),
-        ),
+        reach_m: c.optional(place, "reach_m", file.reach_m, &allowed(1e-6..=100.0, "m")).unwrap_or(REACH_DEFAULT_M),
+        stiffness_n_m: c
+            .optional(place, "stiffness_n_m", file.stiffness_n_m, &allowed(1e-3..=1e7, "N/m"))
+            .unwrap_or(200.0),
+        damping_n_s_m: c
+            .optional(place, "damping_n_s_m", file.damping_n_s_m, &allowed(0.0..=1e5, "N·s/m"))
+            .unwrap_or(1.0),
+        max_force_n: c
+            .optional(place, "max_force_n", file.max_force_n, &allowed(FORCES_N, FORCES_WHY))
+            .unwrap_or(FORCE_DEFAULT_N),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
     }
@@ -94,9 +95,9 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> 
 
 fn keyframe(c: &mut Checker<'_, '_>, place: &Place, file: &KeyframeFile, before: Keyframe) -> Keyframe {
     Keyframe {
-        at_s: c.number_or(place, "at_s", (file.at_s, 0.0), &allowed(0.0..=1e6, "s")),
+        at_s: c.optional(place, "at_s", file.at_s, &allowed(0.0..=1e6, "s")).unwrap_or(0.0),
         tip_m: c.point(place, "tip_m", file.tip_m, POSITION_MAX_M),
         rotation: file.rotation_deg.map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6))),
-        jaw: c.number_or(place, "jaw", (file.jaw, before.jaw), &allowed(0.0..=1.0, "")),
+        jaw: c.optional(place, "jaw", file.jaw, &allowed(0.0..=1.0, "")).unwrap_or(before.jaw),
     }
 }

@@ -50,23 +50,25 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
     let spec = TubeSpec {
         path_m,
         straight: file.straight.unwrap_or(false),
-        twist_rad: c.number_or(place, "twist_deg", (file.twist_deg, 0.0), &TWIST).to_radians(),
+        twist_rad: c.optional(place, "twist_deg", file.twist_deg, &TWIST).unwrap_or(0.0).to_radians(),
         section,
         mass_per_length_kg_m,
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
         integrator: file.integrator.map_or_else(Default::default, integrator),
-        substeps: c.number_or(place, "substeps", (file.substeps.map(f64::from), 1.0), &allowed(1.0..=1000.0, ""))
+        substeps: c.optional(place, "substeps", file.substeps.map(f64::from), &allowed(1.0..=1000.0, "")).unwrap_or(1.0)
             as u32,
-        damping_per_s: c.number_or(place, "damping_per_s", (file.damping_per_s, 0.0), &allowed(0.0..=1e4, "1/s")),
+        damping_per_s: c
+            .optional(place, "damping_per_s", file.damping_per_s, &allowed(0.0..=1e4, "1/s"))
+            .unwrap_or(0.0),
         clamp,
         pin,
         attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
         peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
-        pressure_pa: c.number_or(place, "pressure_pa", (file.pressure_pa, 0.0), &allowed(0.0..=1e7, "Pa")),
+        pressure_pa: c.optional(place, "pressure_pa", file.pressure_pa, &allowed(0.0..=1e7, "Pa")).unwrap_or(0.0),
         self_contact: file.self_contact.unwrap_or(true),
-        friction: c.number_or(place, "friction", (file.friction, 0.2), &allowed(0.0..=10.0, "")),
+        friction: c.optional(place, "friction", file.friction, &allowed(0.0..=10.0, "")).unwrap_or(0.2),
         gravity: given.gravity,
         obstacles: Arc::clone(given.obstacles),
         sleep: given.sleep,
@@ -141,8 +143,9 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section,
     let (_, area_m2) = Section::hollow(radius_m, wall_m, unit);
     let young_pa = modulus(c, place, file, area_m2);
     let density_kg_m3 = density(c, place, file, area_m2);
-    let poisson = c.number_or(place, "poisson", (file.poisson, 0.45), &POISSON);
-    let shear_factor = c.number_or(place, "shear_factor", (file.shear_factor, 27.0 / 28.0), &allowed(1e-3..=2.0, ""));
+    let poisson = c.optional(place, "poisson", file.poisson, &POISSON).unwrap_or(0.45);
+    let shear_factor =
+        c.optional(place, "shear_factor", file.shear_factor, &allowed(1e-3..=2.0, "")).unwrap_or(27.0 / 28.0);
     let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
     let (mut section, mass) = Section::hollow(radius_m, wall_m, material);
     for (key, given, into) in [
@@ -151,10 +154,11 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section,
         ("ei_n_m2", file.ei_n_m2, &mut section.ei_n_m2),
         ("gj_n_m2", file.gj_n_m2, &mut section.gj_n_m2),
     ] {
-        *into = c.number_or(place, key, (given, *into), &STIFFNESS);
+        *into = c.optional(place, key, given, &STIFFNESS).unwrap_or(*into);
     }
-    let mass =
-        c.number_or(place, "mass_per_length_kg_m", (file.mass_per_length_kg_m, mass), &allowed(1e-9..=1e9, "kg/m"));
+    let mass = c
+        .optional(place, "mass_per_length_kg_m", file.mass_per_length_kg_m, &allowed(1e-9..=1e9, "kg/m"))
+        .unwrap_or(mass);
     (section, mass)
 }
 
@@ -250,8 +254,10 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
         from,
         to,
         stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, &allowed(0.0..=1e9, "N/m²")),
-        slack_m: c.number_or(place, "slack_m", (file.slack_m, 0.0), &allowed(0.0..=100.0, "m")),
-        damping_n_s_m2: c.number_or(place, "damping_n_s_m2", (file.damping_n_s_m2, 0.0), &allowed(0.0..=1e6, "N·s/m²")),
+        slack_m: c.optional(place, "slack_m", file.slack_m, &allowed(0.0..=100.0, "m")).unwrap_or(0.0),
+        damping_n_s_m2: c
+            .optional(place, "damping_n_s_m2", file.damping_n_s_m2, &allowed(0.0..=1e6, "N·s/m²"))
+            .unwrap_or(0.0),
     }
 }
 

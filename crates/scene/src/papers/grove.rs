@@ -6,9 +6,22 @@
 use super::camera_path::{Way, stop};
 use super::{Choices, FLOOR, head};
 
-/// Boughs (10 triangles each) and leaves (2 each) of each kind: 620 + 480, 890 + 720, 1740 + 1800 triangles.
-const KINDS: [(&str, u32, u32, &str); 3] =
-    [("birch", 62, 240, "#7fa650"), ("beech", 89, 360, "#5a8a42"), ("oak", 174, 900, "#47713c")];
+/// A kind of tree.
+struct Kind {
+    name: &'static str,
+    /// Boughs, of 10 triangles each.
+    branches: u32,
+    /// Leaves, of 2 triangles each.
+    leaves: u32,
+    leaves_colour: &'static str,
+}
+
+/// The kinds of the paper: 620 + 480, 890 + 720, 1740 + 1800 triangles.
+const KINDS: [Kind; 3] = [
+    Kind { name: "birch", branches: 62, leaves: 240, leaves_colour: "#7fa650" },
+    Kind { name: "beech", branches: 89, leaves: 360, leaves_colour: "#5a8a42" },
+    Kind { name: "oak", branches: 174, leaves: 900, leaves_colour: "#47713c" },
+];
 /// Side of the square for 600 trees, metres; the area grows with their number.
 const SIDE_M: f64 = 240.0;
 const TREES: f64 = 600.0;
@@ -24,13 +37,13 @@ pub(super) fn text(choices: &Choices) -> String {
         &way(choices.zigzag, side_m),
     );
     for (number, kind) in (0..).zip(KINDS) {
-        text += &trees(choices, (number, kind), 0.5 * side_m);
+        text += &trees(choices, number, &kind, 0.5 * side_m);
     }
     text + FLOOR
 }
 
-fn trees(choices: &Choices, (number, kind): (u32, (&str, u32, u32, &str)), half_m: f64) -> String {
-    let (name, branches, leaves, colour) = kind;
+fn trees(choices: &Choices, number: u32, kind: &Kind, half_m: f64) -> String {
+    let Kind { name, branches, leaves, leaves_colour } = kind;
     let count = (choices.trees + 2 - number) / 3;
     let (seed, lod) = (choices.seed + number, if choices.prefix { "prefix" } else { "levels" });
     format!(
@@ -48,7 +61,7 @@ grid = [{count}, 1, 1]
 spacing_m = [0.0, 0.0, 0.0]
 scatter_m = [{half_m:?}, {half_m:?}, 0.0]
 scatter_seed = {seed}
-leaves_colour = "{colour}"
+leaves_colour = "{leaves_colour}"
 "##
     )
 }

@@ -126,7 +126,8 @@ fn out_of_reach_it_rests_on_its_clamp_says_so_and_leaves_without_windup() {
         run.frames(2000);
         assert_eq!(run.control.status(), Status::Clamped(bound));
         let resting = run.control.plan(&run.objects).polygons;
-        let (least, full) = in_view(&run.control.views).fold((0.0, 0.0), |(l, f), (_, s)| (l + s.least, f + s.most));
+        let (least, full) =
+            in_view(&run.control.views).fold((0.0, 0.0), |(l, f), s| (l + s.span.least, f + s.span.most));
         assert_eq!(resting, if bound == Bound::Finest { full } else { least });
         run.plant.slower = 1.0;
         run.frames(2); // the first lesson on the other machine, and the picture made of it

@@ -191,7 +191,7 @@ pub(super) fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<
         return Err("its positions are not three 32-bit floats".to_owned());
     }
     let number = |b: &[u8], at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
-    let items = items(tables, accessor, (data, 12))?;
+    let items = items(tables, accessor, data, 12)?;
     Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
 }
 
@@ -204,7 +204,7 @@ pub(super) fn uvs(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<Vec
         (5123, "VEC2") => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65_535.0),
         _ => return Err("its places on a texture are not two numbers".to_owned()),
     };
-    let items = items(tables, accessor, (data, 2 * size))?;
+    let items = items(tables, accessor, data, 2 * size)?;
     Ok(items.map(|bytes| Vec2::new(number(bytes), number(&bytes[size..]))).collect())
 }
 
@@ -217,7 +217,7 @@ pub(super) fn indices(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec
         (5125, "SCALAR") => (4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         _ => return Err("its indices are not single whole numbers".to_owned()),
     };
-    Ok(items(tables, accessor, (data, size))?.map(number).collect())
+    Ok(items(tables, accessor, data, size)?.map(number).collect())
 }
 
 fn accessor(tables: &Tables, number: usize) -> Result<&Accessor, String> {
@@ -228,7 +228,8 @@ fn accessor(tables: &Tables, number: usize) -> Result<&Accessor, String> {
 fn items<'d>(
     tables: &Tables,
     accessor: &Accessor,
-    (data, size): (&'d [u8], usize),
+    data: &'d [u8],
+    size: usize,
 ) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
     let view = accessor.buffer_view.filter(|_| accessor.sparse.is_none());
     let view = view.ok_or("its data is sparse, which is not understood")?;

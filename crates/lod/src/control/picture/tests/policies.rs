@@ -1,6 +1,7 @@
 //! Policies that choose by cost, on a machine whose prices they are told, or are told wrongly.
 
 use super::*;
+use crate::control::level::Span;
 use proptest::prelude::*;
 
 /// Prices of the plant of these tests: its pixels are the backdrop's.
