@@ -62,26 +62,26 @@ pub(super) fn tolerance(
 ) -> Option<f64> {
     let Some(tolerance_m) = file.tolerance_m else {
         if file.hold == Some(HoldKind::Error) {
-            let expected = "expected `tolerance_m` beside it: the error that it may have, in metres";
-            c.wrong(place, "hold", "is `error`, and nothing says which", expected);
+            let expected = "expected `tolerance_m` beside it: the allowed error, metres";
+            c.wrong(place, "hold", "is `error`, but `tolerance_m` is missing", expected);
         }
         return None;
     };
     let tolerance_m = c.number(place, "tolerance_m", tolerance_m, &TOLERANCE);
     let Some(range) = range else {
-        untolerated(c, place, file);
+        refuse_tolerance(c, place, file);
         return None;
     };
     if file.hold == Some(HoldKind::Rate) {
         c.wrong(
             place,
             "tolerance_m",
-            "stands beside `hold = \"rate\"`",
+            "contradicts `hold = \"rate\"`",
             "expected `hold = \"error\"`, or no `tolerance_m`",
         );
     }
     if pace.dt_range.0 == pace.dt_range.1 && range.eps_m.0 == range.eps_m.1 {
-        let what = "cannot be held: its step is fixed, and so is its spacing";
+        let what = "cannot be held: step and spacing are both fixed";
         let expected = "expected `dt_ms = [least, greatest]`, or for a tube `eps_m = [finest, coarsest]`";
         c.wrong(place, "tolerance_m", what, expected);
     }
@@ -89,10 +89,10 @@ pub(super) fn tolerance(
 }
 
 /// Reports `tolerance_m` and `hold = "error"` on an object that makes no error of its own.
-pub(super) fn untolerated(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
+pub(super) fn refuse_tolerance(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
     let asked = [("tolerance_m", file.tolerance_m.is_some()), ("hold", file.hold == Some(HoldKind::Error))];
     if let Some((key, _)) = asked.iter().find(|(_, there)| *there) {
-        c.wrong(place, key, "is of no use: it makes no error of its own", "expected no such key");
+        c.wrong(place, key, "has no effect: this model has no error of its own", "expected no such key");
     }
 }
 
@@ -151,7 +151,12 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
 /// Colour and material of an object without a texture; `default` is the material of the model.
 pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
     if file.shading == Some(ShadingKind::Textured) {
-        c.wrong(place, "shading", "has nothing to draw", "expected `texture` beside it, which only a mesh can have");
+        c.wrong(
+            place,
+            "shading",
+            "is `textured`, but the object has no texture",
+            "expected `texture` beside it, which only a mesh can have",
+        );
     }
     painted_look(c, place, file, default)
 }

@@ -7,7 +7,7 @@ use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
 use super::texture::Textures;
-use super::{POSITION_MAX_M, mesh};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, mesh};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{GeneratorKind, MeshFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
@@ -57,7 +57,7 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
         let parts = match &entry.model {
             ModelFile::Mesh(file) => {
                 let parts = mesh_parts(c, entry, file, &mut meshes);
-                texture::painted(c, entry, file, parts, &mut textures)
+                texture::apply(c, entry, file, parts, &mut textures)
             }
             ModelFile::Tree(file) => tree_parts(c, entry, file),
             _ => continue,
@@ -87,7 +87,7 @@ pub(super) fn mesh_model(
     source: &Source,
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     if file.dome_m.is_some() {
-        c.wrong(place, "dome_m", "makes many of one proxy", "expected a single mesh");
+        c.wrong(place, "dome_m", "makes many meshes of one proxy", "expected a single mesh");
     }
     mesh_of(c, place, file, &mut Meshes::new(source))
 }
@@ -102,10 +102,10 @@ fn mesh_of(
     let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
     let least =
         file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), &allowed(1.0..=1e6, "")) as u32);
-    let scale = c.optional(place, "scale", file.scale, &allowed(1e-6..=1e6, "")).unwrap_or(1.0);
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let at = Placement { scale, ..placement(c, place, file.position_m, file.rotation_deg) };
     if file.seed.is_some() && file.generate.is_none() {
-        c.wrong(place, "seed", "has nothing to act on", "expected `generate` beside it");
+        c.wrong(place, "seed", "has no effect alone", "expected `generate` beside it");
     }
     let made_from = match (&file.file, file.generate) {
         (Some(name), None) => name.clone(),
@@ -120,27 +120,27 @@ fn mesh_of(
         }
     };
     let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
-    if let Some((tom, reach)) = meshes.made.get(&key) {
-        return in_bounds(c, place, "scale", scale, *reach).then(|| (Arc::clone(tom), at));
+    if let Some((mesh, reach)) = meshes.made.get(&key) {
+        return in_bounds(c, place, "scale", scale, *reach).then(|| (Arc::clone(mesh), at));
     }
-    let made_now = match (&file.file, file.generate) {
+    let built = match (&file.file, file.generate) {
         (Some(name), _) => from_file(name, meshes.source, scale),
         (None, kind) => {
             ProgressiveMesh::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
                 .map_err(|why| why.to_string())
         }
     };
-    match made_now {
-        Ok(tom) => {
+    match built {
+        Ok(mesh) => {
             let wanted = triangles.or(file.generate.map(|_| TRIANGLES_DEFAULT));
-            let tom = match wanted {
-                Some(most) => tom.truncated(most),
-                None => tom,
+            let mesh = match wanted {
+                Some(most) => mesh.truncated(most),
+                None => mesh,
             };
-            let tom = Arc::new(tom.no_coarser(least.unwrap_or(0)));
-            let reach = reach(&tom);
-            meshes.made.insert(key, (Arc::clone(&tom), reach));
-            in_bounds(c, place, "scale", scale, reach).then_some((tom, at))
+            let mesh = Arc::new(mesh.no_coarser(least.unwrap_or(0)));
+            let reach = reach(&mesh);
+            meshes.made.insert(key, (Arc::clone(&mesh), reach));
+            in_bounds(c, place, "scale", scale, reach).then_some((mesh, at))
         }
         Err(why) => {
             let what = format!("cannot be used: {}: {why}", key.0);
@@ -156,8 +156,8 @@ fn from_file(name: &str, source: &Source, scale: f64) -> Result<ProgressiveMesh,
 }
 
 /// The greatest coordinate of a mesh, in its own unit.
-fn reach(tom: &ProgressiveMesh) -> f64 {
-    tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
+fn reach(mesh: &ProgressiveMesh) -> f64 {
+    mesh.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
 }
 
 /// Whether a mesh whose coordinates go up to `reach` in its own unit is within the bounds of a scene at this scale; reports it if not.
@@ -192,7 +192,7 @@ fn placement(
     rotation_deg: Option<Point>,
 ) -> Placement {
     let position = point_or_zero(c, place, "position_m", position, POSITION_MAX_M);
-    let rotation = rotation(point_or_zero(c, place, "rotation_deg", rotation_deg, 1e6)).normalize();
+    let rotation = rotation(point_or_zero(c, place, "rotation_deg", rotation_deg, ROTATION_MAX_DEG)).normalize();
     Placement { position, rotation, scale: 1.0 }
 }
 
@@ -200,26 +200,26 @@ fn placement(
 pub(super) type Parts = Vec<(String, Scenery)>;
 
 /// Checks common keys that scenery does not use: it has no steps, but a wrong rate is still wrong.
-fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
+fn check_unused_keys(c: &mut Checker<'_, '_>, entry: &Entry) {
     pace(c, &entry.place, &entry.common);
     levels(c, &entry.place, &entry.common);
 }
 
 fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &mut Meshes<'_>) -> Parts {
-    read_besides(c, entry);
+    check_unused_keys(c, entry);
     let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
     if file.dome_m.is_some() && file.scale.is_some() {
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
     let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
-    let Some((tom, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
-    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&tom)), at, look, texture: None };
+    let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
+    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&mesh)), at, look, texture: None };
     match dome {
         None => vec![(String::new(), part(at))],
         Some(radius_m) => {
             let places: Vec<Placement> = dome_places(at, radius_m).collect();
             let scale = places.iter().map(|at| at.scale).fold(0.0, f64::max);
-            in_bounds(c, &entry.place, "dome_m", scale, reach(&tom));
+            in_bounds(c, &entry.place, "dome_m", scale, reach(&mesh));
             places.into_iter().enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect()
         }
     }
@@ -227,7 +227,7 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
 
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
     let place = &entry.place;
-    read_besides(c, entry);
+    check_unused_keys(c, entry);
     let bark = look(c, place, &entry.common, Material::Skin);
     let pieces = allowed(1.0..=PIECES_MAX, "");
     let mut count = |key: &str, given: Option<u32>, usual: u32| {
@@ -245,7 +245,7 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let share = c.optional(place, "leaves_importance", file.leaves_importance, &allowed(1e-3..=1.0, ""));
     let share = share.unwrap_or(LEAVES_IMPORTANCE);
     let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
-        c.wrong(place, "leaves_colour", "is no colour", "expected `#rrggbb`, such as `#5a8a42`");
+        c.wrong(place, "leaves_colour", "is not a colour", "expected `#rrggbb`, such as `#5a8a42`");
         LEAF
     });
     let leaf = Look { colour, importance: bark.importance * share, ..bark };

@@ -1,6 +1,6 @@
 //! Reads target, camera, machine and probes of a scene file.
 
-use super::{Names, POSITION_MAX_M};
+use super::{Names, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
@@ -28,7 +28,6 @@ const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 const EYE_NEAREST_M: f64 = 1e-6;
 
 const FOV: Allowed = allowed(1.0..=150.0, "degrees");
-const TIME: Allowed = allowed(0.0..=1e6, "s");
 
 /// The target frame rate and how it is held.
 pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
@@ -59,7 +58,7 @@ fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Opt
     let part = c.optional(place, "optimiser_share", share, &allowed(1e-3..=0.5, "")).unwrap_or(OPTIMISER_SHARE);
     let Some(lag_ms) = file.and_then(|f| f.lag_ms) else {
         if share.is_some() {
-            c.wrong(place, "optimiser_share", "has nothing to act on", "expected `lag_ms` beside it");
+            c.wrong(place, "optimiser_share", "has no effect alone", "expected `lag_ms` beside it");
         }
         return None;
     };
@@ -78,7 +77,7 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
             ("period_s", file.period_s.is_some()),
         ] {
             if given {
-                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes alone");
+                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes only");
             }
         }
         let keys = camera_keys(c, &place, keys, fov_deg)?;
@@ -86,7 +85,7 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
     }
     for (key, given) in [("repeat", file.repeat.is_some()), ("even", file.even.is_some())] {
         if given {
-            c.wrong(&place, key, "has no path to act on", "expected `[[camera.keyframe]]` tables beside it");
+            c.wrong(&place, key, "has no effect without a path", "expected `[[camera.keyframe]]` tables beside it");
         }
     }
     let Some(eye) = file.eye_m else {
@@ -98,7 +97,7 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
         None => Camera::Still(start),
         Some(period_s) if (0.1..=1e5).contains(&period_s.abs()) => Camera::Orbit { start, period_s },
         Some(period_s) => {
-            let expected = "expected 0.1 … 100000 s, or the same below zero to turn the other way";
+            let expected = "expected 0.1 to 100000 s, or -100000 to -0.1 s for the other direction";
             c.wrong(&place, "period_s", format_args!("is {period_s}"), expected);
             Camera::Still(start)
         }
@@ -109,7 +108,7 @@ fn view(c: &mut Checker<'_, '_>, place: &Place, eye: Point, look_at: Point, fov_
     let eye_m = c.point(place, "eye_m", eye, POSITION_MAX_M);
     let look_at_m = c.point(place, "look_at_m", look_at, POSITION_MAX_M);
     if eye_m.distance(look_at_m) < EYE_NEAREST_M && eye_m.is_finite() {
-        c.wrong(place, "eye_m", "is the point that it looks at", "expected a point away from `look_at_m`");
+        c.wrong(place, "eye_m", "is the same point as `look_at_m`", "expected a point away from `look_at_m`");
         return View { eye_m: look_at_m + DVec3::ONE, look_at_m, fov_deg };
     }
     View { eye_m, look_at_m, fov_deg }
@@ -239,7 +238,7 @@ fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Ve
         if known.is_none() {
             let span = c.document().locate(&format!("machine.step.{model}"));
             let list = MODELS.map(|m| format!("`{m}`")).join(", ");
-            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model"));
+            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is not a model"));
             c.push(problem.expecting(format!("expected one of {list}")).helped(did_you_mean(model, MODELS)));
         }
         let place = place.table(model);

@@ -1,7 +1,7 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
-use super::POSITION_MAX_M;
-use super::object::Given;
+use super::object::ModelContext;
+use super::{FRICTION, POSITION_MAX_M};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
 use glam::DVec3;
@@ -40,12 +40,12 @@ pub(super) struct BuiltTube {
 }
 
 /// Reads a tube.
-pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>) -> BuiltTube {
-    let place = given.place;
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelContext<'_>) -> BuiltTube {
+    let place = context.place;
     let path_m = path(c, place, &file.path_m);
     let length_m = path_m.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>().max(SAME_POINT_M);
     let (section, mass_per_length_kg_m) = section(c, place, file);
-    let (resolution, range, picture) = resolutions(c, place, file, given.levels, length_m);
+    let (resolution, range, picture) = resolutions(c, place, file, context.levels, length_m);
     let (clamp, pin) = ends(c, place, file);
     let spec = TubeSpec {
         path_m,
@@ -68,10 +68,10 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
         peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
         pressure_pa: c.optional(place, "pressure_pa", file.pressure_pa, &allowed(0.0..=1e7, "Pa")).unwrap_or(0.0),
         self_contact: file.self_contact.unwrap_or(true),
-        friction: c.optional(place, "friction", file.friction, &allowed(0.0..=10.0, "")).unwrap_or(0.2),
-        gravity: given.gravity,
-        obstacles: Arc::clone(given.obstacles),
-        sleep: given.sleep,
+        friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
+        gravity: context.gravity,
+        obstacles: Arc::clone(context.obstacles),
+        sleep: context.sleep,
     };
     BuiltTube { spec, picture }
 }
@@ -96,7 +96,7 @@ pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, lo
     let (name, segments) = (integrator.name(), tube.segments());
     let wanted = (longest_s / limit_s).ceil();
     let what = format!(
-        "is `{name}`, which carries substeps of {:.3} ms here, not of {:.3} ms",
+        "is `{name}`, which is stable for substeps up to {:.3} ms here, not of {:.3} ms",
         limit_s * 1e3,
         longest_s * 1e3 / f64::from(*substeps)
     );

@@ -3,7 +3,7 @@
 //! In: the number of trees, which path, whether trees have levels, a seed. Out: the scene's text. At twenty frames a second the linear
 //! path has 1000 frames, with most trees in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{Choices, FLOOR, head};
 
 /// A kind of tree.
@@ -34,7 +34,7 @@ pub(super) fn text(choices: &Choices) -> String {
             choices.trees
         ),
         &format!("a walk along a grove of {} trees", choices.trees),
-        &way(choices.zigzag, side_m),
+        &path(choices.zigzag, side_m),
     );
     for (number, kind) in (0..).zip(KINDS) {
         text += &trees(choices, number, &kind, 0.5 * side_m);
@@ -66,7 +66,7 @@ leaves_colour = "{leaves_colour}"
     )
 }
 
-fn way(zigzag: bool, side_m: f64) -> Way {
+fn path(zigzag: bool, side_m: f64) -> CameraPath {
     let place = |x: f64, y: f64| [x * side_m, y * side_m, 6.0];
     let stops = if zigzag {
         vec![
@@ -80,5 +80,5 @@ fn way(zigzag: bool, side_m: f64) -> Way {
     } else {
         vec![stop(0.0, place(-0.1, -0.1), 90.0, -3.0), stop(50.0, place(1.1, -0.1), 90.0, -3.0)]
     };
-    Way { stops, fov_deg: 50.0 }
+    CameraPath { stops, fov_deg: 50.0 }
 }

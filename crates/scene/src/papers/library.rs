@@ -3,7 +3,7 @@
 //! In: nothing. Out: the scene's text. 32 chairs, 8 tables, 24 shelves, 10 doors and 96 sets of books are 19,800 triangles; the paper has
 //! 19,821.
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{FLOOR, head};
 
 /// A grid of equal pieces.
@@ -60,7 +60,7 @@ pub(super) fn text() -> String {
     let mut text = head(
         "A textured room of 19,800 triangles in which the policy chooses the shading as well (FS93, fig. 11).",
         "a library whose triangles and shading are chosen together",
-        &way(),
+        &path(),
     );
     for furniture in &FURNITURE {
         for (number, row) in furniture.rows.iter().enumerate() {
@@ -93,7 +93,7 @@ colour = "{colour}"
     }
 }
 
-fn way() -> Way {
+fn path() -> CameraPath {
     let stops = vec![stop(0.0, [-5.0, -0.5, 1.7], 0.0, -4.0), stop(6.0, [-4.5, 0.5, 1.7], 4.0, -4.0)];
-    Way { stops, fov_deg: 60.0 }
+    CameraPath { stops, fov_deg: 60.0 }
 }

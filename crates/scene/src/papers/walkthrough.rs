@@ -2,7 +2,7 @@
 //!
 //! In: a seed. Out: the scene's text. The paper's counts are lost; these are ours: ten sizes, log-normal, twenty copies of each.
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{FLOOR, head};
 
 const TRIANGLES: f64 = 1.5e6;
@@ -29,7 +29,7 @@ pub(super) fn text(seed: u32) -> String {
     let mut text = head(
         "200 meshes of 1.5 million triangles; a few lie ahead, and after a sudden turn nearly all (GB99).",
         "a walk among 200 meshes of 1.5 million triangles with a sudden turn",
-        &way(),
+        &path(),
     );
     let sizes = NORMAL.map(libm::exp);
     let unit = TRIANGLES / (f64::from(AHEAD.copies + BEHIND.copies) * sizes.iter().sum::<f64>());
@@ -65,12 +65,12 @@ colour = "{colour}"
     )
 }
 
-fn way() -> Way {
+fn path() -> CameraPath {
     let stops = vec![
         stop(0.0, [3.0, 0.0, 1.6], 180.0, 0.0),
         stop(35.0, [-14.0, 0.0, 1.6], 180.0, 0.0),
         stop(35.5, [-14.0, 0.0, 1.6], 360.0, 0.0),
         stop(50.0, [-10.0, 2.0, 1.6], 365.0, 0.0),
     ];
-    Way { stops, fov_deg: 50.0 }
+    CameraPath { stops, fov_deg: 50.0 }
 }
