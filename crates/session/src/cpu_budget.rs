@@ -7,7 +7,7 @@
 
 use super::assemble::ROOM;
 use metachron_core::AgentId;
-use metachron_lod::adaptive::joint::{Between, Drawing, Market, Worker, temporal_error_px};
+use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, temporal_error_px};
 use metachron_lod::control::ObjectView;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -76,7 +76,7 @@ impl AgentBudget {
 pub(super) struct CpuBudget {
     tallies: Vec<Arc<AgentBudget>>,
     workers: Vec<Worker>,
-    market: Market,
+    market: SharedPrice,
     open: bool,
 }
 
@@ -124,7 +124,7 @@ impl CpuBudget {
         if std::mem::take(&mut self.open) {
             self.tallies.iter().for_each(|tally| tally.allow(tally.fair));
         }
-        self.market = Market::default();
+        self.market = SharedPrice::default();
     }
 }
 

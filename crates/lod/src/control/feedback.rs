@@ -6,7 +6,7 @@
 //! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
 
 use super::level;
-use super::level::Held;
+use super::level::LastCut;
 use super::plan::{LevelDemand, SizedView, steers};
 use super::policy::Law;
 use super::status::Status;
@@ -39,7 +39,7 @@ pub(super) struct Feedback {
     /// The water level of the last sharing: the starting guess for the next.
     water: f64,
     /// The last cut of each object, in the order in which they are given.
-    held: Vec<(AgentId, Held)>,
+    held: Vec<(AgentId, LastCut)>,
 }
 
 impl Feedback {
@@ -85,7 +85,7 @@ impl Feedback {
 
     /// Chooses (ε, n) of every object for the next frame.
     pub fn plan(&mut self, views: &[SizedView], levels: &mut Vec<LevelDemand>) {
-        self.held.resize(views.len(), (AgentId(0), Held::default()));
+        self.held.resize(views.len(), (AgentId(0), LastCut::default()));
         for (SizedView { view, .. }, (of, held)) in views.iter().zip(&mut self.held) {
             if *of != view.id || !view.visible {
                 *of = view.id;

@@ -10,7 +10,7 @@ const REMEMBERED: usize = 3;
 
 /// The last levels of one object, newest first.
 #[derive(Debug, Clone, Copy)]
-struct Past {
+struct LevelHistory {
     id: AgentId,
     levels: [Option<LevelDemand>; REMEMBERED],
 }
@@ -18,18 +18,18 @@ struct Past {
 /// The last levels of all objects, in the order in which they are given.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Changes {
-    past: Vec<Past>,
+    past: Vec<LevelHistory>,
 }
 
 impl Changes {
     /// Stores the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
     pub fn count(&mut self, views: &[SizedView], levels: &[LevelDemand]) -> (u32, u32) {
-        let unknown = Past { id: AgentId(0), levels: [None; REMEMBERED] };
+        let unknown = LevelHistory { id: AgentId(0), levels: [None; REMEMBERED] };
         self.past.resize(views.len(), unknown);
         let (mut changes, mut reversals) = (0, 0);
         for ((SizedView { view, .. }, level), past) in views.iter().zip(levels).zip(&mut self.past) {
             if past.id != view.id || !view.visible {
-                *past = Past { id: view.id, ..unknown };
+                *past = LevelHistory { id: view.id, ..unknown };
             }
             if !view.visible {
                 continue;
@@ -52,7 +52,7 @@ mod tests {
     use metachron_core::{Resolution, ResolutionRange};
 
     #[test]
-    fn a_level_that_comes_back_is_a_reversal_and_what_was_out_of_sight_is_new() {
+    fn a_level_that_returns_is_a_reversal_and_an_object_back_in_view_is_new() {
         let at = |n| Resolution { eps_m: 1.0, n };
         let view = |visible| ObjectView {
             id: AgentId(3),

@@ -4,7 +4,7 @@
 //! choice, or the present benefit of an object ([`crate::control::benefit`]). Theory: `docs/theory/control.md`, eq. 23.
 
 use super::benefit;
-use super::level::{Cut, Held, Span, open, polygons};
+use super::level::{Cut, LastCut, Span, open, polygons};
 use super::plan::SizedView;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
@@ -203,7 +203,7 @@ impl Key {
         let octaves = libm::log2(most / span.least);
         let count = if octaves.is_finite() { libm::ceil(octaves / fine) as usize } else { 0 };
         let wishes = (0..count).map(|k| span.least * libm::exp2(fine * k as f64)).chain([most]);
-        let mut cuts: Vec<_> = wishes.map(|wish| Held::default().choose(view, span, wish)).collect();
+        let mut cuts: Vec<_> = wishes.map(|wish| LastCut::default().choose(view, span, wish)).collect();
         cuts.sort_by(|a, b| a.polygons.total_cmp(&b.polygons));
         cuts.dedup_by(|a, b| a.polygons <= b.polygons);
         cuts
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_group_has_a_rung_for_each_impostor_and_the_finest_counts_whole() {
+    fn a_group_has_a_rung_for_each_impostor_and_the_finest_has_accuracy_one() {
         let Ladder { rungs, asked, .. } = ladder([20, 80, 320, 0, 0, 0, 0, 0]);
         assert_eq!(
             rungs.iter().map(|r| (r.resolution.n, r.polygons)).collect::<Vec<_>>(),
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn one_impostor_counts_whole_to_the_bit_and_none_is_no_rung() {
+    fn a_single_impostor_has_accuracy_one_and_no_impostor_gives_no_rung() {
         let one = ladder([37, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
         assert!(ladder([0; 8]).rungs.is_empty());

@@ -64,12 +64,12 @@ pub(super) struct Cut {
 
 /// The last cut of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Held {
+pub(super) struct LastCut {
     /// The polygons requested when it was last cut, and the level n chosen; `None` while it is out of view.
     cut: Option<(f64, u8)>,
 }
 
-impl Held {
+impl LastCut {
     /// Clears the last cut when the object goes out of view.
     pub fn forget(&mut self) {
         *self = Self::default();
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn a_switch_of_n_keeps_the_polygons_and_the_quads_near_square() {
         let view = tube((1e-4, 0.5), (0, 10));
-        let (span, mut held) = (Span::of(&view), Held::default());
+        let (span, mut held) = (Span::of(&view), LastCut::default());
         let mut levels = Vec::new();
         let mut wish = 1300.0;
         while wish < 4e5 {
@@ -229,11 +229,11 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_that_trembles_switches_n_at_most_once() {
+    fn a_request_that_fluctuates_switches_n_at_most_once() {
         let view = tube((5e-4, 0.02), (1, 5));
         let span = Span::of(&view);
         for start in 0..200 {
-            let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), Held::default());
+            let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), LastCut::default());
             let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, √2 wide
             let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).resolution.n).collect();
             levels.dedup();
@@ -247,7 +247,7 @@ mod tests {
             [((5e-4, 0.02), (1, 5)), ((0.01, 0.01), (0, 6)), ((1e-3, 0.05), (3, 3)), ((0.01, 0.02), (1, 4))]
         {
             let view = tube(eps_m, n);
-            let (span, mut held) = (Span::of(&view), Held::default());
+            let (span, mut held) = (Span::of(&view), LastCut::default());
             let mut ends = |wish| held.choose(&view, span, wish).resolution;
             assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
             assert_eq!(ends(span.full), Resolution { eps_m: eps_m.0, n: n.1 });
@@ -258,17 +258,17 @@ mod tests {
     #[test]
     fn a_tube_of_one_spacing_climbs_by_levels() {
         let view = tube((0.01, 0.01), (0, 6));
-        let (span, mut held) = (Span::of(&view), Held::default());
+        let (span, mut held) = (Span::of(&view), LastCut::default());
         let levels: Vec<_> =
             (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).resolution.n).collect();
         assert!(levels.is_sorted() && levels[0] == 0 && *levels.last().unwrap() == 6, "{levels:?}");
     }
 
     #[test]
-    fn what_is_cut_by_triangles_has_as_many_as_are_wished_for() {
+    fn a_mesh_with_free_triangle_count_has_as_many_as_requested() {
         let kind = Kind::Counted { radius_m: 0.1, least: 40, most: 100_000 };
         let view = ObjectView { kind, ..tube((1.0, 1.0), (0, 10)) };
-        let (span, mut held) = (Span::of(&view), Held::default());
+        let (span, mut held) = (Span::of(&view), LastCut::default());
         for wish in [1.0, 40.0, 123.4, 9_999.0, 1e9] {
             let polygons = held.choose(&view, span, wish).polygons;
             assert_eq!(polygons, wish.floor().clamp(40.0, 100_000.0));

@@ -17,11 +17,12 @@ use super::level;
 use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
-use super::quality_boost::Raise;
-use super::query::{Ask, Promise};
+use super::quality_boost::QualityBoost;
+use super::query::{FrameQuery, Promise};
 use super::select::Select;
 use super::status::Status;
 use super::view::ObjectView;
+use crate::adaptive::DEFAULT_MARGIN;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
@@ -37,9 +38,7 @@ const OVERHEAD_NEWS: f64 = 0.1;
 /// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
 const FIXED_TREMBLE: f64 = 0.01;
 
-/// The fraction of a frame that policies with a prediction leave free by default.
-const MARGIN: f64 = 0.02;
-/// The same for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
+/// The fraction of a frame that policies with a prediction leave free for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
 const LAG_MARGIN: f64 = 0.03;
 
 /// Chooses the level of every picture.
@@ -55,7 +54,7 @@ pub struct PictureControl {
     backdrop: Backdrop,
     frozen: bool,
     /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
-    raise: Option<Raise>,
+    raise: Option<QualityBoost>,
     /// Time of a frame outside drawing, seconds, smoothed.
     overhead_s: Option<f64>,
     /// Time of a frame that is spent whatever is chosen, seconds, as used for the last choice.
@@ -148,7 +147,7 @@ impl PictureControl {
 
     /// Chooses the level of every object for the next frame.
     pub fn plan(&mut self, objects: &[ObjectView]) -> &Plan {
-        self.look(objects);
+        self.update_views(objects);
         let same = self.plan.levels.len() == objects.len();
         if self.frozen && same && self.plan.levels.iter().zip(objects).all(|(level, object)| level.id == object.id) {
             self.count();
@@ -184,7 +183,7 @@ impl PictureControl {
     /// The fraction of a frame that is left free by policies with a prediction.
     fn margin_now(&self) -> f64 {
         let bound = self.pipeline.is_some_and(|pipeline| pipeline.lag * self.target_hz < 1.0);
-        self.margin.unwrap_or(if bound { LAG_MARGIN } else { MARGIN })
+        self.margin.unwrap_or(if bound { LAG_MARGIN } else { DEFAULT_MARGIN })
     }
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
@@ -199,7 +198,7 @@ impl PictureControl {
         if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }
-        let ask = Ask {
+        let query = FrameQuery {
             views: &self.views,
             ladders: &self.ladders,
             sliders: &self.sliders,
@@ -210,14 +209,14 @@ impl PictureControl {
             fixed_s: self.fixed_s,
         };
         let mut promise = match self.policy {
-            Policy::Adaptive => self.adaptive.choose(&ask, &self.groups, levels),
+            Policy::Adaptive => self.adaptive.choose(&query, &self.groups, levels),
             Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
-                self.hierarchy.choose(self.policy, &ask, &self.groups, levels)
+                self.hierarchy.choose(self.policy, &query, &self.groups, levels)
             }
-            policy => self.select.choose(policy, &ask, levels),
+            policy => self.select.choose(policy, &query, levels),
         };
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
-            raise.observe(&ask, levels, &promise);
+            raise.observe(&query, levels, &promise);
         }
         // time reserved for others is not spent by the frame
         promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
@@ -231,7 +230,7 @@ impl PictureControl {
     }
 
     /// Stores the objects in view with their polygon ranges and smoothed speeds.
-    fn look(&mut self, objects: &[ObjectView]) {
+    fn update_views(&mut self, objects: &[ObjectView]) {
         self.views.truncate(objects.len());
         self.speeds.resize(objects.len(), (AgentId(0), None));
         for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {

@@ -1,6 +1,6 @@
 //! The input of every cost-based policy, and the promise that it gives.
 //!
-//! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
+//! In: the objects with their ladders, the time. Out: [`FrameQuery`] and [`Promise`]. Never here: a choice.
 
 use super::benefit;
 use super::ladder::{Ladder, Ladders, Rung};
@@ -22,7 +22,7 @@ const USUAL: f64 = 1e5;
 
 /// The input of a policy for one frame.
 #[derive(Clone, Copy)]
-pub(super) struct Ask<'a> {
+pub(super) struct FrameQuery<'a> {
     pub views: &'a [SizedView],
     pub ladders: &'a Ladders,
     pub sliders: &'a Sliders,
@@ -63,7 +63,7 @@ impl Promise {
     }
 }
 
-impl Ask<'_> {
+impl FrameQuery<'_> {
     /// Time for the choice, seconds.
     pub fn budget_s(&self) -> f64 {
         self.target_s * (1.0 - self.margin) - self.fixed_s

@@ -28,7 +28,7 @@ impl PictureControl {
         if self.frozen {
             return;
         }
-        self.look(objects);
+        self.update_views(objects);
         let mut levels = self.ahead.take().map_or_else(Vec::new, |ahead| ahead.levels);
         levels.clear();
         let promise = self.choose(&mut levels);
