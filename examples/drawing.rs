@@ -44,7 +44,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
 /// What one frame took.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// Wall time of the least of 15 frames, milliseconds: the work when nobody disturbs it.
+    /// Wall time of the least of 15 frames, milliseconds: the undisturbed work.
     wall_ms: f64,
     /// Processor time of all threads in the least of 15 frames, milliseconds: a driver in software draws with these.
     cpu_ms: f64,

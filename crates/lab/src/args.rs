@@ -68,7 +68,7 @@ pub struct TuneArgs {
     /// Run the experiment on this machine and its graphics adapter instead of the declared machine
     #[arg(long)]
     pub live: bool,
-    /// Frames a second to hold, 1 to 1000
+    /// Target frame rate, frames per second, 1 to 1000
     #[arg(long, value_name = "F", value_parser = target_fps)]
     pub target_fps: Option<f64>,
     /// Size of the picture in pixels, each 1 to 8192; 1280x720 where not given
