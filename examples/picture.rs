@@ -28,6 +28,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         png: Some(picture_file.clone()),
     };
     let outcome = play_headless(Session::open(scene)?, plan, &mut |_, _| true)?;
-    println!("{} agents, {:.2} s, drawn on {}: {}", outcome.agents.len(), outcome.sim_s, gpu.describe(), picture_file.display());
+    println!(
+        "{} agents, {:.2} s, drawn on {}: {}",
+        outcome.agents.len(),
+        outcome.sim_s,
+        gpu.describe(),
+        picture_file.display()
+    );
     Ok(())
 }

@@ -18,7 +18,7 @@ Examples:
   metachron list                               the built-in scenes
   metachron run yard                           another one
   metachron run my.toml                        a scene of your own
-  metachron check my.toml                      what is wrong with it, line by line
+  metachron check my.toml                      its problems, line by line
   metachron schema > metachron.schema.json     for completion in an editor
 
 Exit codes: 0 ok, 1 failed run, 2 bad input or usage, 4 a goal of --fail-on was missed, 130 interrupted.";
@@ -76,11 +76,11 @@ pub enum Command {
     #[cfg(feature = "lab")]
     #[command(after_help = FIT_EXAMPLES, allow_negative_numbers = true)]
     Fit(FitArgs),
-    /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
+    /// Measure the limits of the methods: CSV, SVG and PNG into a folder, a table on standard output
     #[cfg(feature = "lab")]
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
-    /// Measure how much load this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
+    /// Measure how much load this machine carries: CSV, JSON, SVG and PNG into a folder, a table on standard output
     #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
@@ -106,7 +106,7 @@ pub enum Command {
 /// `generate`.
 #[derive(Debug, Args)]
 pub struct GenerateArgs {
-    /// Which scene
+    /// Name of the scene
     #[arg(value_parser = PossibleValuesParser::new(Paper::ALL.map(Paper::name)))]
     pub scene: String,
     /// Seed of everything random in it
@@ -115,7 +115,7 @@ pub struct GenerateArgs {
     /// Number of trees of the grove; 600 where not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=3000))]
     pub trees: Option<u32>,
-    /// Lead the camera through the grove with two sudden turns instead of straight along it
+    /// Move the camera through the grove with two sudden turns instead of straight along it
     #[arg(long)]
     pub zigzag: bool,
     /// Trees of the grove without levels of detail: as much of the full mesh is drawn as there is time for
@@ -151,19 +151,19 @@ pub struct RunArgs {
     /// Open no window
     #[arg(long, env = "METACHRON_HEADLESS", value_parser = clap::builder::FalseyValueParser::new())]
     pub headless: bool,
-    /// End after so many frames
+    /// End after this many frames
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,
-    /// End after so many simulated seconds; headless runs take 10 where neither this nor --frames is given
+    /// End after this many simulated seconds; headless runs take 10 where neither this nor --frames is given
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
-    /// Frames a second to hold, 1 to 1000
+    /// Target frame rate, frames per second, 1 to 1000
     #[arg(long, value_name = "F", env = "METACHRON_TARGET_FPS", value_parser = target_fps)]
     pub target_fps: Option<f64>,
     /// Policy that chooses the level of detail of every visible object
     #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(PolicyKind::ALL.map(PolicyKind::name)))]
     pub policy: Option<String>,
-    /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
+    /// The feedback law: corrected (its gain does not depend on the machine) or printed (as in the paper)
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
     pub law: Option<String>,
     /// Take the gains of the feedback law from this file (TOML, as `metachron tune` writes it); --set and flags take precedence over it
@@ -182,13 +182,13 @@ pub struct RunArgs {
     /// Change a key of the scene, such as target.frame_hz=60 or object.NAME.rate_hz=120; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
     pub set: Vec<(String, String)>,
-    /// Run the scene a second time on one very fine common clock, and report what its own clocks changed (headless only)
+    /// Run the scene a second time as a reference, all agents on one very fine common clock, and report the differences (headless only)
     #[arg(long)]
     pub oracle: bool,
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
-    /// How headless pictures show things: wireframe, or colours by resolution, age or detail; several are separated by commas
+    /// Style of headless pictures: wireframe, or colours by resolution, age or detail; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,
     /// Write the report here (JSON); - is standard output
@@ -237,7 +237,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_arguments_are_sound() {
+    fn the_arguments_pass_claps_own_checks() {
         Cli::command().debug_assert();
     }
 }

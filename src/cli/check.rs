@@ -2,7 +2,7 @@
 
 use super::args::CheckArgs;
 use metachron_console::exit::Exit;
-use metachron_console::output::{data, message, pictured, tell_overlaps};
+use metachron_console::output::{data, message, print_overlaps, rendered};
 use metachron_scene::{SceneError, SceneProblem, Source, load};
 use metachron_session::report::{MovedReport, OverlapReport};
 use metachron_world::Scene;
@@ -51,15 +51,15 @@ pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
         data(&format!("{}\n", serde_json::to_string_pretty(&rows)?))?;
     } else {
         for (name, result) in &results {
-            tell(name, result, args.common.quiet)?;
+            print_result(name, result, args.common.quiet)?;
         }
     }
     Ok(if results.iter().all(|(_, result)| result.is_ok()) { Exit::Ok } else { Exit::BadInput })
 }
 
-fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::Result<()> {
+fn print_result(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::Result<()> {
     match result {
-        Err(error) => message(&pictured(error)),
+        Err(error) => message(&rendered(error)),
         Ok(_) if quiet => {}
         Ok(scene) => {
             let Content { agents, fixed, probes, scenery, joints, couplings, .. } = content(scene);
@@ -67,15 +67,15 @@ fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::
             let some = [(scenery, "scenic object"), (joints, "joint"), (couplings, "coupling")]
                 .into_iter()
                 .filter(|(count, _)| *count > 0);
-            let list = always.chain(some).map(counted).collect::<Vec<_>>().join(", ");
+            let list = always.chain(some).map(|(count, what)| counted(count, what)).collect::<Vec<_>>().join(", ");
             data(&format!("{name}: ok ({list})\n"))?;
-            tell_overlaps(scene);
+            print_overlaps(scene);
         }
     }
     Ok(())
 }
 
-fn counted((count, what): (usize, &str)) -> String {
+fn counted(count: usize, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {what}{plural}")
 }

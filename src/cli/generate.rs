@@ -5,7 +5,7 @@
 use super::args::GenerateArgs;
 use anyhow::Context;
 use metachron_console::exit::Exit;
-use metachron_console::gains::check_place;
+use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message};
 use metachron_scene::papers::{Choices, Paper};
 
@@ -20,7 +20,7 @@ pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
     match &args.out {
         None => data(&text)?,
         Some(path) => {
-            check_place(path, "--out", args.force)?;
+            check_output_path(path, "--out", args.force)?;
             let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
             std::fs::write(path, text).map_err(refused)?;
             message(&format!("scene: {}", path.display()));
@@ -34,7 +34,7 @@ fn refuse_strays(args: &GenerateArgs, paper: Paper) -> Result<(), BadInput> {
     let given = [("--trees", args.trees.is_some()), ("--zigzag", args.zigzag), ("--prefix", args.prefix)];
     match given.iter().find(|(_, given)| *given) {
         Some((flag, _)) if paper != Paper::Grove => {
-            Err(BadInput(format!("{flag} is for the grove; {} has nothing of the kind", paper.name())))
+            Err(BadInput(format!("{flag} applies to the grove only, not to {}", paper.name())))
         }
         _ => Ok(()),
     }

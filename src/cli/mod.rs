@@ -28,7 +28,7 @@ pub fn main() -> ExitCode {
         Ok(cli) => dispatch(cli, &matches),
         Err(error) => error.exit(),
     };
-    done.unwrap_or_else(|error| metachron_console::output::tell(&error)).into()
+    done.unwrap_or_else(|error| metachron_console::output::report_error(&error)).into()
 }
 
 fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {

@@ -53,7 +53,7 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
 fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = cfg!(feature = "render").then(|| request.png_without_window.clone());
     let mut played = headless(session, request, request.png.clone().or(png), go_on)?;
-    played.no_window = Some("this build has no window (feature `viewer`)".to_owned());
+    played.no_window = Some("this build cannot open a window: it lacks the feature `viewer`".to_owned());
     Ok(played)
 }
 
@@ -124,9 +124,10 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
 #[cfg(not(feature = "render"))]
 fn drawing(_: &Session, _: &Request, picture: bool, _: Size) -> anyhow::Result<Drawing> {
     if picture {
-        return Err(
-            metachron_console::output::BadInput("this build draws no pictures (feature `render`)".to_owned()).into()
-        );
+        return Err(metachron_console::output::BadInput(
+            "this build cannot draw pictures: it lacks the feature `render`".to_owned(),
+        )
+        .into());
     }
     Ok(Drawing::Nothing)
 }

@@ -9,7 +9,7 @@ use anyhow::Context;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use metachron_console::exit::Exit;
-use metachron_console::output::{BadInput, data, message, tell_overlaps, tell_priority};
+use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_console::progress::Bar;
 use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
@@ -105,8 +105,8 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     check_outputs(args)?;
     let request = request(args, matches)?;
     if !args.quiet {
-        tell_overlaps(&request.scene);
-        tell_priority(&request.scene);
+        print_overlaps(&request.scene);
+        warn_priority(&request.scene);
     }
     let bar = Bar::new(&request.scene.name, args.quiet);
     let stopped = Arc::new(AtomicBool::new(false));
@@ -187,13 +187,13 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
     }
     if args.oracle && !args.headless {
-        let why = "--oracle plays the scene twice without a window; add --headless";
+        let why = "--oracle runs the scene twice without a window; add --headless";
         return Err(BadInput(why.to_owned()).into());
     }
     for (flag, path) in [("--png", &args.png), ("--frames-csv", &args.frames_csv)] {
         if path.as_deref() == Some(Path::new("-")) {
             return Err(BadInput(format!(
-                "{flag} - would be standard output, which takes the report alone; name a file"
+                "{flag} - would write to standard output, which only the report may use; name a file"
             ))
             .into());
         }
@@ -207,12 +207,12 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
             return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
         }
     }
-    check_apart(args)?;
-    check_ending(args)
+    check_distinct(args)?;
+    check_extension(args)
 }
 
 /// Refuses a picture file with another ending than .png, because the content is PNG.
-fn check_ending(args: &RunArgs) -> anyhow::Result<()> {
+fn check_extension(args: &RunArgs) -> anyhow::Result<()> {
     let Some((path, ending)) = args.png.as_deref().and_then(|path| Some((path, path.extension()?))) else {
         return Ok(());
     };
@@ -224,7 +224,7 @@ fn check_ending(args: &RunArgs) -> anyhow::Result<()> {
 }
 
 /// Refuses an output that would overwrite another one, or an input.
-fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
+fn check_distinct(args: &RunArgs) -> anyhow::Result<()> {
     let scene = Path::new(&args.scene);
     let files = [
         ("the scene", Some(scene).filter(|path| path.is_file())),
@@ -234,7 +234,7 @@ fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
         ("--frames-csv", args.frames_csv.as_deref()),
     ];
     let places: Vec<_> =
-        files.iter().filter_map(|(what, path)| Some((*what, (*path)?, place(path.as_ref()?)?))).collect();
+        files.iter().filter_map(|(what, path)| Some((*what, (*path)?, resolved_path(path.as_ref()?)?))).collect();
     for (k, (what, path, at)) in places.iter().enumerate().skip(1) {
         // inputs may be the same file
         let before = places[..k].iter().find(|(_, _, other)| other == at && !["the scene", "--gains"].contains(what));
@@ -248,7 +248,7 @@ fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
 }
 
 /// The place of a file, existing or not, independent of how its path is written; `None` for devices, which take any output.
-fn place(path: &Path) -> Option<PathBuf> {
+fn resolved_path(path: &Path) -> Option<PathBuf> {
     match path.canonicalize() {
         Ok(there) => there.is_file().then_some(there),
         Err(_) => {
@@ -278,7 +278,7 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
             .with_context(|| format!("the frames {} cannot be written", path.display()))?;
     }
     if !args.quiet {
-        tell_notes(args, played);
+        print_notes(args, played);
     }
     if args.json {
         data(&report)?;
@@ -289,19 +289,19 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
 }
 
 /// Prints notes in addition to the report.
-fn tell_notes(args: &RunArgs, played: &Played) {
+fn print_notes(args: &RunArgs, played: &Played) {
     if let Some(why) = &played.no_window {
         message(&format!("ran without a window: {why}"));
     }
     if played.unpriced {
-        message("note: what drawing costs here could not be measured in three seconds: the usual prices were taken");
+        message("note: the cost of drawing could not be measured within three seconds: default prices were used");
     }
     if args.oracle && played.interrupted {
         message(&match &played.report.oracle {
             Some(oracle) => {
-                format!("interrupted: the first {:.2} s are compared, which both runs have played", oracle.sim_s)
+                format!("interrupted: only the first {:.2} s, which both runs completed, are compared", oracle.sim_s)
             }
-            None => "interrupted: the scene was not played a second time, so nothing is compared".to_owned(),
+            None => "interrupted: the reference run did not start, so nothing is compared".to_owned(),
         });
     }
     if let Some(path) = &played.picture {
@@ -328,7 +328,7 @@ fn judge(args: &RunArgs, played: &Played) -> anyhow::Result<Exit> {
                 missed = true;
             }
             Verdict::NotMeasured => {
-                message(&format!("goal missed: {goal} cannot be judged, the value was not measured in this run"));
+                message(&format!("goal missed: {goal} cannot be evaluated, the value was not measured in this run"));
                 missed = true;
             }
         }
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn flags_go_before_set_and_set_before_the_scene() {
+    fn flags_override_set_and_set_overrides_the_scene() {
         let hz = |arguments: &[&str]| requested(arguments).scene.target.frame_hz;
         assert_eq!(hz(&["tube"]), 30.0);
         assert_eq!(hz(&["tube", "--set", "target.frame_hz=45"]), 45.0);
@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_takes_what_its_flags_say() {
+    fn a_run_request_has_the_values_of_its_flags() {
         let request = requested(&[
             "pendulum",
             "--headless",

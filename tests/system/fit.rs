@@ -241,8 +241,8 @@ fn an_error_out_of_reach_is_held_as_well_as_can_be_and_told() {
 #[test]
 fn an_error_that_cannot_be_held_is_refused_on_its_line() {
     for (folder, key, sentence) in [
-        (holding("", "hold = \"error\"\n"), "hold = \"error\"", "nothing says which"),
-        (holding("1e-3", "hold = \"rate\"\n"), "tolerance_m = 1e-3", "stands beside"),
+        (holding("", "hold = \"error\"\n"), "hold = \"error\"", "`tolerance_m` is missing"),
+        (holding("1e-3", "hold = \"rate\"\n"), "tolerance_m = 1e-3", "contradicts"),
         (holding("-1", "hold = \"error\"\n"), "tolerance_m = -1", "expected a number from"),
         (Folder::with(&TUBE.replace("sleep = false", "tolerance_m = 1e-3")), "tolerance_m = 1e-3", "cannot be met"),
     ] {
@@ -276,7 +276,7 @@ fn a_step_past_the_limit_of_an_explicit_integrator_is_told_before_the_run() {
         let said = unwrapped(&done);
         assert_eq!(done.status.code(), Some(if refused { 2 } else { 0 }), "{integrator}: {said}");
         if refused {
-            assert!(said.contains("carries substeps of") && said.contains("an implicit integrator"), "{said}");
+            assert!(said.contains("stable for substeps up to") && said.contains("an implicit integrator"), "{said}");
         }
     }
 }

@@ -171,7 +171,7 @@ fn an_integrator_that_does_not_exist_names_those_that_do() {
 
 #[test]
 fn an_integrator_that_cannot_carry_the_step_says_how_long_a_one_it_can() {
-    let words = &["carries substeps of", "`substeps = ", "segments"];
+    let words = &["stable for substeps up to", "`substeps = ", "segments"];
     refused("importance = 1.0", "integrator = \"symplectic-euler\"", "\"symplectic-euler\"", words);
 }
 
@@ -182,12 +182,12 @@ fn an_unknown_model_names_those_that_exist() {
 
 #[test]
 fn names_are_unique_and_not_empty() {
-    refused("\"intestine\"", "\" \"", "\" \"", &["is not a name"]);
+    refused("\"intestine\"", "\" \"", "\" \"", &["is not a valid name"]);
     let twice =
         format!("{TUBE}\n[[object]]\nname = \"intestine\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n");
     let (line, _, text, said) = problem(&twice);
     assert_eq!((line, text.as_str()), (18, "\"intestine\""));
-    assert!(said.contains("is taken"), "{said}");
+    assert!(said.contains("the name of another object"), "{said}");
 }
 
 fn rigid(keys: &str) -> String {
@@ -217,14 +217,14 @@ fn references_name_what_exists() {
     let said = problem(&format!("{TUBE}{tool}")).3;
     assert!(said.contains("`liver`") && said.contains("`intestine`"), "{said}");
     let said = problem(&format!("{TUBE}{}", tool.replace("liver", "tool"))).3;
-    assert!(said.contains("names `tool`, a tool, which jaws cannot hold"), "{said}");
+    assert!(said.contains("names `tool`, a tool, which jaws cannot grasp"), "{said}");
     let fixed = format!(
         "{TUBE}{}\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n",
         tool.replace("liver", "floor")
     );
     let (line, _, text, said) = problem(&fixed);
     assert_eq!((line, text.as_str()), (20, "\"floor\""));
-    assert!(said.contains("names `floor`, a fixed object, which jaws cannot hold"), "{said}");
+    assert!(said.contains("names `floor`, a fixed object, which jaws cannot grasp"), "{said}");
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn a_mesh_that_no_scene_can_hold_is_refused_by_name_whether_it_is_touched_or_see
     for (file, why) in [
         (format!("{tetrahedron}v 1 1 1\nf 1 2 5\n"), "line 10: it is not manifold: 3 triangles share the edge"),
         (tetrahedron.trim_end_matches(" 4\n").to_owned(), "line 8: a face has 2 corners"),
-        (tetrahedron.replace("v 1 0 0", "v 1e38 0 0"), "it reaches 1.000e38 m"),
+        (tetrahedron.replace("v 1 0 0", "v 1e38 0 0"), "it extends 1.000e38 m"),
         ("\u{0}\u{1}\u{2}".to_owned(), "neither a .glb file"),
     ] {
         std::fs::write(at("m.obj"), file).unwrap();

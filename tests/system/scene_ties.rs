@@ -109,9 +109,9 @@ fn a_joint_names_two_rigid_objects() {
     joint_refused(r#"kind = "fixed", a = "left", b = "left""#, "\"left\"", &["another object"]);
     joint_refused(r#"kind = "fixed", a = "left", b = "hose""#, "\"hose\"", &["is a tube", "[[coupling]]", "attach"]);
     joint_refused(r#"kind = "fixed", a = "tool", b = "left""#, "\"tool\"", &["is a tool", "attach"]);
-    joint_refused(r#"kind = "fixed", a = "left", b = "ghost""#, "\"ghost\"", &["no matter"]);
+    joint_refused(r#"kind = "fixed", a = "left", b = "ghost""#, "\"ghost\"", &["without a body"]);
     joint_refused(r#"kind = "fixed", a = "world", b = "left""#, "\"world\"", &["the world is written as `b`"]);
-    joint_refused(r#"kind = "fixed", a = "post", b = "world""#, "\"world\"", &["cannot move"]);
+    joint_refused(r#"kind = "fixed", a = "post", b = "world""#, "\"world\"", &["is fixed, and so is `a`"]);
     joint_refused(r#"kind = "weld", a = "left", b = "right""#, "\"weld\"", &["`fixed`", "`rope`"]);
 }
 
@@ -146,17 +146,17 @@ fn a_joint_holds_where_the_objects_start() {
     joint_refused(
         &format!(r#"kind = "fixed", {pair}, at_b_m = [0, 0.6, 0]"#),
         "[0, 0.6, 0]",
-        &["starts 0.4000 m from", "within 0.001 m"],
+        &["is 0.4000 m away from", "within 0.001 m"],
     );
     joint_refused(
         &format!(r#"kind = "spherical", {pair}, at_b_m = [0, 1, 0.01]"#),
         "[0, 1, 0.01]",
-        &["starts 0.0100 m from"],
+        &["is 0.0100 m away from"],
     );
     joint_refused(
         &format!(r#"kind = "prismatic", {pair}, axis = [0, 0, 1], at_b_m = [0, 0, 0]"#),
         "[0, 0, 0]",
-        &["1.0000 m beside the axis"],
+        &["1.0000 m off the axis"],
     );
     joint_refused(
         &format!(r#"kind = "prismatic", {pair}, axis = [1, 0, 0], at_b_m = [0, 0, 0], range_m = [0, 0.5]"#),
@@ -192,13 +192,13 @@ fn joints_of_one_pair_must_leave_something_free_together() {
     let fixed = r#"kind = "fixed""#;
     let hinge = |axis: &str, at: &str| format!(r#"kind = "revolute", axis = {axis}, at_a_m = {at}"#);
     let slide = r#"kind = "prismatic", axis = [1, 0, 0]"#;
-    refused(fixed, fixed, "holds already");
+    refused(fixed, fixed, "connects already");
     refused(fixed, &hinge("[0, 0, 1]", "[0, 0, 0]"), "contradicts the fixed joint");
-    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), &hinge("[0, 1, 0]", "[0, 0, 0]"), "turns about another line");
+    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), &hinge("[0, 1, 0]", "[0, 0, 0]"), "rotates about another axis");
     // parallel axes, one metre apart: the right box's origin is not the left one's
-    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), &hinge("[0, 0, 1]", "[0, 0, 0]"), "turns about another line");
-    refused(slide, &hinge("[0, 0, 1]", "[0, 0, 0]"), "one turns where the other slides");
-    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), r#"kind = "spherical""#, "beside the axis");
+    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), &hinge("[0, 0, 1]", "[0, 0, 0]"), "rotates about another axis");
+    refused(slide, &hinge("[0, 0, 1]", "[0, 0, 0]"), "one rotates, the other slides");
+    refused(&hinge("[0, 0, 1]", "[0, 0, 0]"), r#"kind = "spherical""#, "off the axis");
     // one line through both origins: the right box's -y axis is the world's x
     with(&both(&hinge("[1, 0, 0]", "[0, 0, 0]"), &hinge("[0, 1, 0]", "[0, 0, 0]")));
     with(&both(&hinge("[1, 0, 0]", "[0, 0, 0]"), r#"kind = "spherical""#));
@@ -231,7 +231,7 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(r#"a = "left", b = "left""#, "\"left\"", &["another object"]);
     coupling_refused(r#"a = "tool", b = "hand", law = "off""#, "\"hand\"", &["is a tool, as `a` is"]);
     coupling_refused(r#"a = "left", b = "post""#, "\"post\"", &["which is fixed"]);
-    coupling_refused(r#"a = "ghost", b = "left""#, "\"ghost\"", &["no matter"]);
+    coupling_refused(r#"a = "ghost", b = "left""#, "\"ghost\"", &["without a body"]);
     coupling_refused(&format!(r#"{pair}, law = "spring""#), "\"spring\"", &["`ledger`", "`tlm`"]);
     coupling_refused(&format!(r#"{pair}, stiffness_n_m = 5"#), "5", &["does not belong to contact by `ledger`"]);
     coupling_refused(&format!(r#"{pair}, law = "tlm", stiffness_n_m = -5"#), "-5", &["`stiffness_n_m`", "N/m"]);
@@ -312,7 +312,7 @@ fn a_grid_that_cannot_be_says_why() {
         "[4294967295, 4294967295, 1]",
         "at most 10000",
     );
-    refused("scatter_m = 0.1", "0.1", "has no grid");
+    refused("scatter_m = 0.1", "0.1", "without a grid");
     refused("spacing_m = [1, 1, 1]\ngrid = [2, 1, 1]\nscatter_m = -1", "-1", "`scatter_m`");
     refused(
         "spacing_m = [1, 1, 1]\ngrid = [2, 1, 1]\nfriction = -0.5",
@@ -321,9 +321,9 @@ fn a_grid_that_cannot_be_says_why() {
     );
     refused("spacing_m = [1, 1, 1]\ngrid = [2, 1, 1]\nmass_kg = 0", "0", "`mass_kg` of `b` is 0");
     let taken = "format = 1\nobject = [\n{ name = \"b-1\", model = \"synthetic\", cost_us = 1 },\n{ name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, grid = [2, 1, 1], spacing_m = [3, 3, 3] },\n]\n";
-    assert!(read(taken).unwrap_err().problems[0].message.contains("`b-1` is taken"));
+    assert!(read(taken).unwrap_err().problems[0].message.contains("`b-1`, the name of another object"));
     let ghost = "format = 1\nobject = [{ name = \"g\", model = \"synthetic\", cost_us = 1, grid = [2, 1, 1], spacing_m = [1, 1, 1] }]\n";
-    assert!(read(ghost).unwrap_err().problems[0].expected.contains("an object that has one: no tool"));
+    assert!(read(ghost).unwrap_err().problems[0].expected.contains("expected no `grid`"));
 }
 
 #[test]

@@ -58,7 +58,7 @@ fn a_coupling_by_a_law_that_soft_bodies_do_not_know_is_refused() {
         "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
     let couple = "[[coupling]]\na = \"s\"\nb = \"b\"\nlaw = \"penalty\"\nstiffness_n_m = 10\n";
     let error = read(&format!("[[object]]\n{SHEET}young_pa = 1e5\n{ball}{couple}")).expect_err("no such law");
-    assert!(error.problems[0].message.contains("sheets, solids and ropes do not know"), "{:?}", error.problems);
+    assert!(error.problems[0].message.contains("sheets, solids and ropes do not support"), "{:?}", error.problems);
 }
 
 #[test]

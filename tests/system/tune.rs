@@ -304,7 +304,7 @@ fn given_gains_are_explained_in_sentences_and_every_law_has_its_analysis() {
     let printed = analysed("α=1e-4,β=5");
     let sentences = printed["sentences"].as_str().unwrap();
     assert!(
-        sentences.starts_with("It can rest in 2 places") && sentences.contains("Use the corrected law"),
+        sentences.starts_with("The loop has 2 fixed points") && sentences.contains("Use the corrected law"),
         "{sentences}"
     );
     assert!((number(&printed, "/rests/0/ratio") - 0.77).abs() < 0.01, "{}", printed["rests"]);
@@ -312,7 +312,7 @@ fn given_gains_are_explained_in_sentences_and_every_law_has_its_analysis() {
     let sentences = slow["sentences"].as_str().unwrap();
     assert!(sentences.contains("each frame removes only") && sentences.contains("Raise κ"), "{sentences}");
     let swings = analysed("α=1e-2,β=5");
-    assert!(swings["sentences"].as_str().unwrap().starts_with("It swings"), "{}", swings["sentences"]);
+    assert!(swings["sentences"].as_str().unwrap().starts_with("The loop oscillates"), "{}", swings["sentences"]);
     assert!(number(&swings, "/loop_gain") > number(&swings, "/loop_gain_boundary"));
     assert!(number(&swings, "/cycle/amplitude") > 0.05 && number(&swings, "/cycle/period_s") > 0.0);
 }
@@ -349,19 +349,19 @@ fn a_target_that_no_resolution_can_reach_is_refused_with_rates_that_can_be() {
     let folder = Folder::with("");
     let gains = folder.file("gains.toml");
     let said = refused(&["tune", "tube", "--quick", "-q", "--target-fps", "400", "--gains", &gains]);
-    assert!(said.contains("coarsest") && said.contains("Ask for a rate between"), "{said}");
+    assert!(said.contains("coarsest") && said.contains("Choose a rate between"), "{said}");
     let said = refused(&["tune", "tube", "--quick", "-q", "--target-fps", "1", "--gains", &gains]);
-    assert!(said.contains("finest") && said.contains("Ask for a rate between"), "{said}");
+    assert!(said.contains("finest") && said.contains("Choose a rate between"), "{said}");
     assert!(!Path::new(&gains).exists());
 }
 
 #[test]
-fn a_plant_that_does_not_answer_is_refused() {
+fn a_plant_that_does_not_respond_is_refused() {
     let folder = Folder::with("");
     let gains = folder.file("gains.toml");
     let free = "machine.draw_triangle_us=0.0";
     let said = refused(&["tune", "tube", "--quick", "-q", "--set", free, "--gains", &gains]);
-    assert!(said.contains("does not answer"), "{said}");
+    assert!(said.contains("does not depend"), "{said}");
     assert!(!Path::new(&gains).exists());
 }
 

@@ -1,6 +1,6 @@
 //! How fast are the triangles of a multiresolution mesh found, against how many there are? Prints CSV.
 //!
-//! `cargo run --release -p metachron-agents --example tom_rate [triangles]`
+//! `cargo run --release -p metachron-geometry --example mesh_rate [triangles]`
 
 use metachron_geometry::{Generator, ProgressiveMesh, generate};
 use std::error::Error;

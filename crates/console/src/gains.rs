@@ -1,9 +1,10 @@
 //! Gains as text: as typed after `--analyse`, and as the TOML fragment that `run --gains` and a scene take.
 //!
-//! In: text. Out: a contender with its gains, or overrides of a scene. Never here: which gains are good.
+//! In: text. Out: a candidate with its gains, or overrides of a scene. Never here: which gains are good.
 
 use super::output::BadInput;
 use anyhow::Context;
+use metachron_lod::adaptive::DEFAULT_MARGIN;
 use metachron_lod::control::Law;
 use metachron_lod::tune::Candidate;
 use std::path::Path;
@@ -36,17 +37,17 @@ const LAWS: [(&str, &[&str]); 5] = [
     ("adaptive", &[MARGIN]),
 ];
 
-/// The contender given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
-pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
+/// The candidate given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
+pub fn parse(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
     let (mut law, mut given) = (None, Vec::new());
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
-        let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain is NAME=NUMBER"))?;
+        let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain must be NAME=NUMBER"))?;
         let (name, value) = (canonical(name.trim()).ok_or_else(|| unknown(name.trim()))?, value.trim());
         if name == "law" {
             law = Some(LAWS.iter().find(|(known, _)| *known == value).ok_or_else(|| no_law(value))?);
             continue;
         }
-        let value: f64 = value.parse().map_err(|_| refused(text, "each gain is NAME=NUMBER"))?;
+        let value: f64 = value.parse().map_err(|_| refused(text, "each gain must be NAME=NUMBER"))?;
         given.push((name, value));
     }
     if law.is_none() && given.is_empty() {
@@ -60,26 +61,26 @@ pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
     let (law, _) = law.ok_or_else(|| {
         refused(
             text,
-            "α and β are of the printed law, k of the normalised, κ, λ and margin of the corrected: give one law's",
+            "α and β belong to the printed law, k to the normalised, κ, λ and margin to the corrected: give the gains of one law",
         )
     })?;
-    contender(law, &|name| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v), target_hz)
+    candidate(law, &|name| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v), target_hz)
 }
 
-fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Candidate> {
-    let gain = |shown: &str, name: &str, own: f64, range: (f64, f64)| {
+fn candidate(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Candidate> {
+    let gain = |shown: &str, name: &str, own: f64, (low, high): (f64, f64)| {
         let gain = value(name).unwrap_or(own);
-        inside(shown, gain, range).map(|()| gain)
+        check_range(shown, gain, low, high).map(|()| gain)
     };
-    let beta = || gain("β", "beta", 5.0, (1e-6, 1e3));
+    let beta = || gain("β", "beta", 5.0, Law::BETA);
     let lead = if law == "pi" { 0.2 } else { 0.0 };
     Ok(match law {
-        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, (1e-9, 1.0))?, beta: beta()? }.into(),
+        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, Law::ALPHA)?, beta: beta()? }.into(),
         "normalised" => {
             let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
             Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
         }
-        "adaptive" => Candidate::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
+        "adaptive" => Candidate::Adaptive { margin: gain(MARGIN, MARGIN, DEFAULT_MARGIN, (0.0, 0.5))? },
         _ => Law::Corrected {
             kappa: gain("κ", "kappa", 0.5, Law::KAPPA)?,
             lead: gain("λ", "lead", lead, Law::LEAD)?,
@@ -98,11 +99,11 @@ fn no_law(name: &str) -> anyhow::Error {
     BadInput(format!("there is no law `{name}` (there are: {laws})")).into()
 }
 
-fn inside(name: &str, value: f64, (low, high): (f64, f64)) -> anyhow::Result<()> {
+fn check_range(name: &str, value: f64, low: f64, high: f64) -> anyhow::Result<()> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
-    Err(BadInput(format!("the gain {name} = {value} is none: expected {low} to {high}")).into())
+    Err(BadInput(format!("the gain {name} = {value} is out of range: expected {low} to {high}")).into())
 }
 
 fn unknown(name: &str) -> anyhow::Error {
@@ -113,12 +114,13 @@ fn unknown(name: &str) -> anyhow::Error {
 }
 
 fn refused(text: &str, why: &str) -> anyhow::Error {
-    BadInput(format!("`{text}` gives no gains: {why}; expected such as α=1e-4,β=5 or kappa=0.5,margin=0.1")).into()
+    BadInput(format!("`{text}` is not a list of gains: {why}; expected for example α=1e-4,β=5 or kappa=0.5,margin=0.1"))
+        .into()
 }
 
 /// The gains in one line.
-pub fn told(contender: Candidate) -> String {
-    match contender {
+pub fn gains_text(candidate: Candidate) -> String {
+    match candidate {
         Candidate::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
         Candidate::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
             format!("κ = {kappa:.3}, margin = {margin:.3}")
@@ -148,7 +150,7 @@ pub fn fragment(law: Law, comment: &str) -> String {
 }
 
 /// Refuses a path that is already taken, or in a folder that does not exist.
-pub fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
+pub fn check_output_path(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if folder.is_some_and(|f| !f.is_dir()) {
         return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -157,7 +159,7 @@ pub fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
         return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
     }
     if path.exists() && !force {
-        let why = format!("{} is there already; --force overwrites it, {flag} FILE names another", path.display());
+        let why = format!("{} exists already; --force overwrites it, {flag} FILE names another file", path.display());
         return Err(BadInput(why).into());
     }
     Ok(())
@@ -168,26 +170,29 @@ pub fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
 /// # Errors
 /// [`BadInput`] where it cannot be read, or contains more than gains.
 pub fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
-    let bad = |why: String| BadInput(format!("the gains {}: {why}", path.display()));
+    let bad = |why: String| BadInput(format!("the gains file {} {why}", path.display()));
     let size = std::fs::metadata(path).map_err(|e| bad(format!("cannot be read: {e}")))?.len();
     if size > BYTES_MAX {
-        return Err(bad(format!("has {size} bytes, a fragment at most {BYTES_MAX}")).into());
+        return Err(bad(format!("has {size} bytes; expected at most {BYTES_MAX}")).into());
     }
     let text = std::fs::read_to_string(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
-    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| bad(format!("is no TOML: {}", e.message())))?;
+    let table: toml::Table =
+        text.parse().map_err(|e: toml::de::Error| bad(format!("is not valid TOML: {}", e.message())))?;
     let target = match (table.len(), table.get("target").and_then(toml::Value::as_table)) {
         (1, Some(target)) => target,
-        _ => return Err(bad("expected the table `[target]` and nothing else".to_owned()).into()),
+        _ => return Err(bad("must contain the table `[target]` and nothing else".to_owned()).into()),
     };
     if let Some(key) = target.keys().find(|key| !KEYS.contains(&key.as_str()) && *key != MARGIN) {
-        return Err(bad(format!("`{key}` is no gain; expected {}, {MARGIN}", KEYS.join(", "))).into());
+        return Err(
+            bad(format!("contains `{key}`, which is not a gain; expected {}, {MARGIN}", KEYS.join(", "))).into()
+        );
     }
     Ok(target.iter().map(|(key, value)| (format!("target.{key}"), value.to_string())).collect())
 }
 
 /// Writes the fragment.
 pub fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
-    std::fs::write(path, fragment).with_context(|| format!("the gains {} cannot be written", path.display()))
+    std::fs::write(path, fragment).with_context(|| format!("the gains file {} cannot be written", path.display()))
 }
 
 #[cfg(test)]
@@ -195,8 +200,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gains_are_read_by_greek_and_by_name() {
-        let read = |text: &str| parsed(text, 30.0).unwrap();
+    fn gains_are_parsed_by_greek_letter_and_by_name() {
+        let read = |text: &str| parse(text, 30.0).unwrap();
         assert_eq!(read("α=1e-3,β=2"), Law::Printed { alpha: 1e-3, beta: 2.0 }.into());
         assert_eq!(read("k=0.06"), Law::Printed { alpha: 0.002, beta: 5.0 }.into());
         assert_eq!(read("kappa=0.25"), Law::Corrected { kappa: 0.25, lead: 0.0, margin: 0.1 }.into());
@@ -207,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_that_are_none_are_refused_with_what_is_expected() {
+    fn invalid_gains_are_refused_with_the_expected_form() {
         for bad in [
             "",
             "α",
@@ -223,13 +228,13 @@ mod tests {
             "law=adaptive,κ=0.5",
             "k=0",
         ] {
-            let error = parsed(bad, 30.0).unwrap_err().to_string();
+            let error = parse(bad, 30.0).unwrap_err().to_string();
             assert!(error.contains("expected") || error.contains("there are"), "{bad}: {error}");
         }
     }
 
     #[test]
-    fn a_fragment_means_the_gains_it_was_made_of() {
+    fn a_fragment_contains_the_gains_it_was_written_from() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("gains.toml");
         let law = Law::Corrected { kappa: 0.375, lead: 0.125, margin: 0.0625 };

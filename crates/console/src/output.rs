@@ -22,30 +22,35 @@ pub fn message(text: &str) {
 }
 
 /// More overlaps than this are counted, not listed.
-const OVERLAPS_TOLD: usize = 10;
+const OVERLAPS_LISTED: usize = 10;
 
 /// Reports agents that start inside each other or inside fixed solids, which is no error: deformables are moved to start elsewhere,
 /// other agents separate without a jump.
-pub fn tell_overlaps(scene: &Scene) {
+pub fn print_overlaps(scene: &Scene) {
     let overlaps = &scene.overlaps;
-    for overlap in overlaps.iter().take(OVERLAPS_TOLD) {
+    for overlap in overlaps.iter().take(OVERLAPS_LISTED) {
         let Overlap { a, b, depth_m } = overlap;
         message(&format!("note: `{a}` and `{b}` overlap by {:.3} mm at the start", depth_m * 1e3));
     }
-    if overlaps.len() > OVERLAPS_TOLD {
-        message(&format!("note: {} more pairs overlap at the start", overlaps.len() - OVERLAPS_TOLD));
+    if overlaps.len() > OVERLAPS_LISTED {
+        message(&format!("note: {} more pairs overlap at the start", overlaps.len() - OVERLAPS_LISTED));
     }
-    for Moved { object, by_m } in scene.moved.iter().take(OVERLAPS_TOLD) {
+    for Moved { object, by_m } in scene.moved.iter().take(OVERLAPS_LISTED) {
         let [x, y, z] = (*by_m * 1e3).to_array();
-        message(&format!("note: `{object}` starts ({x:.3}, {y:.3}, {z:.3}) mm from there, clear of others"));
+        message(&format!(
+            "note: `{object}` starts ({x:.3}, {y:.3}, {z:.3}) mm from its place in the scene, where it overlaps nothing"
+        ));
     }
-    if scene.moved.len() > OVERLAPS_TOLD {
-        message(&format!("note: {} more objects start elsewhere", scene.moved.len() - OVERLAPS_TOLD));
+    if scene.moved.len() > OVERLAPS_LISTED {
+        message(&format!(
+            "note: {} more objects are moved out of overlaps at the start",
+            scene.moved.len() - OVERLAPS_LISTED
+        ));
     }
 }
 
 /// Reports that the system refuses the priority that a scene requests; the run goes on without it.
-pub fn tell_priority(scene: &Scene) {
+pub fn warn_priority(scene: &Scene) {
     let asked = scene.priority == PriorityKind::Realtime && scene.executor != ExecutorKind::Lockstep;
     if asked && let Err(refused) = Priority::Realtime.ask() {
         message(&format!("note: {refused}"));
@@ -53,9 +58,9 @@ pub fn tell_priority(scene: &Scene) {
 }
 
 /// Reports an error; returns how the program ends.
-pub fn tell(error: &anyhow::Error) -> Exit {
+pub fn report_error(error: &anyhow::Error) -> Exit {
     if let Some(bad) = error.downcast_ref::<SceneError>() {
-        message(&pictured(bad));
+        message(&rendered(bad));
         return Exit::BadInput;
     }
     message(&format!("error: {error:#}"));
@@ -63,17 +68,17 @@ pub fn tell(error: &anyhow::Error) -> Exit {
 }
 
 /// The problems of a scene, with the lines underlined; colours and width follow the terminal.
-pub fn pictured(error: &SceneError) -> String {
+pub fn rendered(error: &SceneError) -> String {
     let handler = miette::MietteHandlerOpts::new().build();
-    format!("{:?}", Shown { error, handler: &handler })
+    format!("{:?}", Rendered { error, handler: &handler })
 }
 
-struct Shown<'a> {
+struct Rendered<'a> {
     error: &'a SceneError,
     handler: &'a miette::MietteHandler,
 }
 
-impl std::fmt::Debug for Shown<'_> {
+impl std::fmt::Debug for Rendered<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         miette::ReportHandler::debug(self.handler, self.error, f)
     }

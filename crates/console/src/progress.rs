@@ -20,13 +20,13 @@ impl Bar {
 
     /// Shows the progress of the run: the share that is done, and the last frame.
     pub fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
-        self.tell(done, format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
+        self.set(done, format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
     }
 
-    /// Shows the share that is done, and words next to it.
-    pub fn tell(&self, done: f64, words: String) {
+    /// Shows the share that is done, and a message next to it.
+    pub fn set(&self, done: f64, message: String) {
         self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
-        self.0.set_message(words);
+        self.0.set_message(message);
     }
 }
 

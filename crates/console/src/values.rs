@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_in_quotes_may_hold_the_sign_that_ends_a_key() {
+    fn quoted_keys_may_contain_an_equals_sign() {
         let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
         assert_eq!(assignment("target.frame_hz = 60"), pair("target.frame_hz", "60"));
         assert_eq!(assignment("object.\"a=b.c\".look='x=y'"), pair("object.\"a=b.c\".look", "'x=y'"));

@@ -1,4 +1,4 @@
-//! How long does a choice take, as objects grow to 100,000? `cargo run --release -p metachron-budget --example choosing`.
+//! How long does a choice take, as objects grow to 100,000? `cargo run --release -p metachron-lod --example choosing`.
 //!
 //! In: nothing. Out: milliseconds of one choice of a moving picture (median and least), and the median's part of a frame at 60 Hz.
 

@@ -47,7 +47,7 @@ impl GrisoniLaw {
     #[must_use]
     pub fn new(gains: Gains, limits: Limits, eps: f64, rho: f64) -> Self {
         let rho = if rho.is_finite() { rho } else { 0.0 };
-        Self { gains, limits, eps: within(eps, limits.eps), rho, rest: None }
+        Self { gains, limits, eps: within(eps, limits.eps.0, limits.eps.1), rho, rest: None }
     }
 
     /// Updates the law: a frame ran at `f_hz`, the target is `f0_hz`.
@@ -57,11 +57,11 @@ impl GrisoniLaw {
     pub fn observe(&mut self, f0_hz: f64, f_hz: f64) -> bool {
         let real = |f: f64| f.is_finite() && f > 0.0;
         let wish = self.eps + self.gains.alpha * (f0_hz - f_hz);
-        let rho = self.rho + self.gains.beta * (within(wish, self.limits.eps) - self.eps);
+        let rho = self.rho + self.gains.beta * (within(wish, self.limits.eps.0, self.limits.eps.1) - self.eps);
         if !(real(f0_hz) && real(f_hz) && wish.is_finite() && rho.is_finite()) {
             return false;
         }
-        self.eps = within(wish, self.limits.eps);
+        self.eps = within(wish, self.limits.eps.0, self.limits.eps.1);
         self.rho = rho;
         self.rest = match wish {
             wish if wish < self.limits.eps.0 => Some(Bound::Finest),
@@ -86,7 +86,7 @@ impl GrisoniLaw {
     /// n = ⌊ρ⌋ inside its limits.
     #[must_use]
     pub fn n(&self) -> u8 {
-        within(libm::floor(self.rho), (f64::from(self.limits.n.0), f64::from(self.limits.n.1))) as u8
+        within(libm::floor(self.rho), f64::from(self.limits.n.0), f64::from(self.limits.n.1)) as u8
     }
 
     /// The end of the range at which the last update clamped ε̂.
@@ -102,7 +102,7 @@ impl GrisoniLaw {
 
     /// Sets other limits; ε̂ moves inside them and ρ follows.
     pub fn set_limits(&mut self, limits: Limits) {
-        let eps = within(self.eps, limits.eps);
+        let eps = within(self.eps, limits.eps.0, limits.eps.1);
         let rho = self.rho + self.gains.beta * (eps - self.eps);
         self.rho = if rho.is_finite() { rho } else { self.rho };
         (self.limits, self.eps) = (limits, eps);
@@ -110,6 +110,6 @@ impl GrisoniLaw {
 
     /// Multiplies ε̂ by `factor` and leaves ρ: a disturbance from outside, or another start.
     pub fn coarsen(&mut self, factor: f64) {
-        self.eps = within(self.eps * factor, self.limits.eps);
+        self.eps = within(self.eps * factor, self.limits.eps.0, self.limits.eps.1);
     }
 }

@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_number_that_trembles_about_an_edge_switches_once() {
+    fn a_value_that_fluctuates_about_an_edge_switches_once() {
         let mut held = Some(2);
         let mut switches = 0;
         for k in 0..1000 {
@@ -36,7 +36,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_is_left_a_quarter_past_its_edges() {
+    fn a_level_changes_a_quarter_past_its_edges() {
         assert_eq!(floor(Some(3), 4.249), 3);
         assert_eq!(floor(Some(3), 4.25), 4);
         assert_eq!(floor(Some(3), 2.75), 3);
@@ -44,7 +44,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_none_keeps_the_level() {
+    fn an_invalid_number_keeps_the_level() {
         assert_eq!(floor(Some(4), f64::NAN), 4);
         assert_eq!(floor(None, f64::NAN), 0);
         assert_eq!(floor(Some(4), f64::NEG_INFINITY), 0);

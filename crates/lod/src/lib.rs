@@ -40,6 +40,6 @@ pub enum Bound {
 }
 
 /// `x` inside `lo..=hi`; `hi` if `x` is NaN. Never panics, unlike `f64::clamp`.
-pub(crate) fn within(x: f64, (lo, hi): (f64, f64)) -> f64 {
+pub(crate) fn within(x: f64, lo: f64, hi: f64) -> f64 {
     if x.is_nan() { hi } else { x.max(lo).min(hi) }
 }

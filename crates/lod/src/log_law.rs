@@ -6,11 +6,11 @@
 use crate::{Bound, within};
 
 /// Clamp of the error of one update, |ln(t/T)|: a frame four times too slow. At κ = ½ one update halves the work at most.
-pub const LESSON_MAX: f64 = 2.0 * core::f64::consts::LN_2;
+pub const ERROR_MAX: f64 = 2.0 * core::f64::consts::LN_2;
 
 /// Clamp of an unconfirmed error, ln 1.5: a larger error counts in full only if the one before was as large, on the same side. So a single
 /// frame of five times its time costs e^(−κ ln 1.5) = 18 % of the polygons, and a load that stays counts in full one frame later.
-pub const SURPRISE_MAX: f64 = 0.405_465_108_108_164_4;
+pub const UNCONFIRMED_ERROR_MAX: f64 = 0.405_465_108_108_164_4;
 
 /// Nearer to the target time than this, |ln(t/T)|, a time that no level improves counts as settled.
 const NEAR: f64 = 0.05;
@@ -40,9 +40,9 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 1.99)) } else { Self::default().kappa };
+        let kappa = if self.kappa.is_finite() { within(self.kappa, 0.01, 1.99) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, lead: within(width(self.lead), (0.0, 1.99)), early: width(self.early), late: width(self.late) }
+        Self { kappa, lead: within(width(self.lead), 0.0, 1.99), early: width(self.early), late: width(self.late) }
     }
 }
 
@@ -68,7 +68,7 @@ pub struct LogLaw {
     /// The error before this one; `None` before the first, which counts as confirmed.
     before: Option<f64>,
     /// The error after clamping.
-    believed: Option<f64>,
+    clamped_error: Option<f64>,
     rest: Rest,
 }
 
@@ -79,9 +79,9 @@ impl LogLaw {
         Self {
             gains: gains.sound(),
             range,
-            value: within(start, range),
+            value: within(start, range.0, range.1),
             before: None,
-            believed: None,
+            clamped_error: None,
             rest: Rest::Moving,
         }
     }
@@ -94,9 +94,9 @@ impl LogLaw {
         if !(ratio.is_finite() && ratio > 0.0) {
             return self.rest;
         }
-        let error = self.believed(libm::log(ratio));
-        let change = self.believed.map_or(0.0, |before| self.gains.lead * (error - before));
-        self.believed = Some(error);
+        let error = self.clamped_error(libm::log(ratio));
+        let change = self.clamped_error.map_or(0.0, |before| self.gains.lead * (error - before));
+        self.clamped_error = Some(error);
         let granted = granted.filter(|g| g.is_finite());
         self.rest = if error > self.gains.late {
             self.coarsen_by(self.gains.kappa * (error - self.gains.late) + change, granted)
@@ -109,25 +109,25 @@ impl LogLaw {
     }
 
     /// The error after clamping: tighter if the one before does not confirm it (control.md, eq. 9).
-    fn believed(&mut self, error: f64) -> f64 {
-        let seen_before = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > SURPRISE_MAX);
+    fn clamped_error(&mut self, error: f64) -> f64 {
+        let confirmed = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > UNCONFIRMED_ERROR_MAX);
         self.before = Some(error);
-        let most = if seen_before { LESSON_MAX } else { SURPRISE_MAX };
-        within(error, (-most, most))
+        let most = if confirmed { ERROR_MAX } else { UNCONFIRMED_ERROR_MAX };
+        within(error, -most, most)
     }
 
     fn coarsen_by(&mut self, step: f64, granted: Option<f64>) -> Rest {
         let from = granted.map_or(self.value, |g| g.max(self.value));
-        self.value = within(from + step, self.range);
+        self.value = within(from + step, self.range.0, self.range.1);
         if from + step > self.range.1 { Rest::Clamped(Bound::Coarsest) } else { Rest::Moving }
     }
 
     fn refine(&mut self, error: f64, change: f64, granted: Option<f64>) -> Rest {
         let wish = self.value + self.gains.kappa * (error + self.gains.early) + change;
         // if all of the time were work that ε scales, anything finer than this would be late
-        let soonest = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
-        self.value = within(wish.max(soonest), self.range);
-        match (wish < self.range.0, wish < soonest) {
+        let finest_in_time = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
+        self.value = within(wish.max(finest_in_time), self.range.0, self.range.1);
+        match (wish < self.range.0, wish < finest_in_time) {
             (true, _) if self.value == self.range.0 => Rest::Clamped(Bound::Finest),
             (_, true) if error < -NEAR => Rest::BetweenLevels,
             (_, true) => Rest::Settled,
@@ -156,12 +156,12 @@ impl LogLaw {
     /// Sets another range (finest, coarsest; finite); the value moves inside it.
     pub fn set_range(&mut self, range: (f64, f64)) {
         self.range = range;
-        self.value = within(self.value, range);
+        self.value = within(self.value, range.0, range.1);
     }
 
     /// Moves to `value`, or the end of the range nearest to it: a start, or a disturbance from outside.
     pub fn set_value(&mut self, value: f64) {
-        self.value = within(value, self.range);
+        self.value = within(value, self.range.0, self.range.1);
     }
 
     /// Sets other gains from the next update on; the value stays. κ is clamped to 0.01 … 1.99.

@@ -18,7 +18,7 @@ impl Share {
     /// Amount at level `mu`: weight · μ inside the least and the most.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
-        crate::within(self.weight * mu, (self.least, self.most))
+        crate::within(self.weight * mu, self.least, self.most)
     }
 }
 
@@ -44,7 +44,7 @@ where
         return 0.0; // no shares
     }
     let (mut below, mut above) = (lo, hi);
-    let mut mu = crate::within(start, (lo, hi));
+    let mut mu = crate::within(start, lo, hi);
     for _ in 0..ROUNDS_MAX {
         let (sum, slope) = sum_and_slope(mu, shares.clone());
         let missing = budget - sum;

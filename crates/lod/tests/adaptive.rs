@@ -1,6 +1,8 @@
 //! What the default promises: of its choice, of what it learns, and of a picture in which nothing moves.
 
-use metachron_lod::adaptive::{Adaptive, Gauge, Ladder, Lesson, Offer, Plan, Settings, Time, Trim, is_late};
+use metachron_lod::adaptive::{
+    Adaptive, FilterUpdate, MissCounter, Offer, Plan, Settings, SpeedEstimator, Time, Trim, is_late,
+};
 use metachron_lod::select::Level;
 use proptest::prelude::*;
 
@@ -130,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn no_numbers_make_it_fail(
+    fn no_numbers_make_the_choice_fail(
         objects in prop::collection::vec((prop::collection::vec((any_number(), any_number()), 0..5), any_number()), 0..40),
         frames in prop::collection::vec((any_number(), any_number(), any_number()), 1..20), droppable in any::<bool>(),
     ) {
@@ -143,7 +145,7 @@ proptest! {
             let sound = target.is_finite() && target > 0.0;
             prop_assert!(sound || !plan.feasible || plan.predicted <= 1.0);
             prop_assert!(!plan.feasible || plan.held || plan.predicted <= target.max(1.0) * (1.0 + 1e-9));
-            let kappa = adaptive.gauge(0).kappa();
+            let kappa = adaptive.estimator(0).kappa();
             prop_assert!(kappa.is_finite() && kappa > 0.0 && adaptive.margin() <= 0.5);
         }
     }
@@ -248,7 +250,7 @@ fn camera_that_stands_still_but_for_rounding_is_a_still_picture() {
 }
 
 #[test]
-fn still_picture_on_a_trembling_machine_never_changes_once_it_knows_the_machine() {
+fn still_picture_on_a_noisy_machine_never_changes_once_the_noise_is_known() {
     // 1 % up and down, without a pattern
     let tremble = |frame: u64| 1.0 + 0.01 * ((frame as f64 * 12.9898).sin() * 43_758.547).sin();
     let mut adaptive = scene(200, Settings::default());
@@ -262,7 +264,7 @@ fn still_picture_on_a_trembling_machine_never_changes_once_it_knows_the_machine(
 }
 
 #[test]
-fn still_picture_on_a_wandering_machine_changes_ever_less_often_and_is_not_late() {
+fn still_picture_on_a_drifting_machine_changes_ever_less_often_and_is_not_late() {
     // 5 % that stay by nine tenths from frame to frame; news without a pattern, of variance 1
     let news = |frame: u64| {
         2.45 * (((frame as f64 * 12.9898).sin() * 43_758.547).rem_euclid(1.0)
@@ -310,45 +312,45 @@ fn table_that_is_wrong_is_corrected_within_ten_frames() {
     for wrong in [0.5, 0.8, 1.25, 2.0] {
         let mut adaptive = scene(200, Settings::default());
         play(&mut adaptive, 13, |_| wrong); // three frames teach nothing
-        let kappa = adaptive.gauge(0).kappa();
+        let kappa = adaptive.estimator(0).kappa();
         assert!((kappa / wrong - 1.0).abs() < 0.02, "{kappa} for {wrong}");
     }
 }
 
 #[test]
-fn one_spike_teaches_nothing_and_three_are_a_new_machine() {
-    let mut gauge = Gauge::default();
-    (0..20).for_each(|_| assert_eq!(gauge.observe(0.9, 0.9), Lesson::Learned));
-    let before = gauge.kappa();
-    assert_eq!(gauge.observe(0.9, 1.8), Lesson::Outlier);
-    assert_eq!((gauge.kappa(), gauge.observe(0.9, 0.9)), (before, Lesson::Learned));
-    assert_eq!(gauge.observe(0.9, 1.8), Lesson::Outlier);
-    assert_eq!(gauge.observe(0.9, 0.1), Lesson::Outlier, "on the other side, so not the second in a row");
-    assert_eq!(gauge.observe(0.9, 1.8), Lesson::Outlier);
-    assert_eq!(gauge.observe(0.9, 1.8), Lesson::Outlier);
-    assert_eq!(gauge.observe(0.9, 1.8), Lesson::NewRegime);
-    assert!((gauge.kappa() - 2.0).abs() < 0.01, "{}", gauge.kappa());
+fn one_spike_is_an_outlier_and_three_are_a_new_regime() {
+    let mut estimator = SpeedEstimator::default();
+    (0..20).for_each(|_| assert_eq!(estimator.observe(0.9, 0.9), FilterUpdate::Accepted));
+    let before = estimator.kappa();
+    assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
+    assert_eq!((estimator.kappa(), estimator.observe(0.9, 0.9)), (before, FilterUpdate::Accepted));
+    assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
+    assert_eq!(estimator.observe(0.9, 0.1), FilterUpdate::Outlier, "on the other side, so not the second in a row");
+    assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
+    assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
+    assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::NewRegime);
+    assert!((estimator.kappa() - 2.0).abs() < 0.01, "{}", estimator.kappa());
 }
 
 #[test]
-fn measurements_that_are_none_are_refused() {
-    let mut gauge = Gauge::default();
+fn invalid_measurements_are_rejected() {
+    let mut estimator = SpeedEstimator::default();
     for (table, took) in [(f64::NAN, 1.0), (0.0, 1.0), (-1.0, 1.0), (1.0, f64::NAN), (1.0, -1.0), (1.0, f64::INFINITY)]
     {
-        assert_eq!(gauge.observe(table, took), Lesson::Refused);
+        assert_eq!(estimator.observe(table, took), FilterUpdate::Rejected);
     }
-    assert_eq!(gauge, Gauge::default());
+    assert_eq!(estimator, SpeedEstimator::default());
     let mut adaptive = scene(200, Settings::default());
     for frame in 0..10 {
         adaptive.choose(frame, time(T));
     }
-    assert_eq!(adaptive.observe(9, 0, 0.9 * T), Lesson::Learned);
-    assert_eq!(adaptive.observe(1, 0, 0.9 * T), Lesson::Refused, "nobody remembers frame 1");
-    assert_eq!(adaptive.observe(40, 0, 0.9 * T), Lesson::Refused, "frame 40 is still to come");
+    assert_eq!(adaptive.observe(9, 0, 0.9 * T), FilterUpdate::Accepted);
+    assert_eq!(adaptive.observe(1, 0, 0.9 * T), FilterUpdate::Rejected, "frame 1 is forgotten");
+    assert_eq!(adaptive.observe(40, 0, 0.9 * T), FilterUpdate::Rejected, "frame 40 is still to come");
     adaptive.disturb();
-    assert_eq!(adaptive.observe(9, 0, 0.9 * T), Lesson::Refused);
+    assert_eq!(adaptive.observe(9, 0, 0.9 * T), FilterUpdate::Rejected);
     adaptive.choose(10, time(T));
-    assert_eq!(adaptive.observe(10, 0, 0.9 * T), Lesson::Refused, "the first frames after a disturbance");
+    assert_eq!(adaptive.observe(10, 0, 0.9 * T), FilterUpdate::Rejected, "the first frames after a disturbance");
 }
 
 #[test]
@@ -365,7 +367,7 @@ fn objects_come_and_go_by_their_ids() {
 }
 
 #[test]
-fn one_giant_does_not_take_the_rest_with_it() {
+fn one_giant_does_not_affect_the_rest() {
     let mut adaptive = scene(100, bare());
     adaptive.set(7, 0, false, &offers(&[(10.0, 0.1), (1e9, 1.0)]));
     adaptive.weigh(7, 1e12); // its second level has by far the most gain per time, and never fits
@@ -375,7 +377,7 @@ fn one_giant_does_not_take_the_rest_with_it() {
 }
 
 #[test]
-fn no_objects_and_no_time_are_answered() {
+fn no_objects_and_no_time_give_a_plan() {
     let mut adaptive = Adaptive::new(Settings::default());
     let plan = adaptive.choose(0, time(T));
     assert!(plan.feasible && plan.predicted == 0.0 && plan.lambda == 0.0);
@@ -423,17 +425,17 @@ fn stages_share_one_price() {
 }
 
 #[test]
-fn two_misses_in_a_row_make_it_wary_for_thirty_frames() {
-    let mut ladder = Ladder::default();
-    ladder.observe(1.2);
-    ladder.observe(1.0);
-    ladder.observe(1.2);
-    assert_eq!(ladder.extra_sigmas(), 0.0);
-    ladder.observe(1.2);
+fn two_misses_in_a_row_raise_the_margin_for_thirty_frames() {
+    let mut misses = MissCounter::default();
+    misses.observe(1.2);
+    misses.observe(1.0);
+    misses.observe(1.2);
+    assert_eq!(misses.extra_sigmas(), 0.0);
+    misses.observe(1.2);
     let wary = (0..100)
         .take_while(|_| {
-            let w = ladder.extra_sigmas();
-            ladder.observe(1.0);
+            let w = misses.extra_sigmas();
+            misses.observe(1.0);
             w > 0.0
         })
         .count();

@@ -3,7 +3,7 @@
 mod plant;
 
 use metachron_lod::adaptive::Settings;
-use plant::{Feedback, Full, Greedy, Machine, Ours, Policy, Run, Static, WALK, run, spread};
+use plant::{AdaptivePolicy, Feedback, Full, Greedy, Machine, Policy, Run, Static, WALK, run, spread};
 
 const SEEDS: std::ops::Range<u64> = 1..6;
 
@@ -32,7 +32,7 @@ fn report(name: &str, runs: &[Run]) -> (f64, f64) {
 }
 
 fn ours() -> Box<dyn Policy> {
-    Box::new(Ours::new(Settings::default()))
+    Box::new(AdaptivePolicy::new(Settings::default()))
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn walk_through_the_auditorium_ranks_the_policies_as_the_paper_does() {
 }
 
 #[test]
-fn walk_with_an_erring_machine_is_held_to_the_time() {
+fn walk_on_a_machine_with_errors_keeps_its_time() {
     let runs = s1(ours);
     let (binding, misses) = report("ours", &runs);
     // the goals; 0.0281 and 0.0048 are reached, 1.08 at most
@@ -67,7 +67,7 @@ fn few_levels_are_changed_and_changed_back() {
     let sum = |of: fn(&Run) -> usize| runs.iter().map(of).sum::<usize>() as f64;
     let reversals = sum(|r| r.reversals) / sum(|r| r.object_frames);
     let shy = Settings { hysteresis: 0.0, dwell: 0, ..Settings::default() };
-    let free = s1(|| Box::new(Ours::new(shy)));
+    let free = s1(|| Box::new(AdaptivePolicy::new(shy)));
     let freely = free.iter().map(|r| r.reversals).sum::<usize>() as f64 / sum(|r| r.object_frames);
     // the goal is 0.002; 0.00003 is reached
     assert!(reversals <= 0.0002 && 10.0 * reversals < freely, "{reversals} and {freely}");
@@ -75,8 +75,9 @@ fn few_levels_are_changed_and_changed_back() {
 
 #[test]
 fn wrong_table_a_load_step_and_spikes_are_learnt() {
-    let runs: Vec<_> =
-        SEEDS.map(|seed| run(&mut Ours::new(Settings::default()), &mut Machine::s2(seed), 4 * WALK, 2)).collect();
+    let runs: Vec<_> = SEEDS
+        .map(|seed| run(&mut AdaptivePolicy::new(Settings::default()), &mut Machine::s2(seed), 4 * WALK, 2))
+        .collect();
     let (_, misses) = report("ours, S2", &runs);
     assert!(misses <= 0.05, "{misses}"); // the goal
     for r in &runs {
@@ -92,7 +93,7 @@ fn wrong_table_a_load_step_and_spikes_are_learnt() {
 
 #[test]
 fn certificate_is_below_a_hundredth_in_nearly_every_frame() {
-    let mut policy = Ours::new(Settings::default());
+    let mut policy = AdaptivePolicy::new(Settings::default());
     run(&mut policy, &mut Machine::s1(1), WALK, 1);
     let near = policy.gaps.iter().filter(|g| **g <= 0.01).count();
     assert!(near * 100 >= policy.gaps.len() * 95, "{near} of {}", policy.gaps.len());

@@ -57,7 +57,7 @@ proptest! {
     }
 
     #[test]
-    fn too_little_time_is_said_and_everything_is_at_its_least(meshes in any_meshes(), missing in 0.01..9.0_f64) {
+    fn too_little_time_is_infeasible_and_everything_is_at_its_least(meshes in any_meshes(), missing in 0.01..9.0_f64) {
         let time = time_at(&meshes, 0.0) - missing;
         let limits = barrier::Limits { steps: 50, tolerance: 0.01 };
         for got in [closed_form(time, 0.0, &meshes), interior_point(time, 0.0, &meshes, &[], limits)] {
@@ -88,7 +88,7 @@ proptest! {
     }
 
     #[test]
-    fn robin_hood_gives_away_no_more_than_there_is(
+    fn robin_hood_distributes_no_more_than_the_budget(
         instances in prop::collection::vec((0.1..5.0_f64, any_number(), prop::collection::vec(any_number(), 0..5)), 0..20),
         time in any_number(), rule in prop_oneof![Just(TooLittle::Nothing), Just(TooLittle::Part)],
     ) {
@@ -135,7 +135,7 @@ fn interior_point_comes_within_a_hundredth_in_some_thirty_steps() {
 }
 
 #[test]
-fn numbers_that_are_none_become_meshes_that_can_be_solved() {
+fn invalid_numbers_become_meshes_that_can_be_solved() {
     let bad = Mesh { weight: f64::NAN, time: f64::INFINITY, least: f64::NAN, most: 9.0 }.sound(0.5);
     assert_eq!(bad, Mesh { weight: 0.0, time: 1.0, least: 0.0, most: 1.0 });
     let crossed = Mesh { weight: 1.0, time: -1.0, least: 0.8, most: 0.2 }.sound(0.5);

@@ -1,7 +1,7 @@
 //! Costs and benefits against machines and values that are known.
 
 use metachron_lod::adaptive::joint::{
-    Between, Choice, Drawing, Market, Worker, even_split, pairs, price, taken, temporal_error_px,
+    Between, Choice, Drawing, SharedPrice, Worker, even_split, pairs, price, taken, temporal_error_px,
 };
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::cost::benefit::{Picture, Shading, Sliders, View, accuracy, benefit};
@@ -48,7 +48,7 @@ fn benchmark(seed: u64, count: usize, wild: f64, ratio: Option<f64>) -> Vec<Samp
 }
 
 #[test]
-fn fit_finds_the_machine_among_wild_draws() {
+fn fit_finds_the_machine_among_outliers() {
     for seed in 1..9 {
         let got = fit(&benchmark(seed, 300, 0.05, None)).unwrap().stages;
         for (name, got, want, part) in [
@@ -64,7 +64,7 @@ fn fit_finds_the_machine_among_wild_draws() {
 }
 
 #[test]
-fn draws_kept_out_of_the_fit_are_predicted_within_a_tenth() {
+fn held_out_draws_are_predicted_within_a_tenth() {
     for seed in 1..9 {
         let model = fit(&benchmark(seed, 200, 0.05, None)).unwrap().stages;
         let mut errors: Vec<_> =
@@ -75,14 +75,14 @@ fn draws_kept_out_of_the_fit_are_predicted_within_a_tenth() {
 }
 
 #[test]
-fn vertices_that_go_with_polygons_are_counted_as_polygons() {
+fn vertices_proportional_to_polygons_are_counted_as_polygons() {
     let got = fit(&benchmark(3, 300, 0.0, Some(2.0))).unwrap();
     let both = got.stages.polygon + 2.0 * got.stages.vertex;
     assert!((both / (0.9 + 2.0 * 0.5) - 1.0).abs() < 0.02 && got.error95 < 0.1, "{got:?}");
 }
 
 #[test]
-fn fit_of_too_little_or_of_no_numbers_is_none() {
+fn fit_of_too_few_or_invalid_numbers_is_none() {
     let good = benchmark(1, 7, 0.0, None);
     assert_eq!(fit(&good), None);
     let mut all = benchmark(1, 100, 0.0, None);
@@ -138,7 +138,7 @@ fn accuracy_is_that_of_the_paper() {
 }
 
 #[test]
-fn benefit_falls_with_every_factor_as_far_as_its_slider_lets_it() {
+fn benefit_falls_with_every_factor_by_its_slider() {
     let (all, none) = (
         Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 1.0, motion: 1.0, hysteresis: 1.0 },
         Sliders { size: 1.0, accuracy: 0.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 },
@@ -154,7 +154,7 @@ fn benefit_falls_with_every_factor_as_far_as_its_slider_lets_it() {
 }
 
 #[test]
-fn size_counts_from_not_at_all_to_every_pixel() {
+fn size_slider_counts_from_none_to_every_pixel() {
     let worth = |size: f64, pixels: f64| {
         let sliders = Sliders { size, accuracy: 0.0, ..Sliders::default() };
         benefit(&View { pixels, ..VIEW }, &picture(4.0, Shading::Flat), &sliders)
@@ -207,7 +207,7 @@ fn printed_overlap_gives_953_of_1000_where_it_says_two_thirds() {
 }
 
 #[test]
-fn fitted_overlap_undoes_itself_and_is_found_again() {
+fn fitted_overlap_inverts_its_own_prediction() {
     let mut random = Random(5);
     for kappa in [0.0, 0.3, 0.8, 1.0] {
         let frames: Vec<_> = (0..50)
@@ -227,7 +227,7 @@ fn fitted_overlap_undoes_itself_and_is_found_again() {
 }
 
 #[test]
-fn lag_is_shared_out_whole() {
+fn lag_is_shared_without_remainder() {
     let pipeline = Pipeline { lag: 100.0, share: 0.05, overlapped: false };
     let split = pipeline.split(20.0);
     assert_eq!((split.choose, split.draw, split.extrapolate), (4.0, 76.0, 100.0));
@@ -240,7 +240,7 @@ fn lag_is_shared_out_whole() {
 }
 
 #[test]
-fn cost_that_is_none_is_twice_what_is_typical_and_is_counted() {
+fn an_invalid_cost_is_twice_the_typical_cost_and_is_counted() {
     let mut prior = Prior::new(10.0);
     assert_eq!((prior.sound(f64::NAN), prior.sound(-1.0), prior.sound(f64::INFINITY)), (20.0, 20.0, 20.0));
     (0..200).for_each(|_| assert_eq!(prior.sound(50.0), 50.0));
@@ -269,7 +269,7 @@ fn error_between_steps_is_the_mean_over_a_step() {
 }
 
 #[test]
-fn pairs_are_worth_the_product_of_what_is_right() {
+fn pairs_gain_the_product_of_their_accuracies() {
     let rates = [Choice { cost: 1.0, error: 0.5 }, Choice { cost: 2.0, error: 0.0 }];
     let levels = [Choice { cost: 10.0, error: 0.4 }, Choice { cost: 30.0, error: f64::NAN }];
     let (offers, which) = pairs(&rates, &levels);
@@ -283,7 +283,7 @@ fn bare() -> Adaptive {
     Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, hysteresis: 0.0, dwell: 0, trim: false })
 }
 
-/// Forty agents, each with five rates (stage 0) and five levels (stage 1): the joint purse, and each purse alone.
+/// Forty agents, each with five rates (stage 0) and five levels (stage 1): the joint budget, and each budget alone.
 fn joint(seed: u64) -> (Adaptive, Adaptive, Adaptive, f64, f64) {
     let mut random = Random(seed);
     let (mut both, mut simulate, mut draw) = (bare(), bare(), bare());
@@ -310,7 +310,7 @@ fn joint(seed: u64) -> (Adaptive, Adaptive, Adaptive, f64, f64) {
 }
 
 #[test]
-fn one_purse_for_simulation_and_drawing_is_better_than_two_halves() {
+fn one_budget_for_simulation_and_drawing_is_better_than_two_halves() {
     let (mut joint_sum, mut halves_sum, mut even_sum) = (0.0, 0.0, 0.0);
     const INSTANCES: u64 = 200;
     for seed in 0..INSTANCES {
@@ -329,7 +329,7 @@ fn one_purse_for_simulation_and_drawing_is_better_than_two_halves() {
         let (feasible, value, ..) = split(0.5 * total);
         joint_sum += (plan.value - base) / gain;
         halves_sum += if feasible { (value - base) / gain } else { 0.0 };
-        // a purse that cannot pay for the least of everything would pay any price
+        // a budget that cannot pay for the least of everything would pay any price
         let price = |feasible: bool, first: f64, second: f64| if feasible { (first, second) } else { (1.0, 0.0) };
         let best = even_split(total, |first, _| {
             let (feasible, _, a, b) = split(first);
@@ -346,7 +346,7 @@ fn one_purse_for_simulation_and_drawing_is_better_than_two_halves() {
     }
     let n = INSTANCES as f64;
     let (joint, halves, even) = (joint_sum / n, halves_sum / n, even_sum / n);
-    println!("of the bound's gain: one purse {joint:.4}, two halves {halves:.4}, two purses at one price {even:.4}");
+    println!("of the bound's gain: one budget {joint:.4}, two halves {halves:.4}, two budgets at one price {even:.4}");
     assert!(joint >= 0.99 && joint >= halves + 0.03 && even >= 0.99, "{joint} {halves} {even}");
 }
 
@@ -361,12 +361,12 @@ fn workers(dearer: f64) -> Vec<Worker> {
         .collect()
 }
 
-/// Plays the market with a picture worth `worth` ln(ticks) that wants `wants` ticks: price of the picture, of the agents, ticks of both.
-fn play_market(workers: &[Worker], (capacity, wants, worth): (f64, f64, f64)) -> Option<[f64; 4]> {
-    let (mut market, mut limit, mut last) = (Market::default(), wants, None);
+/// Plays the shared price with a picture worth `worth` ln(ticks) that wants `wants` ticks: price of the picture, of the agents, ticks of both.
+fn play_shared_price(workers: &[Worker], (capacity, wants, worth): (f64, f64, f64)) -> Option<[f64; 4]> {
+    let (mut shared_price, mut limit, mut last) = (SharedPrice::default(), wants, None);
     for _ in 0..600 {
         let lambda = if limit < wants { worth / limit.max(1.0) } else { 0.0 };
-        let settled = market.settle(workers, capacity, Drawing { wants, lambda });
+        let settled = shared_price.settle(workers, capacity, Drawing { wants, lambda });
         limit = settled.map_or(wants, |(_, ticks)| ticks.min(wants));
         last = settled.map(|(price, _)| [worth / limit, price, limit, taken(workers, price)]);
     }
@@ -374,11 +374,12 @@ fn play_market(workers: &[Worker], (capacity, wants, worth): (f64, f64, f64)) ->
 }
 
 #[test]
-fn market_finds_the_split_at_which_one_more_tick_is_worth_the_same_to_both() {
+fn shared_price_finds_the_split_of_equal_marginal_gain() {
     let (capacity, wants, worth) = (8000.0, 6000.0, 900.0);
     for dearer in [1.0, 2.0, 4.0, 8.0] {
         let workers = workers(dearer);
-        let [drawing, agents, ticks, taken] = play_market(&workers, (capacity, wants, worth)).expect("short of time");
+        let [drawing, agents, ticks, taken] =
+            play_shared_price(&workers, (capacity, wants, worth)).expect("short of time");
         assert!((drawing / agents - 1.0).abs() < 0.02, "{dearer}: {drawing} and {agents}");
         assert!((ticks + taken - capacity).abs() < 1e-6 * capacity);
         // by halving, without frames
@@ -388,20 +389,20 @@ fn market_finds_the_split_at_which_one_more_tick_is_worth_the_same_to_both() {
 }
 
 #[test]
-fn market_is_closed_where_there_is_enough_for_all_and_takes_any_worker() {
+fn shared_price_is_none_with_time_for_all_and_accepts_any_worker() {
     let workers = workers(1.0);
     let full = taken(&workers, 0.0);
-    assert_eq!(play_market(&workers, (full + 500.0, 500.0, 1.0)), None);
-    assert!(play_market(&workers, (full + 499.0, 500.0, 1.0)).is_some());
-    // a picture that wants more than there is, and nobody who could give it any
-    assert_eq!(play_market(&[], (900.0, 1000.0, 1.0)), None);
+    assert_eq!(play_shared_price(&workers, (full + 500.0, 500.0, 1.0)), None);
+    assert!(play_shared_price(&workers, (full + 499.0, 500.0, 1.0)).is_some());
+    // a picture that wants more than there is, and no agent that could give it any
+    assert_eq!(play_shared_price(&[], (900.0, 1000.0, 1.0)), None);
     for (full, least, loss) in
         [(f64::NAN, 0.1, 1.0), (9e9, f64::NAN, 1.0), (9e9, 0.0, 0.0), (9e9, 2.0, f64::NAN), (-1.0, 0.5, 1.0)]
     {
         let odd = [Worker { full, least, loss }, workers[0]];
         for _ in 0..50 {
             if let Some((lambda, ticks)) =
-                Market::default().settle(&odd, 1000.0, Drawing { wants: 900.0, lambda: f64::NAN })
+                SharedPrice::default().settle(&odd, 1000.0, Drawing { wants: 900.0, lambda: f64::NAN })
             {
                 assert!(
                     lambda.is_finite() && ticks.is_finite() && ticks >= 0.0,

@@ -3,7 +3,7 @@
 use metachron_lod::Bound;
 use metachron_lod::grisoni;
 use metachron_lod::grisoni::{GrisoniLaw, Limits};
-use metachron_lod::log_law::{Gains, LogLaw, Rest, SURPRISE_MAX};
+use metachron_lod::log_law::{Gains, LogLaw, Rest, UNCONFIRMED_ERROR_MAX};
 use metachron_lod::share::{Share, water_level};
 use proptest::prelude::*;
 use serde_json::Value;
@@ -80,7 +80,7 @@ fn printed_law_settles_in_a_second_only_on_fast_machines() {
 }
 
 #[test]
-fn printed_law_swings_for_ever_where_its_gain_passes_two() {
+fn printed_law_oscillates_without_end_where_its_gain_exceeds_two() {
     assert!(settling_s(0.9 * 2.0 * EPS_AT_TARGET / 460.0, 460.0).is_some());
     // α f0/ε₀ = 3.5
     assert_eq!(settling_s(1e-3, 460.0), None);
@@ -101,7 +101,7 @@ fn printed_law_coarsens_into_slower_frames_past_its_turning_point() {
 }
 
 #[test]
-fn printed_law_learns_nothing_from_a_rate_that_is_none() {
+fn printed_law_ignores_an_invalid_rate() {
     let cases: Value = serde_json::from_str(CASES).unwrap();
     let mut law = law_of(&cases["cases"][0]);
     let before = law;
@@ -158,18 +158,18 @@ fn corrected_law_rests_on_its_clamp_and_leaves_it_at_the_first_frame_of_the_othe
 }
 
 #[test]
-fn a_single_slow_frame_costs_a_fifth_and_a_load_that_stays_is_believed() {
+fn a_single_slow_frame_costs_a_fifth_and_a_lasting_load_counts_in_full() {
     let mut law = LogLaw::new(Gains::default(), (-8.0, 8.0), 0.0);
     law.observe(1.0, None);
     law.observe(5.0, None);
     let quality = (-law.value()).exp();
     assert!(quality > 0.8, "{quality}"); // e^(−κ (ln 1.5 − 0.02)) = 0.825
     law.observe(5.0, None);
-    assert!(law.value() > 2.0 * 0.5 * SURPRISE_MAX, "{}", law.value());
+    assert!(law.value() > 2.0 * 0.5 * UNCONFIRMED_ERROR_MAX, "{}", law.value());
 }
 
 #[test]
-fn a_level_that_would_be_late_is_not_asked_for() {
+fn a_level_that_would_be_late_is_not_requested() {
     // a picture of whole octaves, all of its time in polygons: 0.8 T, and the next level would take 1.6 T
     let mut law = LogLaw::new(Gains::default(), (-8.0, 8.0), 0.0);
     for _ in 0..100 {
@@ -199,7 +199,7 @@ fn any_ratio() -> impl Strategy<Value = f64> {
 
 proptest! {
     #[test]
-    fn no_sequence_of_times_takes_the_corrected_law_out_of_its_range(
+    fn no_sequence_of_times_moves_the_corrected_law_out_of_its_range(
         lessons in prop::collection::vec((any_ratio(), prop::option::of(any_ratio())), 1..200),
         kappa in any::<f64>(),
     ) {
@@ -211,7 +211,7 @@ proptest! {
     }
 
     #[test]
-    fn no_sequence_of_rates_takes_the_printed_law_out_of_its_limits(
+    fn no_sequence_of_rates_moves_the_printed_law_out_of_its_limits(
         lessons in prop::collection::vec((any_ratio(), any_ratio()), 1..200),
         alpha in any::<f64>(),
         beta in any::<f64>(),

@@ -153,7 +153,7 @@ proptest! {
 }
 
 #[test]
-fn half_of_the_best_is_not_what_the_greedy_choice_promises() {
+fn greedy_choice_can_be_below_half_of_the_best() {
     // BUDGET's counter-example: the claim of (FS93, §6) fails at 0.341, with the repair too
     let objects = vec![vec![(1, 500), (510, 511)], vec![(499, 499)], vec![(499, 499)]];
     let problem = problem_of(Mode::AtMostOne, 1000, &objects);
@@ -173,7 +173,7 @@ fn early_stop_lets_one_large_object_block_everything() {
 }
 
 #[test]
-fn cheapest_set_over_the_budget_is_given_and_said_to_be() {
+fn cheapest_set_over_the_budget_is_returned_as_infeasible() {
     let problem = problem_of(Mode::ExactlyOne, 10, &vec![vec![(5, 1), (9, 8)], vec![(6, 1)]]);
     for (name, got) in policies(&problem) {
         assert!(!got.feasible && got.levels == [Some(0), Some(0)] && got.upper == 0.0, "{name}");
@@ -195,7 +195,7 @@ fn no_objects_and_no_budget_give_nothing() {
 }
 
 #[test]
-fn measured_numbers_that_are_none_become_levels_that_can_be_compared() {
+fn invalid_measured_numbers_become_levels_that_can_be_compared() {
     for cost in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1.0] {
         assert_eq!(Entry::measured(cost, 3.0, 20.0), (Entry::new(40, 3), false));
     }

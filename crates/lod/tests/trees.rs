@@ -96,7 +96,7 @@ fn node(parent: Option<usize>, impostors: &[(u64, u64)]) -> Node {
 }
 
 #[test]
-fn nodes_that_are_no_tree_are_named() {
+fn nodes_that_form_no_tree_are_named_in_the_error() {
     let leaf = |parent| node(parent, &[(1, 1)]);
     assert_eq!(Tree::new(1, &[leaf(None), leaf(None)]), Err(TreeError::Loose(1)));
     assert_eq!(Tree::new(1, &[leaf(Some(0))]), Err(TreeError::Loose(0)));
@@ -115,7 +115,7 @@ fn empty_scene_is_an_empty_cut() {
 }
 
 #[test]
-fn opening_what_is_most_important_can_be_a_bad_bargain() {
+fn refining_the_most_important_node_can_lose_value() {
     // the example of (MB97, §2): one important part among dear ones, against many cheap parts worth more together
     let mut nodes = vec![node(None, &[]), node(Some(0), &[(1, 10)]), node(Some(0), &[(1, 10)])];
     nodes.extend([node(Some(1), &[(50, 30)]), node(Some(1), &[(49, 1)])]);

@@ -114,7 +114,7 @@ fn trees_give_the_values_and_the_cuts() {
 }
 
 #[test]
-fn robin_hood_offers_and_chooses_as_the_cases_say() {
+fn robin_hood_matches_the_worked_cases() {
     let answers = answers();
     for case in of_kind("robinhood") {
         let got = answer_to(&answers, &case, "main");
@@ -124,7 +124,7 @@ fn robin_hood_offers_and_chooses_as_the_cases_say() {
 }
 
 #[test]
-fn resolutions_and_rates_are_those_of_the_cases() {
+fn resolutions_and_rates_match_the_worked_cases() {
     let answers = answers();
     for (kind, fields) in [("gobbetti", ["r", "value", "lambda"]), ("rates", ["f", "cost", "lambda"])] {
         for case in of_kind(kind) {
@@ -138,7 +138,7 @@ fn resolutions_and_rates_are_those_of_the_cases() {
 }
 
 #[test]
-fn printed_rate_law_gives_the_traces() {
+fn printed_rate_law_matches_the_traces() {
     let answers = answers();
     for case in of_kind("grisoni") {
         check(&case, answer_to(&answers, &case, "main"), &case["expect"], &["trace"], 1e-9);

@@ -44,7 +44,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
 /// What one frame took.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// Wall time of the least of 15 frames, milliseconds: the work when nobody disturbs it.
+    /// Wall time of the least of 15 frames, milliseconds: the undisturbed work.
     wall_ms: f64,
     /// Processor time of all threads in the least of 15 frames, milliseconds: a driver in software draws with these.
     cpu_ms: f64,
@@ -78,13 +78,14 @@ fn measure(gpu: &Gpu) -> Result<(), GpuError> {
     }
     let small = Size { width: 64, height: 36 };
     let (few, many) = (cost(gpu, small, 0.1, 0)?, cost(gpu, small, 0.005, 4)?);
-    report("wall", &points, (few, many), |cost| cost.wall_ms);
-    report("cpu", &points, (few, many), |cost| cost.cpu_ms);
+    report("wall", &points, few, many, |cost| cost.wall_ms);
+    report("cpu", &points, few, many, |cost| cost.cpu_ms);
     Ok(())
 }
 
-/// Prints what a frame, a triangle and a pixel cost of one kind of time.
-fn report(name: &str, points: &[Cost], (few, many): (Cost, Cost), ms: fn(&Cost) -> f64) {
+/// Prints what a frame, a triangle and a pixel cost of one kind of time; `few` and `many` are pictures of few pixels, with few and
+/// many triangles.
+fn report(name: &str, points: &[Cost], few: Cost, many: Cost, ms: fn(&Cost) -> f64) {
     let pairs: Vec<_> = points.iter().map(|cost| (cost.triangles as f64, ms(cost))).collect();
     let (base, slope) = line(&pairs);
     let triangle_ms = (ms(&many) - ms(&few)) / (many.triangles - few.triangles) as f64;

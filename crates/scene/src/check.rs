@@ -17,15 +17,15 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 const LISTED_MAX: usize = 20;
 
 /// Most wrong keys of one table that are reported: each is found by reading the table once more.
-const TOLD_OF_A_TABLE: usize = 20;
+const TABLE_PROBLEMS_MAX: usize = 20;
 
-/// Removes from `table` the innermost key whose key or value spans `at`, and returns its name; `None` where there is none.
-fn take_out(table: &mut DeTable<'_>, at: &Range<usize>) -> Option<String> {
+/// Removes from `table` the innermost key owner key or value spans `at`, and returns its name; `None` where there is none.
+fn remove_innermost(table: &mut DeTable<'_>, at: &Range<usize>) -> Option<String> {
     for (_, value) in table.iter_mut() {
         let inner = match value.get_mut() {
-            DeValue::Table(inner) => take_out(inner, at),
+            DeValue::Table(inner) => remove_innermost(inner, at),
             DeValue::Array(items) => items.iter_mut().find_map(|item| match item.get_mut() {
-                DeValue::Table(inner) => take_out(inner, at),
+                DeValue::Table(inner) => remove_innermost(inner, at),
                 _ => None,
             }),
             _ => None,
@@ -55,22 +55,22 @@ pub(super) struct Place {
     /// Dotted path, such as `object.2`.
     pub(super) path: String,
     /// For messages, such as ``of `intestine` ``; may be empty.
-    pub(super) whose: String,
+    pub(super) owner: String,
 }
 
 impl Place {
-    pub(super) fn new(path: impl Into<String>, whose: impl Into<String>) -> Self {
-        Self { path: path.into(), whose: whose.into() }
+    pub(super) fn new(path: impl Into<String>, owner: impl Into<String>) -> Self {
+        Self { path: path.into(), owner: owner.into() }
     }
 
     /// The `index`-th entry of the list under `key`.
     pub(super) fn entry(&self, key: &str, index: usize) -> Self {
-        Self { path: format!("{}.{key}.{index}", self.path), whose: self.whose.clone() }
+        Self { path: format!("{}.{key}.{index}", self.path), owner: self.owner.clone() }
     }
 
     /// The table under `key`.
     pub(super) fn table(&self, key: &str) -> Self {
-        Self { path: format!("{}.{key}", self.path), whose: self.whose.clone() }
+        Self { path: format!("{}.{key}", self.path), owner: self.owner.clone() }
     }
 
     fn key(&self, key: &str) -> String {
@@ -79,7 +79,7 @@ impl Place {
 
     fn named(&self, key: &str) -> String {
         let key = key.split('.').next().unwrap_or(key);
-        if self.whose.is_empty() { format!("`{key}`") } else { format!("`{key}` {}", self.whose) }
+        if self.owner.is_empty() { format!("`{key}`") } else { format!("`{key}` {}", self.owner) }
     }
 }
 
@@ -144,7 +144,7 @@ impl<'d, 't> Checker<'d, 't> {
         also: &[&str],
     ) -> Option<T> {
         let mut taken: Vec<String> = Vec::new();
-        for _ in 0..TOLD_OF_A_TABLE {
+        for _ in 0..TABLE_PROBLEMS_MAX {
             let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table.clone())));
             let error = match T::deserialize(value) {
                 Ok(read) => return taken.is_empty().then_some(read),
@@ -152,12 +152,12 @@ impl<'d, 't> Checker<'d, 't> {
             };
             let missing = error.message().strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
             // a key that is reported wrong, also one that is this key misspelt, is not reported missing as well
-            let told = |key: &str| taken.iter().any(|one| one == key || did_you_mean(one, [key]).is_some());
-            if !missing.is_some_and(told) {
+            let reported = |key: &str| taken.iter().any(|one| one == key || did_you_mean(one, [key]).is_some());
+            if !missing.is_some_and(reported) {
                 self.push(Problem::from_toml(&error, span.clone(), also));
             }
             taken.extend(missing.map(str::to_owned));
-            taken.push(take_out(&mut table, &error.span()?)?);
+            taken.push(remove_innermost(&mut table, &error.span()?)?);
         }
         None
     }
@@ -178,9 +178,9 @@ impl<'d, 't> Checker<'d, 't> {
         if value.is_nan() { least } else { value.clamp(least, greatest) }
     }
 
-    /// As [`Self::number`], for a value that may be left out: `(given, default)`.
-    pub(super) fn number_or(&mut self, place: &Place, key: &str, value: (Option<f64>, f64), allowed: &Allowed) -> f64 {
-        value.0.map_or(value.1, |given| self.number(place, key, given, allowed))
+    /// As [`Self::number`], for a value that may be left out.
+    pub(super) fn optional(&mut self, place: &Place, key: &str, value: Option<f64>, allowed: &Allowed) -> Option<f64> {
+        value.map(|given| self.number(place, key, given, allowed))
     }
 
     /// A point or direction, every coordinate within ± `most`.

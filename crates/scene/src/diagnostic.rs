@@ -163,7 +163,10 @@ fn plain_words(message: &str) -> (String, Option<String>) {
     let first_line = message.lines().next().unwrap_or_default();
     // every choice in a scene is one of a list of words, and toml requests one in a wording of its own
     if first_line.starts_with("wanted ") {
-        return ("one word is wanted here".to_owned(), Some("expected a word in quotes, as \"auto\"".to_owned()));
+        return (
+            "the value must be a single word".to_owned(),
+            Some("expected a word in quotes, such as \"auto\"".to_owned()),
+        );
     }
     let (found, expected) = match first_line.split_once(", expected ") {
         Some((found, expected)) => (found, Some(format!("expected {}", plain_type(expected)))),

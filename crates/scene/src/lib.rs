@@ -34,7 +34,7 @@ pub use diagnostic::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{SCENE_BYTES_MAX, Source};
 
-use build::{Around, Objects};
+use build::{Objects, SceneContext};
 use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
@@ -74,9 +74,9 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     if let Some(faults) = faults {
         build::world_faults(&mut c, faults);
     }
-    let around = Around { source, gravity, faults };
-    let objects = build::read_objects(&mut c, document.root().get("object"), &around);
-    let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
+    let context = SceneContext { source, gravity, faults };
+    let objects = build::read_objects(&mut c, document.root().get("object"), &context);
+    let scene = file.map(|file| assemble(&mut c, source, file, gravity, objects));
     match (scene, c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
             scene.resolve_initial_overlaps();
@@ -100,14 +100,9 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
     given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
 }
 
-fn assemble(
-    c: &mut Checker<'_, '_>,
-    source: &Source,
-    file: SceneFile,
-    (gravity, mut objects): (DVec3, Objects),
-) -> Scene {
+fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
-        let what = format!("is {}, which this program does not know", file.format);
+        let what = format!("is {}, which this version does not support", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
     }
     let agents = objects.agents.len();
@@ -121,9 +116,9 @@ fn assemble(
     let sound = c.count() == 0;
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
     let joints: Arc<[Joint]> = joints.into();
-    objects.hold(&joints);
+    objects.set_joints(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
-    let groups = if sound { build::groups(c, &file.group, (&mut objects, source)) } else { Vec::new() };
+    let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),

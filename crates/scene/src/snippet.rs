@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_line_is_shown_around_its_place_which_keeps_its_column() {
+    fn a_long_line_is_cut_around_its_position_and_keeps_its_column() {
         let line = format!("x = \"{}ä-1\"{}", "ö".repeat(500), "b".repeat(500));
         let source = format!("{}\n{line}\nshort\n", "a".repeat(300));
         let at = source.find("-1").unwrap();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn places_at_both_ends_of_a_text_are_shown() {
+    fn positions_at_both_ends_of_a_text_are_shown() {
         for (source, place, line) in [("", 0..0, 1), ("a\n", 2..2, 2), ("a", 0..1, 1), ("a\r\nb", 3..4, 2)] {
             let excerpt = Excerpt::of("x", source, &place);
             assert_eq!((&excerpt.text[excerpt.span.clone()], excerpt.line), (&source[place], line), "{source:?}");
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_told_without_a_line_of_zeros() {
+    fn numbers_are_shown_without_a_line_of_zeros() {
         let said = format!("`radius_m` is {}, from {} to 10000.", 1e308, -1e-300);
         assert_eq!(readable(&said), "`radius_m` is 1e308, from -1e-300 to 10000.");
         assert!(readable(&"ä b ".repeat(100_000)).chars().count() < 1600);

@@ -18,15 +18,15 @@ const SIBLING_BYTES_MAX: u64 = 64 << 20;
 pub struct Source {
     name: String,
     text: String,
-    beside: Beside,
+    siblings: SiblingFiles,
 }
 
 /// Location of the files next to a scene.
 #[derive(Debug, Clone)]
-enum Beside {
+enum SiblingFiles {
     BuiltIn,
     Folder(PathBuf),
-    Nowhere,
+    Unavailable,
 }
 
 impl Source {
@@ -37,12 +37,12 @@ impl Source {
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
-            return Ok(Self { name, text, beside: Beside::BuiltIn });
+            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn });
         }
         let path = Path::new(name_or_path);
         let bytes = read_bounded(path, SCENE_BYTES_MAX).map_err(|why| missing(name_or_path, path, &why))?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        Self::from_bytes(name_or_path, bytes, Beside::Folder(folder))
+        Self::from_bytes(name_or_path, bytes, SiblingFiles::Folder(folder))
     }
 
     /// A scene from bytes in memory, without files next to it.
@@ -54,12 +54,12 @@ impl Source {
             let message = format!("it has {} bytes, more than {SCENE_BYTES_MAX}", bytes.len());
             return Err(SceneError::unreadable(name, message, None));
         }
-        Self::from_bytes(name, bytes.to_vec(), Beside::Nowhere)
+        Self::from_bytes(name, bytes.to_vec(), SiblingFiles::Unavailable)
     }
 
-    fn from_bytes(name: &str, bytes: Vec<u8>, beside: Beside) -> Result<Self, SceneError> {
+    fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self { name: name.to_owned(), text, beside }),
+            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings }),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let before = &error.as_bytes()[..valid];
@@ -89,12 +89,12 @@ impl Source {
         if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
             return Err("expected a path relative to the scene".to_owned());
         }
-        match &self.beside {
-            Beside::BuiltIn => {
+        match &self.siblings {
+            SiblingFiles::BuiltIn => {
                 builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
             }
-            Beside::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
-            Beside::Nowhere => Err("this scene has no folder".to_owned()),
+            SiblingFiles::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
+            SiblingFiles::Unavailable => Err("a scene from memory has no files beside it".to_owned()),
         }
     }
 }
@@ -143,14 +143,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_plain_file_is_refused_and_not_waited_for() {
+    fn a_path_that_is_not_a_plain_file_is_refused_without_waiting() {
         // an endless device, and a socket in place of a pipe: both are refused before they are opened
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("socket.obj");
         let _listens = std::os::unix::net::UnixListener::bind(&socket).unwrap();
         for path in [Path::new("/dev/zero"), &socket] {
-            let told = read_plain(path, SIBLING_BYTES_MAX).unwrap_err();
-            assert!(told.contains("expected a plain file"), "{path:?}: {told}");
+            let message = read_plain(path, SIBLING_BYTES_MAX).unwrap_err();
+            assert!(message.contains("expected a plain file"), "{path:?}: {message}");
         }
         assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
         // a scene may come from a pipe, but its length is bounded

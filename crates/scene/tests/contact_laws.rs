@@ -14,7 +14,7 @@ fn balls(ties: &str) -> Scene {
 }
 
 #[test]
-fn agents_that_joints_hold_together_begin_in_the_world_of_the_lowest() {
+fn jointed_agents_start_in_the_island_of_the_lowest_id() {
     let joint = |a, b| format!("{{ kind = \"fixed\", a = \"b-{a}\", b = \"b-{b}\" }}");
     let scene = balls(&format!("joint = [{}, {}, {}]", joint(5, 3), joint(2, 1), joint(3, 2)));
     let ties = Ties::of(&scene);
@@ -23,7 +23,7 @@ fn agents_that_joints_hold_together_begin_in_the_world_of_the_lowest() {
 }
 
 #[test]
-fn bodies_that_lie_against_each_other_begin_in_one_world_unless_their_law_is_another() {
+fn touching_bodies_start_in_one_island_unless_their_law_is_another() {
     let row = |x: f64, more: &str| {
         format!(
             "{{ name = \"{x}\", model = \"rigid\", shape = \"ball\", radius_m = 0.5, position_m = [{x}, 0, 0]{more} }},\n"
@@ -42,7 +42,7 @@ fn bodies_that_lie_against_each_other_begin_in_one_world_unless_their_law_is_ano
 }
 
 #[test]
-fn a_heap_begins_in_one_world_and_what_is_smaller_or_sparser_does_not() {
+fn a_heap_starts_in_one_island_and_a_smaller_or_sparser_one_does_not() {
     let worlds = |grid: &str, spacing: &str, more: &str| {
         let text = format!(
             "format = 1\n{more}\n[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.1, 0.1, 0.1]\nrate_hz = 60.0\ngrid = {grid}\nspacing_m = {spacing}\n"
@@ -58,7 +58,7 @@ fn a_heap_begins_in_one_world_and_what_is_smaller_or_sparser_does_not() {
 }
 
 #[test]
-fn a_world_without_contacts_turns_every_pair_off_but_those_it_names() {
+fn a_world_without_contacts_turns_every_pair_off_except_those_it_names() {
     let coupling = "coupling = [{ a = \"b-4\", b = \"b-1\", law = \"ledger\" }]\n[world]\ncontacts = false";
     let laws = contact_laws(&balls(coupling));
     assert_eq!(laws.len(), 15);

@@ -7,7 +7,7 @@
 
 use super::assemble::ROOM;
 use metachron_core::AgentId;
-use metachron_lod::adaptive::joint::{Between, Drawing, Market, Worker, temporal_error_px};
+use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, temporal_error_px};
 use metachron_lod::control::ObjectView;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -85,7 +85,7 @@ pub(super) struct FramePeriod {
 pub(super) struct CpuBudget {
     agents: Vec<Arc<AgentBudget>>,
     workers: Vec<Worker>,
-    market: Market,
+    market: SharedPrice,
     open: bool,
 }
 
@@ -134,7 +134,7 @@ impl CpuBudget {
         if std::mem::take(&mut self.open) {
             self.agents.iter().for_each(|agent| agent.set_share(agent.fair));
         }
-        self.market = Market::default();
+        self.market = SharedPrice::default();
     }
 }
 

@@ -165,7 +165,7 @@ fn find(observed: &[Observed], target_hz: f64, shared: &SearchState) -> Result<V
 pub(super) fn verdict_text(verdict: &Verdict) -> String {
     let settles = verdict.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
     let late = 100.0 * verdict.miss_share;
-    match verdict.contender {
+    match verdict.candidate {
         Candidate::Feedback(Law::Corrected { kappa, margin, .. }) => {
             format!("κ {kappa:.2}, margin {:.0} %: {settles}, {late:.1} % late", 100.0 * margin)
         }

@@ -269,7 +269,7 @@ impl<'a> WindowSimulation<'a> {
         let Some(tuning) = self.tuning.take_if(|tuning| tuning.is_over()) else { return };
         match tuning.end() {
             Tuned::Found(verdict) => {
-                if let metachron_lod::tune::Candidate::Feedback(law) = verdict.contender {
+                if let metachron_lod::tune::Candidate::Feedback(law) = verdict.candidate {
                     self.session.control().set_policy(Policy::Feedback);
                     self.session.control().set_law(law);
                 }

@@ -94,7 +94,7 @@ fn what_cannot_be_played_is_refused_by_run_and_by_check_alike() {
     for (text, word) in [
         (format!("{BALL}[[probe]]\nobject = \"ball\"\nat = 1.5\n"), "1.5"),
         (format!("{BALL}[[probe]]\nobject = \"bell\"\n"), "ball"),
-        (format!("{BALL}{BALL}"), "taken"),
+        (format!("{BALL}{BALL}"), "the name of another object"),
         (format!("{BALL}radius_m = 2\n"), "duplicate"),
         (format!("{BALL}name\u{0} = 1\n"), "scene.toml"),
         ("[[object]]\nname = \"\\u0007\"\nmodel = \"rigid\"\nshape = \"plane\"\n".to_owned(), "name"),

@@ -42,7 +42,7 @@ pub(super) struct Progress {
 impl Progress {
     /// Reports a case that is about to be measured: the share that is done, and its description. `false`: measure no more.
     pub(super) fn continues(&self, done: f64, words: String) -> bool {
-        self.bar.tell(done, words);
+        self.bar.set(done, words);
         !self.stopped.load(Ordering::Relaxed)
     }
 }

@@ -224,7 +224,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     let (file, kept) = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
     let bar = Bar::new(E::NAME, setting.quiet);
     let swept = sweep::sweep::<E>(&cases, file, kept, setting.stopped, &mut |done, all| {
-        bar.tell(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
+        bar.set(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
     })?;
     drop(bar);
     let mut files = vec![setting.folder.join(format!("{stem}.csv"))];

@@ -197,7 +197,7 @@ impl<'a> Task<'a> {
         let runs = self.runs.get() + 1;
         self.runs.set(runs);
         let done = f64::from(runs) / f64::from(self.runs_max.max(1));
-        self.bar.iter().for_each(|bar| bar.tell(done, format!("run {runs}")));
+        self.bar.iter().for_each(|bar| bar.set(done, format!("run {runs}")));
         let stopped = self.stopped;
         match play_points(&scene, &self.points, self.seconds, &mut || !stopped.load(Ordering::Relaxed)) {
             Ok(played) => played,

@@ -69,7 +69,7 @@ pub(super) fn check(
     };
     let bar = Bar::new("measured frames", args.common.quiet || args.common.json);
     let runs = push(Session::open(on.scene.clone())?, pushes, &mut |share| {
-        bar.tell(share, "step response".to_owned());
+        bar.set(share, "step response".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
     let measured = runs.iter().map(|frames| settled_s(frames, set_s));

@@ -58,8 +58,8 @@ fn fit(plant: &Plant) -> Panel {
     }
 }
 
-fn undisturbed_trial(on: &Identified, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
-    Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
+fn undisturbed_trial(on: &Identified, candidate: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
+    Trial { start: Start::Rate(rate), seconds, ..Trial::calm(candidate, on.target_hz) }
 }
 
 /// How a law's points are drawn.
@@ -78,7 +78,7 @@ fn responses(on: &Identified, tuned: &Tuned) -> Panel {
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
     for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
         for (k, rate) in STARTS.into_iter().enumerate() {
-            let beats = play(&plant, &undisturbed_trial(on, row.verdict.contender, rate, SHOWN_S));
+            let beats = play(&plant, &undisturbed_trial(on, row.verdict.candidate, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
             layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
         }
@@ -100,7 +100,7 @@ fn evaluated_plant(on: &Identified, tuned: &Tuned) -> Plant {
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
     let ([columns, rows], plant) = (CELLS, evaluated_plant(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
-    let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
+    let found = tuned.rows.iter().filter_map(|row| match row.verdict.candidate {
         Candidate::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
         _ => None,
     });
@@ -151,15 +151,15 @@ fn kind(measured: &[Measures]) -> usize {
 
 /// Late frames over the speed of the machine, with 40 % more load for a third of the time.
 fn late_frames(on: &Identified, tuned: &Tuned) -> Panel {
-    let trial = |contender: Candidate, speed: f64| Trial {
+    let trial = |candidate: Candidate, speed: f64| Trial {
         speed,
         disturbance: Disturbance::Load(1.4),
         noise: on.plant.line.scatter,
         seed: 1,
         start: Start::Rate(speed),
-        ..undisturbed_trial(on, contender, 1.0, 4.0)
+        ..undisturbed_trial(on, candidate, 1.0, 4.0)
     };
-    let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.contender, speed)));
+    let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.candidate, speed)));
     let measured = measure(&on.plant, &trials.collect::<Vec<_>>(), None);
     let lines = tuned.rows.iter().zip(styles(tuned)).zip(measured.chunks(SPEEDS.len()));
     let lines = lines.map(|((row, (colour, mark)), measured)| {

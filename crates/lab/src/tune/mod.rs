@@ -16,7 +16,7 @@ use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
 use metachron_lod::control::Law;
 use metachron_lod::tune::{
-    Candidate, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
+    Candidate, Extent, Family, Plant, Search, SearchResult, Verdict, explain, judge, refusal, relay_gains, search,
 };
 use metachron_render::{Gpu, Offscreen, RendererOptions, Size};
 use metachron_scene::{Source, load};
@@ -50,7 +50,7 @@ struct Row {
 /// The result of a search over all families.
 struct Tuned {
     rows: Vec<Row>,
-    found: Vec<(Family, Found)>,
+    found: Vec<(Family, SearchResult)>,
     /// The best of the feedback laws, which the fragment contains.
     best: Law,
     interrupted: bool,
@@ -59,7 +59,7 @@ struct Tuned {
 impl Tuned {
     /// The verdict on the best law.
     fn verdict(&self) -> Option<&Verdict> {
-        self.rows.iter().map(|row| &row.verdict).find(|v| v.contender == self.best.into())
+        self.rows.iter().map(|row| &row.verdict).find(|v| v.candidate == self.best.into())
     }
 }
 
@@ -69,18 +69,18 @@ impl Tuned {
 /// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
     let scene = scene(args)?;
-    let given = args.analyse.as_deref().map(|text| gains::parsed(text, scene.target.frame_hz)).transpose()?;
+    let given = args.analyse.as_deref().map(|text| gains::parse(text, scene.target.frame_hz)).transpose()?;
     let fragment =
         args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", file_stem(&args.scene))));
     if given.is_none() {
-        gains::check_place(&fragment, "--gains", args.force)?;
+        gains::check_output_path(&fragment, "--gains", args.force)?;
     }
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     let Some(identified) = identify(args, scene, &stopped)? else { return Ok(Exit::Interrupted) };
     match given {
-        Some(contender) => analyse(args, &identified, contender),
+        Some(candidate) => analyse(args, &identified, candidate),
         None => tune(args, &identified, &fragment, &stopped),
     }
 }
@@ -100,7 +100,7 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
     let bar = Bar::new("experiment", args.common.quiet || args.common.json);
     let done = experiment(session, plan, &mut |share| {
-        bar.tell(share, "drawing frames at many resolutions".to_owned());
+        bar.set(share, "drawing frames at many resolutions".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
     drop(bar);
@@ -137,9 +137,9 @@ fn extent(args: &TuneArgs) -> Extent {
 }
 
 /// Explains given gains.
-fn analyse(args: &TuneArgs, on: &Identified, contender: Candidate) -> anyhow::Result<Exit> {
-    let explanation = explain(&on.plant, contender, on.target_hz);
-    let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
+fn analyse(args: &TuneArgs, on: &Identified, candidate: Candidate) -> anyhow::Result<Exit> {
+    let explanation = explain(&on.plant, candidate, on.target_hz);
+    let verdict = judge(&on.plant, candidate, on.target_hz, extent(args));
     data(&if args.common.json {
         report::analysis_json(on, &explanation, &verdict)?
     } else {
@@ -187,7 +187,7 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
     for family in Family::ALL {
         let bar = Bar::new(family_name(family), args.common.quiet || args.common.json);
         let mut go_on = |share: f64, best: &Verdict| {
-            bar.tell(share, format!("best so far {}: {:.3}", gains::told(best.contender), best.objective));
+            bar.set(share, format!("best so far {}: {:.3}", gains::gains_text(best.candidate), best.objective));
             !stopped.load(Ordering::Relaxed)
         };
         let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent, go_on: &mut go_on };
@@ -200,15 +200,15 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
     let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
     let mut rows: Vec<_> =
         found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
-    let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.contender == best.into()).cloned();
+    let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.candidate == best.into()).cloned();
     rows.extend(verdict.iter().flat_map(|verdict| reference_laws(on, verdict, extent)));
     Ok(Tuned { rows, found, best, interrupted })
 }
 
 /// The best of the laws whose gain is the same at every rate. The printed law's gain is not, and the predicting policy has no gains to
 /// write to the fragment: both are only shown in the table.
-fn best_law(found: &[(Family, Found)]) -> Option<Law> {
-    let law = |(_, f): &(Family, Found)| match f.best.contender {
+fn best_law(found: &[(Family, SearchResult)]) -> Option<Law> {
+    let law = |(_, f): &(Family, SearchResult)| match f.best.candidate {
         Candidate::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
         _ => None,
     };
@@ -218,7 +218,7 @@ fn best_law(found: &[(Family, Found)]) -> Option<Law> {
 /// The laws for comparison with the gains found; the relay's law has the same margin.
 fn reference_laws(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
     let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
-    let margin = 1.0 - best.contender.set_share();
+    let margin = 1.0 - best.candidate.set_share();
     let rivals = [
         ("corrected, default gains", Some(Law::CORRECTED)),
         ("printed, α = 1e-4", Some(Law::PRINTED)),

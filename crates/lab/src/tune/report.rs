@@ -31,7 +31,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
         let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
         table.rows.push(vec![
             row.name.into(),
-            gains::told(v.contender).into(),
+            gains::gains_text(v.candidate).into(),
             settle,
             Cell::Number(v.overshoot, 3),
             Cell::Number(v.miss_share, 4),
@@ -49,7 +49,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
         plant(on),
         speed_note(tuned),
         table.text(),
-        gains::told(tuned.best.into()),
+        gains::gains_text(tuned.best.into()),
         checked.iter().map(Checked::text).collect::<String>(),
         files.join(", ")
     )
@@ -69,7 +69,7 @@ fn speed_note(tuned: &Tuned) -> String {
 /// The plant, in a few lines.
 fn plant(on: &Identified) -> String {
     let line = &on.plant.line;
-    let reach = on.plant.reach(1.0);
+    let reach = on.plant.time_range(1.0);
     format!(
         "{} at {} Hz on {}\n  a frame takes {:.2} ms + {:.1} ns a polygon (95 %: {:.1} to {:.1}), scatter {:.1} %, dead time {} frames\n  \
          what is in view can take {:.2} to {:.2} ms\n",
@@ -121,12 +121,12 @@ pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
         .found
         .iter()
         .flat_map(|(_, f)| {
-            f.tried.iter().map(|(contender, objective)| {
-                json!({ "law": law_name(*contender), "gains": gains_json(*contender), "objective": objective })
+            f.tried.iter().map(|(candidate, objective)| {
+                json!({ "law": law_name(*candidate), "gains": gains_json(*candidate), "objective": objective })
             })
         })
         .collect();
-    let mut whole = tuned.verdict().map_or_else(|| json!({}), |v| row_json(law_name(v.contender), v));
+    let mut whole = tuned.verdict().map_or_else(|| json!({}), |v| row_json(law_name(v.candidate), v));
     let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
         "checked": checked.iter().map(Checked::json).collect::<Vec<_>>(),
@@ -140,7 +140,7 @@ pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
 
 fn plant_json(on: &Identified) -> Value {
     let line = &on.plant.line;
-    let reach = on.plant.reach(1.0);
+    let reach = on.plant.time_range(1.0);
     json!({
         "fixed_ms": 1e3 * line.intercept, "polygon_ns": 1e9 * line.slope,
         "polygon_ns_95": [1e9 * line.slope_95.0, 1e9 * line.slope_95.1], "scatter": line.scatter,
@@ -150,7 +150,7 @@ fn plant_json(on: &Identified) -> Value {
 
 fn row_json(name: &str, v: &Verdict) -> Value {
     json!({
-        "law": name, "gains": gains_json(v.contender), "settle_s": v.settle_s, "overshoot": v.overshoot,
+        "law": name, "gains": gains_json(v.candidate), "settle_s": v.settle_s, "overshoot": v.overshoot,
         "miss_share": v.miss_share, "gain_margin": v.margins.map(|m| m.gain), "delay_margin_frames": v.margins.map(|m| m.delay),
         "reversals": v.reversals, "quality": v.quality, "robust_to": v.robust_to, "asked": v.asked, "at_speed": v.at_speed,
         "objective": v.objective,
@@ -158,16 +158,16 @@ fn row_json(name: &str, v: &Verdict) -> Value {
 }
 
 /// The law's name, as scenes and `--analyse` write it.
-fn law_name(contender: Candidate) -> &'static str {
-    match contender {
+fn law_name(candidate: Candidate) -> &'static str {
+    match candidate {
         Candidate::Feedback(Law::Printed { .. }) => "printed",
         Candidate::Feedback(Law::Corrected { .. }) => "corrected",
         Candidate::Adaptive { .. } => "adaptive",
     }
 }
 
-fn gains_json(contender: Candidate) -> Value {
-    match contender {
+fn gains_json(candidate: Candidate) -> Value {
+    match candidate {
         Candidate::Feedback(Law::Printed { alpha, beta }) => json!({ "alpha": alpha, "beta": beta }),
         Candidate::Feedback(Law::Corrected { kappa, lead, margin }) => {
             json!({ "kappa": kappa, "lead": lead, "margin": margin })
@@ -190,7 +190,7 @@ pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String 
     let rest = |eps: f64, ratio: f64, end: bool| {
         format!("ε̂ = {eps:.4} at {ratio:.2} of the target time{}", if end { " (a limit)" } else { "" })
     };
-    let rests: Vec<_> = e.rests.iter().map(|r| rest(r.eps_hat, r.ratio, r.clamped)).collect();
+    let rests: Vec<_> = e.fixed_points.iter().map(|r| rest(r.eps_hat, r.ratio, r.clamped)).collect();
     let cycle = e.cycle.map_or_else(String::new, |c| {
         format!("  limit cycle: amplitude {:.1} % of the frame time, period {:.3} s\n", 100.0 * c.amplitude, c.period_s)
     });
@@ -199,8 +199,8 @@ pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String 
         "{}  {}, {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  can rest: {}\n{cycle}  settles from 0.4 of the rate: \
          {}, from 2.5: {}; overshoot {:.2}, {:.2}\n  n changes {:.3} times per frame at rest; late {:.2} % of disturbed frames\n\n{}\n",
         plant(on),
-        law_name(v.contender),
-        gains::told(v.contender),
+        law_name(v.candidate),
+        gains::gains_text(v.candidate),
         1e3 * e.set_s,
         100.0 * e.share,
         rests.join("; "),
@@ -217,8 +217,8 @@ pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String 
 /// The same as JSON.
 pub(super) fn analysis_json(on: &Identified, e: &Explanation, v: &Verdict) -> anyhow::Result<String> {
     let rests: Vec<_> =
-        e.rests.iter().map(|r| json!({ "eps": r.eps_hat, "ratio": r.ratio, "clamped": r.clamped })).collect();
-    let mut whole = row_json(law_name(v.contender), v);
+        e.fixed_points.iter().map(|r| json!({ "eps": r.eps_hat, "ratio": r.ratio, "clamped": r.clamped })).collect();
+    let mut whole = row_json(law_name(v.candidate), v);
     let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
         "set_ms": 1e3 * e.set_s, "share": e.share, "loop_gain": e.near.map(|n| n.gain),

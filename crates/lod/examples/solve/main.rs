@@ -1,4 +1,4 @@
-//! Answers a file of worked cases: `cargo run -p metachron-budget --example solve -- CASES ANSWERS`.
+//! Answers a file of worked cases: `cargo run -p metachron-lod --example solve -- CASES ANSWERS`.
 //!
 //! In: a case file. Out: a file with one answer for every policy of every case, and a line that counts them.
 

@@ -8,7 +8,7 @@ const MISS: f64 = 0.10;
 /// This many in a row raise the margin …
 const MISSES: u8 = 2;
 /// … for this many frames.
-const WARY: u8 = 30;
+const RAISED_FRAMES: u8 = 30;
 /// A still picture is refined where this fraction of T was to spare …
 const SPARE: f64 = 0.05;
 /// … this often in a row: initially about as long as it takes to see that a machine has calmed down; doubled after each time that the
@@ -17,25 +17,25 @@ const SPARE_IN_A_ROW: (u16, u16) = (8, 512);
 
 /// Raises the margin for about half a second after two misses in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Ladder {
+pub struct MissCounter {
     misses: u8,
-    wary: u8,
+    raised_frames: u8,
 }
 
-impl Ladder {
+impl MissCounter {
     /// Reports that a frame took `part` of its time.
     pub fn observe(&mut self, part: f64) {
-        self.wary = self.wary.saturating_sub(1);
+        self.raised_frames = self.raised_frames.saturating_sub(1);
         self.misses = if part > 1.0 + MISS { self.misses.saturating_add(1) } else { 0 };
         if self.misses >= MISSES {
-            self.wary = WARY;
+            self.raised_frames = RAISED_FRAMES;
         }
     }
 
     /// Number added to the σ in the margin: 1 while the margin is raised.
     #[must_use]
     pub fn extra_sigmas(&self) -> f64 {
-        if self.wary > 0 { 1.0 } else { 0.0 }
+        if self.raised_frames > 0 { 1.0 } else { 0.0 }
     }
 }
 
@@ -50,19 +50,19 @@ pub fn is_late(elapsed: f64, target: f64) -> bool {
 
 /// Whether the choice for a picture in which nothing moves still holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Hold {
+pub(crate) struct ChoiceHold {
     /// Consecutive frames with time to spare, and how many it takes to refine.
     spare: u16,
     patience: u16,
 }
 
-impl Default for Hold {
+impl Default for ChoiceHold {
     fn default() -> Self {
         Self { spare: 0, patience: SPARE_IN_A_ROW.0 }
     }
 }
 
-impl Hold {
+impl ChoiceHold {
     /// Whether the last choice may stay: `predicted` is what it would take now, `goal` the budget, both as fractions of T; `can_rise` where
     /// not everything is at its finest.
     pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
@@ -89,7 +89,7 @@ impl Trim {
     /// nothing to spend it on (eq. 40).
     pub fn observe(&mut self, left_over: f64, all_at_most: bool) {
         if left_over.is_finite() && !(all_at_most && left_over > 0.0) {
-            self.part = crate::within(self.part + 0.03 * left_over, (-0.10, 0.05));
+            self.part = crate::within(self.part + 0.03 * left_over, -0.10, 0.05);
         }
     }
 

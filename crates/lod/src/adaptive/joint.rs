@@ -1,7 +1,7 @@
 //! Simulation and drawing under one budget: the benefit of a step rate on the screen, and how two budgets share the cores.
 //!
 //! In: motion on the screen, rates, levels. Out: offers that [`super::Adaptive`] chooses among; for two budgets a split, computed directly
-//! or found over several frames ([`Market`]). Never here: stepping. Theory: `docs/theory/budget.md`, eq. 54 … 59.
+//! or found over several frames ([`SharedPrice`]). Never here: stepping. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 
 use alloc::vec::Vec;
 
@@ -88,7 +88,7 @@ pub fn even_split(total: f64, mut prices: impl FnMut(f64, f64) -> (f64, f64)) ->
     0.5 * (low + high)
 }
 
-/// An agent that steps on the processor that draws, as the market sees it.
+/// An agent that steps on the processor that draws, as the shared price sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Worker {
     /// Ticks of a frame's time that the agent takes at its finest, > 0.
@@ -104,7 +104,7 @@ impl Worker {
     #[must_use]
     pub fn part(&self, lambda: f64) -> f64 {
         let part = libm::sqrt(self.loss / (lambda * self.full));
-        let least = crate::within(self.least, (0.0, 1.0));
+        let least = crate::within(self.least, 0.0, 1.0);
         if part.is_nan() { 1.0 } else { part.min(1.0).max(least) }
     }
 
@@ -125,7 +125,7 @@ fn prices(workers: &[Worker]) -> (f64, f64) {
     let sound = workers.iter().filter(|worker| worker.full > 0.0 && worker.loss > 0.0);
     let of = |worker: &Worker, part: f64| worker.loss / (worker.full * part * part);
     sound.fold((f64::MAX, f64::MIN_POSITIVE), |(low, high), worker| {
-        let least = crate::within(worker.least, (LEAST, 1.0));
+        let least = crate::within(worker.least, LEAST_PART, 1.0);
         (low.min(of(worker, 1.0)), high.max(of(worker, least)))
     })
 }
@@ -151,16 +151,16 @@ pub fn price(workers: &[Worker], ticks: f64) -> f64 {
 }
 
 /// Least fraction of its work that any worker is assumed to need when prices are computed.
-const LEAST: f64 = 1e-3;
+const LEAST_PART: f64 = 1e-3;
 /// Fraction of the distance to the drawing's price that one frame covers: agents respond within a quarter of a second, and the price must
 /// not outrun them.
-const PACE: f64 = 0.05;
+const PRICE_STEP: f64 = 0.05;
 /// Limit of that distance, |Δ ln λ|, in one frame: prices are step functions.
-const FAR: f64 = 1.0;
+const PRICE_STEP_MAX: f64 = 1.0;
 /// Relative fall of the price per frame while drawing has all the time it requests.
-const FALL: f64 = 0.02;
+const PRICE_DECAY: f64 = 0.02;
 
-/// The state of drawing in the market.
+/// The state of drawing, as the shared price sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawing {
     /// Ticks that a frame would take if nothing else needed any.
@@ -171,11 +171,11 @@ pub struct Drawing {
 
 /// One price for simulation and drawing on shared cores, found over several frames (eq. 59).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Market {
+pub struct SharedPrice {
     lambda: Option<f64>,
 }
 
-impl Market {
+impl SharedPrice {
     /// The price of a tick in the next frame, and the ticks that drawing may take; `None` where `capacity` ticks are enough for all, so
     /// that no agent reduces its work.
     pub fn settle(&mut self, workers: &[Worker], capacity: f64, drawing: Drawing) -> Option<(f64, f64)> {
@@ -190,9 +190,11 @@ impl Market {
             // drawing gets what it requests, but at most half of the capacity
             None => price(workers, (capacity - drawing.wants).max(0.5 * capacity)),
             Some(held) if drawing.lambda > 0.0 => {
-                held * libm::exp(PACE * crate::within(libm::log(drawing.lambda / held), (-FAR, FAR)))
+                held * libm::exp(
+                    PRICE_STEP * crate::within(libm::log(drawing.lambda / held), -PRICE_STEP_MAX, PRICE_STEP_MAX),
+                )
             }
-            Some(held) => held * (1.0 - FALL),
+            Some(held) => held * (1.0 - PRICE_DECAY),
         };
         let (low, high) = prices(workers);
         let lambda = lambda.max(low.min(high)).min(high);

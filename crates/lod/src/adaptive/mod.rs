@@ -24,15 +24,19 @@ mod options;
 mod pick;
 mod speed_estimator;
 
-pub use hysteresis::{Ladder, Trim, is_late};
+pub use hysteresis::{MissCounter, Trim, is_late};
 pub use options::Offer;
-pub use speed_estimator::{Gauge, Lesson};
+pub use speed_estimator::{FilterUpdate, SpeedEstimator};
+#[cfg(feature = "std")]
+pub(crate) use speed_estimator::{SIGMA_LEAST, WANDER};
 
 use crate::select::Level;
-use hysteresis::Hold;
+use hysteresis::ChoiceHold;
 use options::Options;
 use pick::{Picker, Terms};
 
+/// The fraction of a frame that a policy with a prediction leaves free where a scene sets none.
+pub const DEFAULT_MARGIN: f64 = 0.02;
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
 /// Frames whose measurement may still arrive: later measurements are ignored.
@@ -63,14 +67,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { margin: 0.02, sigmas: 0.5, hysteresis: 0.25, dwell: 8, trim: false }
+        Self { margin: DEFAULT_MARGIN, sigmas: 0.5, hysteresis: 0.25, dwell: 8, trim: false }
     }
 }
 
 impl Settings {
     fn sound(self) -> Self {
-        let (margin, sigmas) = (crate::within(self.margin, (0.0, 0.5)), crate::within(self.sigmas, (0.0, 5.0)));
-        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, (0.0, 2.0)), ..self }
+        let (margin, sigmas) = (crate::within(self.margin, 0.0, 0.5), crate::within(self.sigmas, 0.0, 5.0));
+        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
     }
 }
 
@@ -112,30 +116,30 @@ impl Plan {
 
 /// The prediction for a frame, stored until the frame is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Sent {
+struct Prediction {
     frame: u64,
     target: f64,
     table: [u64; STAGES],
-    teaches: bool,
+    usable: bool,
 }
 
 /// Objects, the estimates of the machine, and the last choice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adaptive {
     settings: Settings,
-    menu: Options,
+    options: Options,
     picker: Picker,
-    gauges: [Gauge; STAGES],
-    /// κ used in plans: follows the gauges up immediately and down slowly.
+    estimators: [SpeedEstimator; STAGES],
+    /// κ used in plans: follows the estimators up immediately and down slowly.
     kappa: [f64; STAGES],
-    ladder: Ladder,
-    hold: Hold,
+    misses: MissCounter,
+    hold: ChoiceHold,
     trim: Trim,
-    sent: [Option<Sent>; IN_FLIGHT],
+    predictions: [Option<Prediction>; IN_FLIGHT],
     unsettled: u8,
     plan: Plan,
     table: [u64; STAGES],
-    /// The menu's change counter and the time at the last choice.
+    /// The options' change counter and the time at the last choice.
     chosen_for: Option<(u64, Time)>,
 }
 
@@ -145,14 +149,14 @@ impl Adaptive {
     pub fn new(settings: Settings) -> Self {
         Self {
             settings: settings.sound(),
-            menu: Options::default(),
+            options: Options::default(),
             picker: Picker::default(),
-            gauges: [Gauge::default(); STAGES],
+            estimators: [SpeedEstimator::default(); STAGES],
             kappa: [1.0; STAGES],
-            ladder: Ladder::default(),
-            hold: Hold::default(),
+            misses: MissCounter::default(),
+            hold: ChoiceHold::default(),
             trim: Trim::default(),
-            sent: [None; IN_FLIGHT],
+            predictions: [None; IN_FLIGHT],
             unsettled: UNSETTLED,
             plan: Plan::default(),
             table: [0; STAGES],
@@ -164,18 +168,18 @@ impl Adaptive {
     ///
     /// A new object starts at its lowest form with weight 1. `droppable` objects may be left out altogether.
     pub fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
-        self.menu.set(id, stage.min(STAGES - 1), droppable, levels);
+        self.options.set(id, stage.min(STAGES - 1), droppable, levels);
     }
 
     /// Sets the factor of an object's gains from the next choice on; NaN and negative values are 0, and 0 gives the lowest form. `false`
     /// where there is no such object.
     pub fn weigh(&mut self, id: u64, weight: f64) -> bool {
-        self.menu.weigh(id, weight)
+        self.options.weigh(id, weight)
     }
 
     /// Removes an object; `false` where there is no such object.
     pub fn remove(&mut self, id: u64) -> bool {
-        self.menu.remove(id)
+        self.options.remove(id)
     }
 
     /// Takes other settings from the next choice on.
@@ -191,42 +195,42 @@ impl Adaptive {
             (target, fixed) = (1.0, 1.0); // no time at all: everything at its lowest, reported as infeasible
         }
         fixed = if fixed > 0.0 { fixed } else { 0.0 };
-        for (planned, gauge) in self.kappa.iter_mut().zip(&self.gauges) {
-            *planned = gauge.kappa().max(EASING * *planned);
+        for (planned, estimator) in self.kappa.iter_mut().zip(&self.estimators) {
+            *planned = estimator.kappa().max(EASING * *planned);
         }
         let trim = if self.settings.trim { self.trim.part() } else { 0.0 };
         let budget = target * (1.0 - self.margin() + trim) - fixed;
         let terms = Terms::new(budget, self.kappa, 1.0 + self.settings.hysteresis);
         if self.may_keep(time, &terms, target, fixed) {
-            self.menu.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
+            self.options.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
         } else {
             self.pick(terms);
-            self.chosen_for = Some((self.menu.changes, time));
+            self.chosen_for = Some((self.options.changes, time));
         }
         self.plan.predicted = self.cost(&terms) + fixed;
         self.plan.budget = budget;
-        let teaches = self.unsettled == 0;
+        let usable = self.unsettled == 0;
         self.unsettled = self.unsettled.saturating_sub(1);
-        self.sent[frame as usize % IN_FLIGHT] = Some(Sent { frame, target, table: self.table, teaches });
+        self.predictions[frame as usize % IN_FLIGHT] = Some(Prediction { frame, target, table: self.table, usable });
         self.plan
     }
 
     /// Reports the time that a stage of a frame took, ticks, without the fixed part. Measurements may come late, and in any order.
-    pub fn observe(&mut self, frame: u64, stage: usize, took: f64) -> Lesson {
-        match self.sent[frame as usize % IN_FLIGHT] {
-            Some(sent) if sent.frame == frame && sent.teaches && stage < STAGES => {
-                self.gauges[stage].observe(sent.table[stage] as f64 / sent.target, took / sent.target)
-            }
-            _ => Lesson::Refused,
+    pub fn observe(&mut self, frame: u64, stage: usize, took: f64) -> FilterUpdate {
+        match self.predictions[frame as usize % IN_FLIGHT] {
+            Some(prediction) if prediction.frame == frame && prediction.usable && stage < STAGES => self.estimators
+                [stage]
+                .observe(prediction.table[stage] as f64 / prediction.target, took / prediction.target),
+            _ => FilterUpdate::Rejected,
         }
     }
 
     /// Reports the time that a whole frame took, ticks: for the miss ladder and the trim.
     pub fn finished(&mut self, frame: u64, took: f64) {
-        match self.sent[frame as usize % IN_FLIGHT] {
-            Some(sent) if sent.frame == frame && sent.teaches && took.is_finite() => {
-                self.ladder.observe(took / sent.target);
-                let left_over = 1.0 - self.settings.margin - took / sent.target;
+        match self.predictions[frame as usize % IN_FLIGHT] {
+            Some(prediction) if prediction.frame == frame && prediction.usable && took.is_finite() => {
+                self.misses.observe(took / prediction.target);
+                let left_over = 1.0 - self.settings.margin - took / prediction.target;
                 self.trim.observe(left_over, self.plan.lambda == 0.0);
             }
             _ => {}
@@ -236,29 +240,29 @@ impl Adaptive {
     /// Reports an outside disturbance (a resize, a shader compiled, a hidden window): measurements of the next few frames are ignored.
     pub fn disturb(&mut self) {
         self.unsettled = UNSETTLED;
-        self.sent = [None; IN_FLIGHT];
+        self.predictions = [None; IN_FLIGHT];
     }
 
     /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
     #[must_use]
     pub fn level(&self, id: u64) -> Level {
-        let object = self.menu.find(id)?;
-        self.menu.vertex(object, object.taken).level
+        let object = self.options.find(id)?;
+        self.options.vertex(object, object.taken).level
     }
 
     /// The lowest form of an object, for the rest of a frame when [`is_late`] is true.
     #[must_use]
     pub fn lowest(&self, id: u64) -> Level {
-        self.menu.find(id)?.base.level
+        self.options.find(id)?.base.level
     }
 
-    /// The gauge of a stage; of the last where there is no such stage.
+    /// The estimator of a stage; of the last where there is no such stage.
     #[must_use]
-    pub fn gauge(&self, stage: usize) -> &Gauge {
-        &self.gauges[stage.min(STAGES - 1)]
+    pub fn estimator(&self, stage: usize) -> &SpeedEstimator {
+        &self.estimators[stage.min(STAGES - 1)]
     }
 
-    /// κ of a stage in the last plan: follows the gauge up immediately, and down by 5 % a frame at most.
+    /// κ of a stage in the last plan: follows the estimator up immediately, and down by 5 % a frame at most.
     #[must_use]
     pub fn planned_kappa(&self, stage: usize) -> f64 {
         self.kappa[stage.min(STAGES - 1)]
@@ -267,9 +271,9 @@ impl Adaptive {
     /// The present margin, as a fraction of T.
     #[must_use]
     pub fn margin(&self) -> f64 {
-        let used = self.gauges.iter().zip(&self.table).filter(|(_, table)| **table > 0);
-        let sigma = used.map(|(gauge, _)| gauge.sigma()).fold(0.0, f64::max);
-        self.settings.margin.max((self.settings.sigmas + self.ladder.extra_sigmas()) * sigma).min(0.5)
+        let used = self.estimators.iter().zip(&self.table).filter(|(_, table)| **table > 0);
+        let sigma = used.map(|(estimator, _)| estimator.sigma()).fold(0.0, f64::max);
+        self.settings.margin.max((self.settings.sigmas + self.misses.extra_sigmas()) * sigma).min(0.5)
     }
 
     fn cost(&self, terms: &Terms) -> f64 {
@@ -280,20 +284,20 @@ impl Adaptive {
     fn may_keep(&mut self, time: Time, terms: &Terms, target: f64, fixed: f64) -> bool {
         let is_same = |(changes, before): (u64, Time)| {
             let fixed = (time.fixed - before.fixed).abs() <= ROUNDING * before.target;
-            changes == self.menu.changes && time.target == before.target && fixed
+            changes == self.options.changes && time.target == before.target && fixed
         };
         let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
         let predicted = (self.cost(terms) + fixed) / target;
         let goal = (terms.budget + fixed) / target;
         if !still {
-            self.hold = Hold::default();
+            self.hold = ChoiceHold::default();
         }
         self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
         self.plan.held
     }
 
     fn pick(&mut self, terms: Terms) {
-        let picked = self.picker.pick(&mut self.menu, terms, self.settings.dwell);
+        let picked = self.picker.pick(&mut self.options, terms, self.settings.dwell);
         self.table = picked.table;
         let (value, upper, lambda) = (picked.value, picked.upper, picked.lambda);
         self.plan = Plan { feasible: picked.feasible, held: false, value, upper, lambda, ..self.plan };

@@ -37,11 +37,11 @@ pub(crate) struct Vertex {
     pub level: Option<u32>,
 }
 
-/// An object on the menu.
+/// An object among the options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Object {
     pub id: u64,
-    /// Which gauge its costs belong to, below [`super::STAGES`].
+    /// Which estimator its costs belong to, below [`super::STAGES`].
     pub stage: u8,
     /// Factor of all the object's gains; finite, ≥ 0.
     pub weight: f64,

@@ -1,6 +1,6 @@
 //! The choice of a frame: hull steps in falling gain per time, in linear time.
 //!
-//! In: a menu, κ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
+//! In: the options, κ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
 //! Never here: where the budget comes from. Theory: `docs/theory/budget.md`, eq. 32 and 33.
 //!
 //! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
@@ -22,14 +22,14 @@ const BUCKETS: usize = (OCTAVES << BITS) as usize;
 
 /// With fewer objects than this the choice continues below the bucket in which the budget ends: with few, large steps much would stay
 /// unspent.
-const FEW: usize = 32;
+const FEW_OBJECTS: usize = 32;
 
 /// Factor for the steps of an object that has just risen: where accuracy is 1 − ½/polygons, it falls again once it is an octave too fine.
-const YOUNG: f64 = 4.0;
+const JUST_ROSE_FACTOR: f64 = 4.0;
 
 /// The result of a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Picked {
+pub(crate) struct PickResult {
     /// Whether every object at its least fits.
     pub feasible: bool,
     /// Ticks of each stage by the table.
@@ -42,7 +42,7 @@ pub(crate) struct Picked {
     pub lambda: f64,
 }
 
-impl Picked {
+impl PickResult {
     /// Takes one more step where it fits.
     fn take(&mut self, terms: &Terms, object: &Object, step: &Step) -> bool {
         let mut with = self.table;
@@ -55,7 +55,7 @@ impl Picked {
     }
 }
 
-/// Inputs of a choice in addition to the menu.
+/// Inputs of a choice in addition to the options.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Terms {
     /// Measured ticks that may be spent.
@@ -63,7 +63,7 @@ pub(crate) struct Terms {
     /// Measured ticks per tick of the table, for each stage; > 0.
     pub kappa: [f64; STAGES],
     /// Factor for a step that was taken last time: 1 + h.
-    pub loyalty: f64,
+    pub stay_factor: f64,
     /// 1/κ of each stage: a division per object would dominate the time.
     pub per_kappa: [f64; STAGES],
     /// Most ticks that one object can take above its least, by the table of each stage: a more expensive object can never fit.
@@ -71,9 +71,9 @@ pub(crate) struct Terms {
 }
 
 impl Terms {
-    /// Terms without a menu: `reach` is set once there is one.
-    pub(crate) fn new(budget: f64, kappa: [f64; STAGES], loyalty: f64) -> Self {
-        Self { budget, kappa, loyalty, per_kappa: kappa.map(|k| 1.0 / k), reach: [0; STAGES] }
+    /// Terms without the options: `reach` is set once there is one.
+    pub(crate) fn new(budget: f64, kappa: [f64; STAGES], stay_factor: f64) -> Self {
+        Self { budget, kappa, stay_factor, per_kappa: kappa.map(|k| 1.0 / k), reach: [0; STAGES] }
     }
 
     fn cost(&self, table: &[u64; STAGES]) -> f64 {
@@ -83,7 +83,7 @@ impl Terms {
     /// Factors from gain per tick of the table to gain per measured tick, for an object's steps: new ones, and those taken last time.
     fn worth(&self, object: &Object) -> [f64; 2] {
         let worth = object.weight * self.per_kappa[usize::from(object.stage)];
-        [worth, worth * if object.just_rose() { YOUNG.max(self.loyalty) } else { self.loyalty }]
+        [worth, worth * if object.just_rose() { JUST_ROSE_FACTOR.max(self.stay_factor) } else { self.stay_factor }]
     }
 
     /// How many steps of an object are on offer: all that have a gain and can ever fit; if the object has just fallen, those it had.
@@ -151,39 +151,39 @@ pub(crate) struct Picker {
 }
 
 impl Picker {
-    /// Chooses; the menu stores the steps taken, and objects that changed are reluctant to reverse.
-    pub(crate) fn pick(&mut self, menu: &mut Options, mut terms: Terms, dwell: u8) -> Picked {
-        let mut picked = Picked { table: menu.least, ..Picked::default() };
-        let spare = terms.budget - terms.cost(&menu.least);
+    /// Chooses; the options store the steps taken, and objects that changed are reluctant to reverse.
+    pub(crate) fn pick(&mut self, options: &mut Options, mut terms: Terms, dwell: u8) -> PickResult {
+        let mut result = PickResult { table: options.least, ..PickResult::default() };
+        let spare = terms.budget - terms.cost(&options.least);
         terms.reach = terms.kappa.map(|k| (spare / k) as u64);
         if spare < 0.0 || spare.is_nan() {
             self.taken.clear();
-            self.taken.resize(menu.objects().len(), 0);
-            picked.value = menu.objects().iter().map(|o| o.base.gain * o.weight).sum();
-            menu.objects_mut().iter_mut().for_each(|object| object.settle(0, dwell));
-            return picked;
+            self.taken.resize(options.objects().len(), 0);
+            result.value = options.objects().iter().map(|o| o.base.gain * o.weight).sum();
+            options.objects_mut().iter_mut().for_each(|object| object.settle(0, dwell));
+            return result;
         }
-        picked.feasible = true;
-        let found = self.find_edge(menu, &terms, Near::to(self.price));
-        picked.table = found.unwrap_or_else(|| self.find_edge(menu, &terms, Near::ALL).unwrap_or(menu.least));
+        result.feasible = true;
+        let found = self.find_edge(options, &terms, Near::to(self.price));
+        result.table = found.unwrap_or_else(|| self.find_edge(options, &terms, Near::ALL).unwrap_or(options.least));
         self.sort_edge();
-        picked.lambda = self.take_edge(menu, &terms, &mut picked);
-        self.price = picked.lambda;
-        if picked.lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
-            self.go_on(menu, &terms, &mut picked);
+        result.lambda = self.take_edge(options, &terms, &mut result);
+        self.price = result.lambda;
+        if result.lambda > 0.0 && (options.droppable > 0 || options.objects().len() < FEW_OBJECTS) {
+            self.fill_below_edge(options, &terms, &mut result);
         }
-        self.settle(menu, &terms, &mut picked, dwell);
-        picked
+        self.settle(options, &terms, &mut result, dwell);
+        result
     }
 
     /// Takes all steps above the bucket in which the budget ends, and collects those in it in `edge`. Gives the ticks taken by the table;
     /// `None` where that bucket is not among the near ones.
-    fn find_edge(&mut self, menu: &Options, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
-        let (mut table, all) = self.take_far(menu, terms, near);
+    fn find_edge(&mut self, options: &Options, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
+        let (mut table, all) = self.take_far(options, terms, near);
         if terms.cost(&table) > terms.budget {
             return None;
         }
-        self.sort_into_buckets(menu, near);
+        self.sort_into_buckets(options, near);
         for at in near.buckets().rev() {
             let mut with = table;
             with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at]);
@@ -198,13 +198,13 @@ impl Picker {
     }
 
     /// Takes the steps above the near ones and collects the near ones. Gives the ticks taken, and whether no step is below.
-    fn take_far(&mut self, menu: &Options, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
+    fn take_far(&mut self, options: &Options, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
         self.near.clear();
-        self.near.reserve(menu.room());
+        self.near.reserve(options.room());
         self.taken.clear();
-        let (mut table, mut all) = (menu.least, true);
-        for (i, object) in (0..).zip(menu.objects()) {
-            let steps = menu.steps_of(object);
+        let (mut table, mut all) = (options.least, true);
+        for (i, object) in (0..).zip(options.objects()) {
+            let steps = options.steps_of(object);
             let offered = &steps[..terms.on_offer(object, steps)];
             let worth = terms.worth(object);
             let merit = |at: usize| offered[at].slope * worth[usize::from(at < usize::from(object.taken))];
@@ -225,12 +225,12 @@ impl Picker {
     }
 
     /// Fills the bins.
-    fn sort_into_buckets(&mut self, menu: &Options, near: Near) {
+    fn sort_into_buckets(&mut self, options: &Options, near: Near) {
         self.bins.resize(STAGES, [0; BUCKETS]);
         self.bins.iter_mut().for_each(|bins| bins[near.buckets()].fill(0));
         for step in &self.near {
-            let object = &menu.objects()[step.object as usize];
-            let cost = menu.steps_of(object)[usize::from(step.step)].cost;
+            let object = &options.objects()[step.object as usize];
+            let cost = options.steps_of(object)[usize::from(step.step)].cost;
             self.bins[usize::from(object.stage)][bucket(step.merit)] += u64::from(cost);
         }
     }
@@ -256,13 +256,13 @@ impl Picker {
 
     /// Takes the steps on the edge that fit, and gives the gain per tick of the first that does not. One large step must not block those
     /// after it, whose gains are nearly as high; but no further step of its object is taken.
-    fn take_edge(&mut self, menu: &Options, terms: &Terms, picked: &mut Picked) -> f64 {
+    fn take_edge(&mut self, options: &Options, terms: &Terms, result: &mut PickResult) -> f64 {
         let mut lambda = 0.0;
         for edge in &self.edge {
-            let object = &menu.objects()[edge.object as usize];
-            let step = &menu.steps_of(object)[usize::from(edge.step)];
+            let object = &options.objects()[edge.object as usize];
+            let step = &options.steps_of(object)[usize::from(edge.step)];
             let taken = &mut self.taken[edge.object as usize];
-            if *taken == edge.step && picked.take(terms, object, step) {
+            if *taken == edge.step && result.take(terms, object, step) {
                 *taken += 1;
             } else if lambda == 0.0 {
                 lambda = step.slope * terms.worth(object)[0];
@@ -272,10 +272,10 @@ impl Picker {
     }
 
     /// Below the bucket in which the budget ends: takes each object's next steps that fit, best first.
-    fn go_on(&mut self, menu: &Options, terms: &Terms, picked: &mut Picked) {
+    fn fill_below_edge(&mut self, options: &Options, terms: &Terms, result: &mut PickResult) {
         self.edge.clear();
-        for (i, object) in menu.objects().iter().enumerate() {
-            let (at, steps) = (usize::from(self.taken[i]), menu.steps_of(object));
+        for (i, object) in options.objects().iter().enumerate() {
+            let (at, steps) = (usize::from(self.taken[i]), options.steps_of(object));
             if at < terms.on_offer(object, steps) {
                 let merit = steps[at].slope * terms.worth(object)[usize::from(at < usize::from(object.taken))];
                 self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
@@ -283,30 +283,30 @@ impl Picker {
         }
         self.sort_edge();
         for edge in &self.edge {
-            let object = &menu.objects()[edge.object as usize];
-            let steps = menu.steps_of(object);
+            let object = &options.objects()[edge.object as usize];
+            let steps = options.steps_of(object);
             let next = &steps[usize::from(edge.step)..terms.on_offer(object, steps)];
-            let taken = next.iter().take_while(|step| picked.take(terms, object, step)).count();
+            let taken = next.iter().take_while(|step| result.take(terms, object, step)).count();
             self.taken[edge.object as usize] += taken as u16;
         }
     }
 
     /// Stores the steps taken, their value, and the bound that the price λ gives for any choice, with each object optimised on its own (eq.
     /// 33): the value taken, the price of the time left over, and the loss caused by hysteresis.
-    fn settle(&self, menu: &mut Options, terms: &Terms, picked: &mut Picked, dwell: u8) {
-        let mut astray = 0.0;
+    fn settle(&self, options: &mut Options, terms: &Terms, result: &mut PickResult, dwell: u8) {
+        let mut missed_gain = 0.0;
         for (i, &taken) in self.taken.iter().enumerate() {
-            let object = &menu.objects()[i];
-            picked.value += object.weight * menu.gain(object, taken);
-            let (steps, worth) = (menu.steps_of(object), terms.worth(object)[0]);
+            let object = &options.objects()[i];
+            result.value += object.weight * options.gain(object, taken);
+            let (steps, worth) = (options.steps_of(object), terms.worth(object)[0]);
             let kappa = terms.kappa[usize::from(object.stage)];
-            let net = |step: &Step| (step.slope * worth - picked.lambda) * (kappa * f64::from(step.cost));
+            let net = |step: &Step| (step.slope * worth - result.lambda) * (kappa * f64::from(step.cost));
             let (had, rest) = steps.split_at(usize::from(taken));
-            astray -= had.iter().rev().take_while(|s| s.slope * worth < picked.lambda).map(net).sum::<f64>();
-            astray += rest.iter().take_while(|s| s.slope * worth > picked.lambda).map(net).sum::<f64>();
-            menu.objects_mut()[i].settle(taken, dwell);
+            missed_gain -= had.iter().rev().take_while(|s| s.slope * worth < result.lambda).map(net).sum::<f64>();
+            missed_gain += rest.iter().take_while(|s| s.slope * worth > result.lambda).map(net).sum::<f64>();
+            options.objects_mut()[i].settle(taken, dwell);
         }
-        picked.upper = picked.value + picked.lambda * (terms.budget - terms.cost(&picked.table)) + astray;
+        result.upper = result.value + result.lambda * (terms.budget - terms.cost(&result.table)) + missed_gain;
     }
 }
 

@@ -6,21 +6,21 @@
 use crate::within;
 
 /// Least and greatest process noise: growth of the variance of κ between measurements. κ may drift by 1.4 to 14 % a frame.
-const WANDER: (f64, f64) = (2e-4, 2e-2);
+pub(crate) const WANDER: (f64, f64) = (2e-4, 2e-2);
 /// Initial process noise, 4.5 % a frame: on an unknown machine measurements count much until they turn out to be noisy.
 const WANDER_START: f64 = 2e-3;
 /// Rate at which the process noise follows the correlation of consecutive errors, and the correlation that counts as chance: with 0, the
 /// process noise itself would drift.
-const HASTE: f64 = 0.1;
-const CHANCE: f64 = 0.1;
+const WANDER_RATE: f64 = 0.1;
+const CHANCE_CORRELATION: f64 = 0.1;
 /// Initial variance of κ: the table may be 14 % wrong before an error counts as an outlier.
 const P_START: f64 = 0.02;
 /// Variance of κ after a change of regime: the next measurement is taken in full.
 const P_REGIME: f64 = 0.2;
 /// Least standard deviation of a measurement, as a fraction of the frame's time.
-const SIGMA_LEAST: f64 = 0.01;
+pub(crate) const SIGMA_LEAST: f64 = 0.01;
 /// Memory of σ²: each measurement counts 3 %.
-const FORGET: f64 = 0.97;
+const SIGMA_MEMORY: f64 = 0.97;
 /// An error past this many σ is an outlier …
 const OUTLIER: f64 = 4.0;
 /// … unless this many in a row err on the same side: then the machine has changed.
@@ -30,47 +30,47 @@ const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
 
 /// The effect of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lesson {
+pub enum FilterUpdate {
     /// κ has moved towards the measurement.
-    Learned,
+    Accepted,
     /// The measurement was too far off and is ignored, unless more follow on its side.
     Outlier,
     /// The measurement was the third outlier on the same side: κ has jumped.
     NewRegime,
     /// Not a usable measurement: not a valid number, or nothing was predicted.
-    Refused,
+    Rejected,
 }
 
 /// κ of one stage: drawing, culling, or one class of simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gauge {
+pub struct SpeedEstimator {
     kappa: f64,
     variance: f64,
     sigma2: f64,
     /// Q: growth of the variance between measurements.
     wander: f64,
     /// The last error used, and the mean product of consecutive errors.
-    before: f64,
-    common: f64,
+    last_error: f64,
+    error_product: f64,
     /// Consecutive outliers: counts up for too slow, down for too fast.
-    strange: i8,
+    outliers_in_a_row: i8,
 }
 
-impl Default for Gauge {
+impl Default for SpeedEstimator {
     fn default() -> Self {
         Self {
             kappa: 1.0,
             variance: P_START,
             sigma2: SIGMA_LEAST * SIGMA_LEAST,
             wander: WANDER_START,
-            before: 0.0,
-            common: 0.0,
-            strange: 0,
+            last_error: 0.0,
+            error_product: 0.0,
+            outliers_in_a_row: 0,
         }
     }
 }
 
-impl Gauge {
+impl SpeedEstimator {
     /// Measured ticks per tick of the table, 0.001 … 1000.
     #[must_use]
     pub fn kappa(&self) -> f64 {
@@ -84,49 +84,51 @@ impl Gauge {
     }
 
     /// Updates κ: `took` was measured where the table, without κ, predicted `table`; both as fractions of the frame's time T.
-    pub fn observe(&mut self, table: f64, took: f64) -> Lesson {
+    pub fn observe(&mut self, table: f64, took: f64) -> FilterUpdate {
         if !(table.is_finite() && table > 0.0 && took.is_finite() && took >= 0.0) {
-            return Lesson::Refused;
+            return FilterUpdate::Rejected;
         }
         let error = took - self.kappa * table;
-        let surprise = error.abs() > OUTLIER * libm::sqrt(self.sigma2 + self.variance * table * table);
-        let lesson = if surprise { self.doubt(error) } else { Lesson::Learned };
-        if !surprise {
-            self.strange = 0;
+        let is_outlier = error.abs() > OUTLIER * libm::sqrt(self.sigma2 + self.variance * table * table);
+        let update = if is_outlier { self.check_outlier(error) } else { FilterUpdate::Accepted };
+        if !is_outlier {
+            self.outliers_in_a_row = 0;
         }
-        if lesson == Lesson::Outlier {
-            return lesson;
+        if update == FilterUpdate::Outlier {
+            return update;
         }
         // a measurement of κ with standard deviation σ/ŷ₀
         let noise = self.sigma2 / (table * table);
         self.variance += self.wander;
         let gain = self.variance / (self.variance + noise);
-        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE);
+        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE.0, KAPPA_RANGE.1);
         self.variance *= 1.0 - gain;
-        if lesson == Lesson::Learned {
-            self.sigma2 = (FORGET * self.sigma2 + (1.0 - FORGET) * error * error).max(SIGMA_LEAST * SIGMA_LEAST);
+        if update == FilterUpdate::Accepted {
+            self.sigma2 =
+                (SIGMA_MEMORY * self.sigma2 + (1.0 - SIGMA_MEMORY) * error * error).max(SIGMA_LEAST * SIGMA_LEAST);
             self.follow(error);
         }
-        lesson
+        update
     }
 
     /// Consecutive errors that correlate show that κ follows too slowly; uncorrelated errors, that it follows fast enough (Meh70, eq. 35a).
     fn follow(&mut self, error: f64) {
-        self.common = FORGET * self.common + (1.0 - FORGET) * error * self.before;
-        self.before = error;
-        let correlation = within(self.common / self.sigma2, (-1.0, 1.0));
-        self.wander = within(self.wander * libm::exp(HASTE * (correlation - CHANCE)), WANDER);
+        self.error_product = SIGMA_MEMORY * self.error_product + (1.0 - SIGMA_MEMORY) * error * self.last_error;
+        self.last_error = error;
+        let correlation = within(self.error_product / self.sigma2, -1.0, 1.0);
+        self.wander =
+            within(self.wander * libm::exp(WANDER_RATE * (correlation - CHANCE_CORRELATION)), WANDER.0, WANDER.1);
     }
 
-    fn doubt(&mut self, error: f64) -> Lesson {
+    fn check_outlier(&mut self, error: f64) -> FilterUpdate {
         let side = if error > 0.0 { 1 } else { -1 };
-        self.strange = if self.strange * side >= 0 { self.strange + side } else { side };
-        if self.strange.abs() < IN_A_ROW {
-            return Lesson::Outlier;
+        self.outliers_in_a_row = if self.outliers_in_a_row * side >= 0 { self.outliers_in_a_row + side } else { side };
+        if self.outliers_in_a_row.abs() < IN_A_ROW {
+            return FilterUpdate::Outlier;
         }
-        self.strange = 0;
+        self.outliers_in_a_row = 0;
         self.variance = P_REGIME;
-        Lesson::NewRegime
+        FilterUpdate::NewRegime
     }
 }
 
@@ -135,19 +137,19 @@ mod tests {
     use super::*;
 
     /// Root-mean-square error of κ as the filter predicts it, over the last half of 4000 measurements with a table of 1.
-    fn error_rms(mut next: impl FnMut(usize) -> f64) -> (f64, Gauge) {
-        let mut gauge = Gauge::default();
+    fn error_rms(mut next: impl FnMut(usize) -> f64) -> (f64, SpeedEstimator) {
+        let mut estimator = SpeedEstimator::default();
         let mut square = 0.0;
         for k in 0..4000 {
             let took = next(k);
-            square += if k >= 2000 { (took - gauge.kappa()) * (took - gauge.kappa()) } else { 0.0 };
-            gauge.observe(1.0, took);
+            square += if k >= 2000 { (took - estimator.kappa()) * (took - estimator.kappa()) } else { 0.0 };
+            estimator.observe(1.0, took);
         }
-        (libm::sqrt(square / 2000.0), gauge)
+        (libm::sqrt(square / 2000.0), estimator)
     }
 
     /// Random numbers of deviation about 1: sums of four uniform ones of a congruential generator.
-    fn dice() -> impl FnMut() -> f64 {
+    fn noise() -> impl FnMut() -> f64 {
         let mut state = 7_u64;
         move || {
             let mut uniform = || {
@@ -160,22 +162,22 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_that_trembles_is_not_followed() {
-        let mut dice = dice();
-        let (rms, gauge) = error_rms(|_| 1.0 + 0.05 * dice());
-        assert!(gauge.wander == WANDER.0, "{}", gauge.wander);
+    fn noise_of_the_machine_is_not_followed() {
+        let mut noise = noise();
+        let (rms, estimator) = error_rms(|_| 1.0 + 0.05 * noise());
+        assert!(estimator.wander == WANDER.0, "{}", estimator.wander);
         assert!(rms < 0.056, "{rms}: the tremble itself is 0.05");
     }
 
     #[test]
-    fn a_machine_that_wanders_is_followed_as_fast_as_it_does() {
-        let (mut dice, mut wandered) = (dice(), 0.0);
+    fn drift_of_the_machine_is_followed_at_its_own_speed() {
+        let (mut noise, mut wandered) = (noise(), 0.0);
         // random walk of 5 % a measurement, mean-reverting, and 2 % of noise: the filter that knows both errs by 0.057
-        let (rms, gauge) = error_rms(|_| {
-            wandered = 0.98 * wandered + 0.05 * dice();
-            1.0 + wandered + 0.02 * dice()
+        let (rms, estimator) = error_rms(|_| {
+            wandered = 0.98 * wandered + 0.05 * noise();
+            1.0 + wandered + 0.02 * noise()
         });
-        assert!(gauge.wander > 4.0 * WANDER.0, "{}", gauge.wander);
+        assert!(estimator.wander > 4.0 * WANDER.0, "{}", estimator.wander);
         assert!(rms < 1.2 * 0.057, "{rms}");
     }
 }

@@ -10,14 +10,14 @@ use super::hierarchy::leave_out_members;
 use super::impostors::ImpostorChoice;
 use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
-use super::query::{Ask, Promise, TICKS, demand};
+use super::query::{FrameQuery, Promise, TICKS, demand};
 use super::status::Status;
 use crate::Bound;
 use crate::adaptive::{Adaptive, Offer, Plan, Settings, Time};
 use metachron_core::AgentId;
 
 /// A smaller relative change of a weight is ignored: weights fluctuate, and levels should not follow that.
-const TREMBLE: f64 = 0.05;
+const WEIGHT_DEADBAND: f64 = 0.05;
 
 /// The stage of `budget` used for drawing.
 const DRAWING: usize = 0;
@@ -27,7 +27,7 @@ const ON_TARGET: f64 = 0.05;
 
 /// The entry of an object in the law.
 #[derive(Debug, Clone, Copy)]
-struct Dish {
+struct ObjectEntry {
     id: AgentId,
     /// Version of the ladder last given to the law, 0 while the object is not there; and the number of its rungs.
     version: u64,
@@ -38,7 +38,7 @@ struct Dish {
 
 /// The choice that is being drawn.
 #[derive(Debug, Clone, Copy, Default)]
-struct Drawn {
+struct DrawnChoice {
     frame: u64,
     plan: Plan,
     fixed_s: f64,
@@ -49,61 +49,61 @@ struct Drawn {
 pub(super) struct AdaptiveChoice {
     law: Adaptive,
     /// In the order in which the objects are given.
-    dishes: Vec<Dish>,
-    closing: ImpostorChoice,
+    entries: Vec<ObjectEntry>,
+    group_choice: ImpostorChoice,
     offers: Vec<Offer>,
     fixed_s: f64,
     /// Number of the last frame chosen for, as the law counts them.
     frame: u64,
     plan: Plan,
     /// The plan of the frame that is being drawn.
-    drawn: Drawn,
+    drawn: DrawnChoice,
     status: Status,
-    kept: Settings,
+    settings: Settings,
 }
 
 impl Default for AdaptiveChoice {
     fn default() -> Self {
-        let kept = Settings::default();
+        let settings = Settings::default();
         Self {
-            law: Adaptive::new(kept),
-            dishes: Vec::new(),
-            closing: ImpostorChoice::default(),
+            law: Adaptive::new(settings),
+            entries: Vec::new(),
+            group_choice: ImpostorChoice::default(),
             offers: Vec::new(),
             fixed_s: 0.0,
             frame: 0,
             plan: Plan::default(),
-            drawn: Drawn::default(),
+            drawn: DrawnChoice::default(),
             status: Status::Waiting,
-            kept,
+            settings,
         }
     }
 }
 
 impl AdaptiveChoice {
     /// Chooses; `levels` has one entry per object.
-    pub fn choose(&mut self, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
-        self.set_margin(ask);
-        self.closing.decide(ask, groups, (self.plan.lambda, self.kappa()));
-        self.lay(ask, groups);
-        self.fixed_s = ask.fixed_s;
-        let time = Time { target: TICKS * ask.target_s, fixed: TICKS * ask.fixed_s };
+    pub fn choose(&mut self, query: &FrameQuery<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
+        self.set_margin(query);
+        self.group_choice.decide(query, groups, self.plan.lambda, self.kappa());
+        self.update_objects(query, groups);
+        self.fixed_s = query.fixed_s;
+        let time = Time { target: TICKS * query.target_s, fixed: TICKS * query.fixed_s };
         self.frame += 1;
         self.plan = self.law.choose(self.frame, time);
-        self.serve(ask, levels);
-        leave_out_members(ask, groups, levels);
+        self.write_levels(query, levels);
+        leave_out_members(query, groups, levels);
         self.promise()
     }
 
     /// Marks the last choice as the one being drawn.
     pub fn take_up(&mut self) {
-        self.drawn = Drawn { frame: self.frame, plan: self.plan, fixed_s: self.fixed_s };
+        self.drawn = DrawnChoice { frame: self.frame, plan: self.plan, fixed_s: self.fixed_s };
     }
 
     /// Reports times of the frame that was drawn, seconds: `drawn_s` for drawing the choice, `work_s` in all, `others_s` reserved for
     /// others.
-    pub fn observe(&mut self, drawn_s: f64, (work_s, others_s): (f64, f64), target_s: f64) {
-        let Drawn { frame, plan, fixed_s } = self.drawn;
+    pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) {
+        let DrawnChoice { frame, plan, fixed_s } = self.drawn;
         self.law.observe(frame, DRAWING, TICKS * drawn_s);
         self.law.finished(frame, TICKS * work_s);
         let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
@@ -141,80 +141,81 @@ impl AdaptiveChoice {
         self.law.margin()
     }
 
-    fn set_margin(&mut self, ask: &Ask<'_>) {
-        let hysteresis = Settings::default().hysteresis + ask.sliders.hysteresis;
-        let wanted = Settings { margin: ask.margin, hysteresis, ..Settings::default() };
-        if wanted != self.kept {
-            self.kept = wanted;
+    fn set_margin(&mut self, query: &FrameQuery<'_>) {
+        let hysteresis = Settings::default().hysteresis + query.sliders.hysteresis;
+        let wanted = Settings { margin: query.margin, hysteresis, ..Settings::default() };
+        if wanted != self.settings {
+            self.settings = wanted;
             self.law.set_settings(wanted);
         }
     }
 
     /// Gives the objects in view to the law, and removes the others.
-    fn lay(&mut self, ask: &Ask<'_>, groups: &Groups) {
-        let same = self.dishes.len() == ask.views.len();
-        if !same || self.dishes.iter().zip(ask.views).any(|(dish, (view, _))| dish.id != view.id) {
+    fn update_objects(&mut self, query: &FrameQuery<'_>, groups: &Groups) {
+        let same = self.entries.len() == query.views.len();
+        if !same || self.entries.iter().zip(query.views).any(|(entry, seen)| entry.id != seen.view.id) {
             self.clear();
-            self.dishes.extend(ask.views.iter().map(|(view, _)| Dish {
-                id: view.id,
+            self.entries.extend(query.views.iter().map(|seen| ObjectEntry {
+                id: seen.view.id,
                 version: 0,
                 rungs: 0,
                 weight: None,
             }));
         }
-        for at in 0..self.dishes.len() {
-            let within = groups.parent(at).is_some() && groups.is_within(at, |group| self.closing.is_closed(group));
-            let (view, ladder) = (&ask.views[at].0, ask.ladders.of(at));
+        for at in 0..self.entries.len() {
+            let within =
+                groups.parent(at).is_some() && groups.is_within(at, |group| self.group_choice.is_closed(group));
+            let (view, ladder) = (&query.views[at].view, query.ladders.of(at));
             let (rungs, weight) = match view.is_group() {
-                false => (ladder.rungs.as_slice(), ask.weight(at)),
-                true if self.closing.is_closed(at) => self.closing.impostors(ask, at),
+                false => (ladder.rungs.as_slice(), query.weight(at)),
+                true if self.group_choice.is_closed(at) => self.group_choice.impostors(query, at),
                 true => (&[][..], 0.0),
             };
             if within || !view.visible || rungs.is_empty() {
-                self.take_off(at);
+                self.withdraw(at);
                 continue;
             }
-            self.put_on(at, (ladder, rungs), weight);
+            self.offer(at, ladder, rungs, weight);
         }
     }
 
     /// Offers the given rungs of a ladder: of a group, only its useful impostors.
-    fn put_on(&mut self, at: usize, (ladder, rungs): (&Ladder, &[Rung]), weight: f64) {
-        let dish = &mut self.dishes[at];
-        let id = u64::from(dish.id.0);
-        if (dish.version, dish.rungs) != (ladder.version, rungs.len()) {
+    fn offer(&mut self, at: usize, ladder: &Ladder, rungs: &[Rung], weight: f64) {
+        let entry = &mut self.entries[at];
+        let id = u64::from(entry.id.0);
+        if (entry.version, entry.rungs) != (ladder.version, rungs.len()) {
             self.offers.clear();
             self.offers.extend(rungs.iter().map(|rung| Offer { cost: TICKS * rung.cost_s, gain: rung.accuracy }));
-            (dish.version, dish.rungs) = (ladder.version, rungs.len());
+            (entry.version, entry.rungs) = (ladder.version, rungs.len());
             self.law.set(id, DRAWING, false, &self.offers);
         }
-        if dish.weight.is_none_or(|held| (weight - held).abs() > TREMBLE * held) {
-            dish.weight = Some(weight);
+        if entry.weight.is_none_or(|held| (weight - held).abs() > WEIGHT_DEADBAND * held) {
+            entry.weight = Some(weight);
             self.law.weigh(id, weight);
         }
     }
 
-    fn take_off(&mut self, at: usize) {
-        let dish = &mut self.dishes[at];
-        if dish.version > 0 {
-            self.law.remove(u64::from(dish.id.0));
-            (dish.version, dish.weight) = (0, None);
+    fn withdraw(&mut self, at: usize) {
+        let entry = &mut self.entries[at];
+        if entry.version > 0 {
+            self.law.remove(u64::from(entry.id.0));
+            (entry.version, entry.weight) = (0, None);
         }
     }
 
     /// Removes everything from the law: prices have changed, or objects have come or gone.
     pub fn clear(&mut self) {
-        (0..self.dishes.len()).for_each(|at| self.take_off(at));
-        self.dishes.clear();
-        self.closing = ImpostorChoice::default();
+        (0..self.entries.len()).for_each(|at| self.withdraw(at));
+        self.entries.clear();
+        self.group_choice = ImpostorChoice::default();
     }
 
-    fn serve(&self, ask: &Ask<'_>, levels: &mut [LevelDemand]) {
-        for (at, dish) in self.dishes.iter().enumerate().filter(|(_, dish)| dish.version > 0) {
-            let ladder = ask.ladders.of(at);
-            let level = self.law.level(u64::from(dish.id.0)).map_or(0, |level| level as usize);
+    fn write_levels(&self, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) {
+        for (at, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.version > 0) {
+            let ladder = query.ladders.of(at);
+            let level = self.law.level(u64::from(entry.id.0)).map_or(0, |level| level as usize);
             if let Some(rung) = ladder.rungs.get(level) {
-                levels[at] = demand(at, ask.views, rung);
+                levels[at] = demand(at, query.views, rung);
             }
         }
     }

@@ -80,18 +80,18 @@ mod tests {
     }
 
     #[test]
-    fn objects_kept_out_of_the_table_are_predicted_within_a_tenth() {
+    fn held_out_objects_are_predicted_within_a_tenth() {
         let areas = Areas::fitted(&objects()).unwrap();
         for n in [7.0, 30.0, 110.0, 700.0] {
             for area in [1.5, 9.0, 33.0, 180.0, 700.0, 3000.0] {
-                let (told, true_s) = (areas.time(n, n * area), machine(n, n * area));
-                assert!((told / true_s - 1.0).abs() < 0.1, "{n} of {area} px: {told} for {true_s}");
+                let (predicted, true_s) = (areas.time(n, n * area), machine(n, n * area));
+                assert!((predicted / true_s - 1.0).abs() < 0.1, "{n} of {area} px: {predicted} for {true_s}");
             }
         }
     }
 
     #[test]
-    fn what_was_not_measured_gives_no_prices() {
+    fn missing_measurements_give_no_prices() {
         let all = objects();
         let without = |lost: f64| all.iter().copied().filter(|o| o.1 / o.0 != lost).collect::<Vec<_>>();
         assert_eq!(Areas::fitted(&[]), None);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn prices_are_numbers_wherever_they_are_asked_for() {
+    fn prices_are_finite_for_all_inputs() {
         let areas = Areas::fitted(&objects()).unwrap();
         assert!(areas.is_sound() && areas.time(0.0, 100.0) == areas.setup);
         assert!(areas.time(10.0, 0.0) > areas.setup && areas.time(10.0, 1e9).is_finite());

@@ -41,7 +41,7 @@ pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f
 
 /// The fraction of an object's pixels that a level draws correctly, 0 … 1: its shape by the triangles, its light by the shading
 /// (control.md, eq. 21 and 22), relative to the best shading allowed.
-pub(super) fn accuracy(kind: &Kind, polygons: f64, (shading, best): (Shading, Shading), pixels: f64) -> f64 {
+pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, best: Shading, pixels: f64) -> f64 {
     let (pieces, coarsest) = match *kind {
         // a tube counts as a row of balls of its length
         Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),

@@ -6,8 +6,8 @@
 //! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
 
 use super::level;
-use super::level::Held;
-use super::plan::{LevelDemand, Seen, steers};
+use super::level::LastCut;
+use super::plan::{LevelDemand, SizedView, steers};
 use super::policy::Law;
 use super::status::Status;
 use super::view::{Kind, ObjectView};
@@ -39,7 +39,7 @@ pub(super) struct Feedback {
     /// The water level of the last sharing: the starting guess for the next.
     water: f64,
     /// The last cut of each object, in the order in which they are given.
-    held: Vec<(AgentId, Held)>,
+    held: Vec<(AgentId, LastCut)>,
 }
 
 impl Feedback {
@@ -84,9 +84,9 @@ impl Feedback {
     }
 
     /// Chooses (ε, n) of every object for the next frame.
-    pub fn plan(&mut self, views: &[Seen], levels: &mut Vec<LevelDemand>) {
-        self.held.resize(views.len(), (AgentId(0), Held::default()));
-        for ((view, _), (of, held)) in views.iter().zip(&mut self.held) {
+    pub fn plan(&mut self, views: &[SizedView], levels: &mut Vec<LevelDemand>) {
+        self.held.resize(views.len(), (AgentId(0), LastCut::default()));
+        for (SizedView { view, .. }, (of, held)) in views.iter().zip(&mut self.held) {
             if *of != view.id || !view.visible {
                 *of = view.id;
                 held.forget();
@@ -101,31 +101,38 @@ impl Feedback {
     /// Shares the polygons that ln ε̂ represents among the objects (control.md, eq. 13 and 14).
     ///
     /// Bodies, whose levels are few and far apart, choose first; tubes, which follow exactly, share the rest.
-    fn plan_corrected(&mut self, views: &[Seen], levels: &mut Vec<LevelDemand>) {
+    fn plan_corrected(&mut self, views: &[SizedView], levels: &mut Vec<LevelDemand>) {
         self.bound_corrected(views);
         let budget = POLYGONS_AT_ONE * libm::exp(-self.corrected.value());
         self.water = water_level(budget, in_view(views).map(share), self.water);
         let water = self.water;
-        levels.extend(views.iter().map(|(view, _)| unseen(view)));
-        self.choose((views, levels), water, |view| !is_tube(view) && !view.is_group());
-        let bodies = views.iter().zip(&*levels).filter(|((view, _), _)| view.visible && !is_tube(view));
+        levels.extend(views.iter().map(|seen| unseen(&seen.view)));
+        self.choose(views, levels, water, |view| !is_tube(view) && !view.is_group());
+        let bodies = views.iter().zip(&*levels).filter(|(seen, _)| seen.view.visible && !is_tube(&seen.view));
         let taken: f64 = bodies.map(|(_, level)| level.polygons).sum();
-        let tubes = in_view(views).filter(|(view, _)| is_tube(view)).map(share);
+        let tubes = in_view(views).filter(|seen| is_tube(&seen.view)).map(share);
         let water = water_level(budget - taken, tubes, water);
-        self.choose((views, levels), water, is_tube);
+        self.choose(views, levels, water, is_tube);
     }
 
     /// Chooses the level of the objects in view that are `of` the kind, by their shares at `water`.
-    fn choose(&mut self, (views, levels): (&[Seen], &mut [LevelDemand]), water: f64, of: impl Fn(&ObjectView) -> bool) {
+    fn choose(
+        &mut self,
+        views: &[SizedView],
+        levels: &mut [LevelDemand],
+        water: f64,
+        of: impl Fn(&ObjectView) -> bool,
+    ) {
         let all = views.iter().zip(levels).zip(&mut self.held);
-        for ((seen, level), (_, held)) in all.filter(|(((view, _), _), _)| view.visible && of(view)) {
-            (level.resolution, level.polygons) = held.choose(&seen.0, seen.1, share(seen).at(water));
+        for ((seen, level), (_, held)) in all.filter(|((seen, _), _)| seen.view.visible && of(&seen.view)) {
+            let cut = held.choose(&seen.view, seen.span, share(seen).at(water));
+            (level.resolution, level.polygons) = (cut.resolution, cut.polygons);
         }
     }
 
     /// Keeps ln ε̂ between all objects in view at their finest and all at their coarsest.
-    fn bound_corrected(&mut self, views: &[Seen]) {
-        let (least, most) = in_view(views).fold((0.0, 0.0), |(l, m), (_, span)| (l + span.least, m + span.most));
+    fn bound_corrected(&mut self, views: &[SizedView]) {
+        let (least, most) = in_view(views).fold((0.0, 0.0), |(l, m), seen| (l + seen.span.least, m + seen.span.most));
         if least <= 0.0 {
             return; // nothing is in view: keep the present state
         }
@@ -139,10 +146,10 @@ impl Feedback {
     }
 
     /// ε̂ for all tubes, weighted; n = ⌊ρ⌋ for everything (GDC04, eq. 1).
-    fn plan_printed(&mut self, views: &[Seen], levels: &mut Vec<LevelDemand>) {
+    fn plan_printed(&mut self, views: &[SizedView], levels: &mut Vec<LevelDemand>) {
         let mean = mean_coarseness(views);
         self.bound_printed(views, mean);
-        for (view, _) in views {
+        for SizedView { view, .. } in views {
             let eps_m = match view.kind {
                 Kind::Tube { length_m, .. } => self.printed.eps() * length_m / INTERVALS_AT_ONE * weight(view, mean),
                 Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,
@@ -156,8 +163,8 @@ impl Feedback {
     }
 
     /// Keeps ε̂ and n where they change at least one tube in view.
-    fn bound_printed(&mut self, views: &[Seen], mean: f64) {
-        let tubes = in_view(views).filter_map(|(view, _)| Some((view.range, eps_hat(view, mean)?)));
+    fn bound_printed(&mut self, views: &[SizedView], mean: f64) {
+        let tubes = in_view(views).filter_map(|seen| Some((seen.view.range, eps_hat(&seen.view, mean)?)));
         let widest = |a: Limits, b: Limits| Limits {
             eps: (a.eps.0.min(b.eps.0), a.eps.1.max(b.eps.1)),
             n: (a.n.0.min(b.n.0), a.n.1.max(b.n.1)),
@@ -182,16 +189,16 @@ impl Feedback {
     }
 
     /// Sets both laws to the state of the last plan.
-    pub fn take_over(&mut self, views: &[Seen], levels: &[LevelDemand], polygons: f64) {
+    pub fn take_over(&mut self, views: &[SizedView], levels: &[LevelDemand], polygons: f64) {
         self.status = Status::Waiting;
         if polygons <= 0.0 {
             return;
         }
         self.corrected.set_value(libm::log(POLYGONS_AT_ONE / polygons));
         let mean = mean_coarseness(views);
-        let drawn = views.iter().zip(levels).filter(|((view, _), _)| view.visible);
+        let drawn = views.iter().zip(levels).filter(|(seen, _)| seen.view.visible);
         let mut tubes =
-            drawn.filter_map(|((view, _), at)| Some((eps_hat(view, mean)? * at.resolution.eps_m, at.resolution.n)));
+            drawn.filter_map(|(seen, at)| Some((eps_hat(&seen.view, mean)? * at.resolution.eps_m, at.resolution.n)));
         if let Some((eps, n)) = tubes.next() {
             let limits = Limits { eps: (1e-9, 1e9), n: (0, N_MAX) }; // until the next plan
             self.printed = GrisoniLaw::new(self.law.printed_gains(), limits, eps, f64::from(n) + 0.5);
@@ -231,14 +238,14 @@ impl Feedback {
     }
 }
 
-fn in_view(views: &[Seen]) -> impl Iterator<Item = &Seen> + Clone {
-    views.iter().filter(|(view, _)| view.visible)
+fn in_view(views: &[SizedView]) -> impl Iterator<Item = &SizedView> + Clone {
+    views.iter().filter(|seen| seen.view.visible)
 }
 
 /// The geometric mean of the tubes' coarseness: one tube alone has weight 1, and the law is exactly the printed one.
-fn mean_coarseness(views: &[Seen]) -> f64 {
-    let tubes = in_view(views).filter(|(view, _)| is_tube(view));
-    let (sum, count) = tubes.fold((0.0, 0.0), |(s, c), (view, _)| (s + libm::log(view.coarseness_m2()), c + 1.0));
+fn mean_coarseness(views: &[SizedView]) -> f64 {
+    let tubes = in_view(views).filter(|seen| is_tube(&seen.view));
+    let (sum, count) = tubes.fold((0.0, 0.0), |(s, c), seen| (s + libm::log(seen.view.coarseness_m2()), c + 1.0));
     if count > 0.0 { libm::exp(sum / count) } else { 1.0 }
 }
 
@@ -247,7 +254,7 @@ fn is_tube(view: &ObjectView) -> bool {
 }
 
 /// The claim of an object in view on the polygons (control.md, eq. 14).
-fn share((view, span): &Seen) -> Share {
+fn share(SizedView { view, span }: &SizedView) -> Share {
     Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
-use super::plan::{LevelDemand, Seen};
+use super::plan::{LevelDemand, SizedView};
 use metachron_core::AgentId;
 
 /// A level that returns within this many frames is a reversal.
@@ -10,7 +10,7 @@ const REMEMBERED: usize = 3;
 
 /// The last levels of one object, newest first.
 #[derive(Debug, Clone, Copy)]
-struct Past {
+struct LevelHistory {
     id: AgentId,
     levels: [Option<LevelDemand>; REMEMBERED],
 }
@@ -18,18 +18,18 @@ struct Past {
 /// The last levels of all objects, in the order in which they are given.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Changes {
-    past: Vec<Past>,
+    past: Vec<LevelHistory>,
 }
 
 impl Changes {
     /// Stores the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
-    pub fn count(&mut self, views: &[Seen], levels: &[LevelDemand]) -> (u32, u32) {
-        let unknown = Past { id: AgentId(0), levels: [None; REMEMBERED] };
+    pub fn count(&mut self, views: &[SizedView], levels: &[LevelDemand]) -> (u32, u32) {
+        let unknown = LevelHistory { id: AgentId(0), levels: [None; REMEMBERED] };
         self.past.resize(views.len(), unknown);
         let (mut changes, mut reversals) = (0, 0);
-        for (((view, _), level), past) in views.iter().zip(levels).zip(&mut self.past) {
+        for ((SizedView { view, .. }, level), past) in views.iter().zip(levels).zip(&mut self.past) {
             if past.id != view.id || !view.visible {
-                *past = Past { id: view.id, ..unknown };
+                *past = LevelHistory { id: view.id, ..unknown };
             }
             if !view.visible {
                 continue;
@@ -47,13 +47,12 @@ impl Changes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::Span;
     use super::super::view::{Kind, ObjectView, Shading};
     use super::*;
     use metachron_core::{Resolution, ResolutionRange};
 
     #[test]
-    fn a_level_that_comes_back_is_a_reversal_and_what_was_out_of_sight_is_new() {
+    fn a_level_that_returns_is_a_reversal_and_an_object_back_in_view_is_new() {
         let at = |n| Resolution { eps_m: 1.0, n };
         let view = |visible| ObjectView {
             id: AgentId(3),
@@ -71,7 +70,7 @@ mod tests {
         let mut changes = Changes::default();
         let mut frame = |n, visible| {
             let level = LevelDemand { id: AgentId(3), resolution: at(n), polygons: 4.0, shading: Shading::Flat };
-            changes.count(&[(view(visible), Span::of(&view(visible)))], &[level])
+            changes.count(&[SizedView::of(view(visible))], &[level])
         };
         assert_eq!(frame(1, true), (0, 0));
         assert_eq!(frame(2, true), (1, 0));

@@ -4,8 +4,8 @@
 //! Theory: `docs/theory/budget.md`, section 4 (MB97, §3).
 
 use super::ladder::Rung;
-use super::plan::Seen;
-use super::query::Ask;
+use super::plan::SizedView;
+use super::query::FrameQuery;
 use super::view::Kind;
 
 /// Benefit of a group's finest impostor relative to its members in their lowest forms: less than any form of the members, as (MB97, §3)
@@ -23,11 +23,11 @@ pub(super) struct Groups {
 
 impl Groups {
     /// Reads the groups anew. An object belongs to the first group that names it; an object given after its group belongs to none.
-    pub fn update(&mut self, views: &[Seen]) {
+    pub fn update(&mut self, views: &[SizedView]) {
         self.parent.clear();
         self.parent.resize(views.len(), None);
         self.groups.clear();
-        for (at, (view, _)) in views.iter().enumerate() {
+        for (at, SizedView { view, .. }) in views.iter().enumerate() {
             let Kind::Group { members: (first, count), .. } = view.kind else { continue };
             self.groups.push(at);
             let end = first.saturating_add(count).min(at);
@@ -68,36 +68,36 @@ pub(super) struct Impostors {
 
 impl Impostors {
     /// Recomputes the sums: the objects in view and their sizes change in every frame.
-    pub fn update(&mut self, ask: &Ask<'_>, groups: &Groups) {
+    pub fn update(&mut self, query: &FrameQuery<'_>, groups: &Groups) {
         for sums in [&mut self.worth, &mut self.least_s] {
             sums.clear();
-            sums.resize(ask.views.len(), 0.0);
+            sums.resize(query.views.len(), 0.0);
         }
-        for at in ask.drawable() {
-            let lowest = &ask.ladders.of(at).rungs[0];
-            (self.worth[at], self.least_s[at]) = (ask.weight(at) * lowest.accuracy, lowest.cost_s);
+        for at in query.drawable() {
+            let lowest = &query.ladders.of(at).rungs[0];
+            (self.worth[at], self.least_s[at]) = (query.weight(at) * lowest.accuracy, lowest.cost_s);
         }
-        for at in 0..ask.views.len() {
+        for at in 0..query.views.len() {
             let Some(group) = groups.parent(at) else { continue };
-            let (worth, least_s) = self.lowest(ask, at);
+            let (worth, least_s) = self.lowest(query, at);
             self.worth[group] += IMPOSTOR_WORTH * worth;
             self.least_s[group] += least_s;
         }
     }
 
     /// Benefit and cost of an object in its lowest form: a group by its coarsest impostor, or its members if it has no cheaper impostor.
-    fn lowest(&self, ask: &Ask<'_>, at: usize) -> (f64, f64) {
-        if !ask.views[at].0.is_group() {
+    fn lowest(&self, query: &FrameQuery<'_>, at: usize) -> (f64, f64) {
+        if !query.views[at].view.is_group() {
             return (self.worth[at], self.least_s[at]);
         }
-        let coarsest = self.rungs(ask, at).first();
+        let coarsest = self.rungs(query, at).first();
         coarsest.map_or((self.members_worth(at), self.least_s[at]), |it| (self.worth[at] * it.accuracy, it.cost_s))
     }
 
     /// The impostors of a group that cost less than its members in their lowest forms: a more expensive one is pointless, since the members
     /// have a greater benefit. Empty for a group out of view.
-    pub fn rungs<'a>(&self, ask: &Ask<'a>, group: usize) -> &'a [Rung] {
-        let rungs = &ask.ladders.of(group).rungs;
+    pub fn rungs<'a>(&self, query: &FrameQuery<'a>, group: usize) -> &'a [Rung] {
+        let rungs = &query.ladders.of(group).rungs;
         let cheaper = rungs.iter().take_while(|rung| rung.cost_s < self.least_s[group]).count();
         if self.is_in_view(group) { &rungs[..cheaper] } else { &[] }
     }
@@ -120,17 +120,15 @@ impl Impostors {
 
 #[cfg(test)]
 mod tests {
-    use super::super::level::Span;
     use super::super::view::ObjectView;
     use super::*;
 
-    fn object(id: usize, kind: Kind) -> Seen {
-        let view = ObjectView::plain(id as u32, kind);
-        (view, Span::of(&view))
+    fn object(id: usize, kind: Kind) -> SizedView {
+        SizedView::of(ObjectView::plain(id as u32, kind))
     }
 
     #[test]
-    fn groups_hold_what_stands_before_them_and_nothing_twice() {
+    fn groups_contain_objects_before_them_and_none_twice() {
         let leaf = Kind::Counted { radius_m: 0.1, least: 4, most: 100 };
         let impostors = [12, 0, 0, 0, 0, 0, 0, 0];
         let group = |members| Kind::Group { radius_m: 1.0, members, impostors };

@@ -6,7 +6,7 @@
 use super::groups::{Groups, Impostors};
 use super::plan::LevelDemand;
 use super::policy::Policy;
-use super::query::{Ask, Promise, TICKS, left_out};
+use super::query::{FrameQuery, Promise, TICKS, left_out};
 use super::select;
 use crate::select::incremental::Keep;
 use crate::select::tree::{Cut, Node, Tree};
@@ -31,34 +31,40 @@ struct Forest {
 
 impl Hierarchy {
     /// Chooses by `policy`; `levels` has one entry per object.
-    pub fn choose(&mut self, policy: Policy, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
-        self.impostors.update(ask, groups);
-        let forest = Forest::of(ask, groups, &self.impostors);
+    pub fn choose(
+        &mut self,
+        policy: Policy,
+        query: &FrameQuery<'_>,
+        groups: &Groups,
+        levels: &mut [LevelDemand],
+    ) -> Promise {
+        self.impostors.update(query, groups);
+        let forest = Forest::of(query, groups, &self.impostors);
         if forest.nodes.len() < 2 {
-            let predicted_s = ask.fixed_s;
-            return Promise { budget_s: ask.budget_s(), predicted_s, feasible: true, ..Promise::default() };
+            let predicted_s = query.fixed_s;
+            return Promise { budget_s: query.budget_s(), predicted_s, feasible: true, ..Promise::default() };
         }
-        let Ok(tree) = Tree::new(ask.budget(), &forest.nodes) else { return Promise::default() };
-        let cut = self.cut(policy, ask, (&tree, &forest));
+        let Ok(tree) = Tree::new(query.budget(), &forest.nodes) else { return Promise::default() };
+        let cut = self.cut(policy, query, &tree, &forest);
         self.last.clear();
         for (object, level) in forest.objects.iter().zip(&cut.levels) {
             let Some(at) = *object else { continue };
-            self.last.insert(ask.views[at].0.id, *level);
-            select::set(ask, at, *level, levels);
+            self.last.insert(query.views[at].view.id, *level);
+            select::set(query, at, *level, levels);
         }
-        leave_out_members(ask, groups, levels);
-        promise(ask, &cut)
+        leave_out_members(query, groups, levels);
+        promise(query, &cut)
     }
 
-    fn cut(&self, policy: Policy, ask: &Ask<'_>, (tree, forest): (&Tree, &Forest)) -> Cut {
+    fn cut(&self, policy: Policy, query: &FrameQuery<'_>, tree: &Tree, forest: &Forest) -> Cut {
         match policy {
             Policy::HierarchicalFlat => mason_flat::flat(tree),
             Policy::MacielShirley => {
-                let importance = |at: &Option<usize>| at.map_or(0.0, |at| ask.weight(at));
+                let importance = |at: &Option<usize>| at.map_or(0.0, |at| query.weight(at));
                 maciel::choose(tree, &forest.objects.iter().map(importance).collect::<Vec<_>>())
             }
             _ => {
-                let last = |at: &Option<usize>| self.last.get(&ask.views[(*at)?].0.id).copied().flatten();
+                let last = |at: &Option<usize>| self.last.get(&query.views[(*at)?].view.id).copied().flatten();
                 let known =
                     |(node, level): (usize, Level)| level.filter(|l| (*l as usize) < tree.impostors(node).len());
                 let last: Vec<_> = forest.objects.iter().map(last).enumerate().map(known).collect();
@@ -69,18 +75,18 @@ impl Hierarchy {
 }
 
 impl Forest {
-    fn of(ask: &Ask<'_>, groups: &Groups, impostors: &Impostors) -> Self {
+    fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors) -> Self {
         let mut forest = Self { nodes: vec![Node { parent: None, impostors: Vec::new() }], objects: vec![None] };
-        let mut place = vec![0; ask.views.len()];
+        let mut place = vec![0; query.views.len()];
         // groups are given after their members, so in reverse order each group comes before its members
         for &group in groups.all().iter().rev().filter(|group| impostors.is_in_view(**group)) {
             let worth = impostors.worth(group);
-            let entries = impostors.rungs(ask, group).iter().map(|rung| ask.entry(worth, rung)).collect();
+            let entries = impostors.rungs(query, group).iter().map(|rung| query.entry(worth, rung)).collect();
             place[group] = forest.push(groups.parent(group).map_or(0, |parent| place[parent]), group, entries);
         }
-        for at in ask.drawable() {
-            let weight = ask.weight(at);
-            let entries = ask.ladders.of(at).rungs.iter().map(|rung| ask.entry(weight, rung)).collect();
+        for at in query.drawable() {
+            let weight = query.weight(at);
+            let entries = query.ladders.of(at).rungs.iter().map(|rung| query.entry(weight, rung)).collect();
             forest.push(groups.parent(at).map_or(0, |parent| place[parent]), at, entries);
         }
         forest
@@ -94,19 +100,19 @@ impl Forest {
 }
 
 /// Leaves out all members of groups that are drawn by an impostor, in view or not.
-pub(super) fn leave_out_members(ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) {
+pub(super) fn leave_out_members(query: &FrameQuery<'_>, groups: &Groups, levels: &mut [LevelDemand]) {
     for at in 0..levels.len() {
         let closed = |group: usize| levels[group].polygons > 0.0;
         if groups.parent(at).is_some() && groups.is_within(at, closed) {
-            levels[at] = left_out(at, ask.views, ask.ladders.of(at));
+            levels[at] = left_out(at, query.views, query.ladders.of(at));
         }
     }
 }
 
-fn promise(ask: &Ask<'_>, cut: &Cut) -> Promise {
+fn promise(query: &FrameQuery<'_>, cut: &Cut) -> Promise {
     Promise {
-        budget_s: ask.budget_s(),
-        predicted_s: ask.fixed_s + cut.cost as f64 / TICKS,
+        budget_s: query.budget_s(),
+        predicted_s: query.fixed_s + cut.cost as f64 / TICKS,
         value: cut.value as f64,
         upper: cut.upper,
         feasible: cut.feasible,
@@ -119,8 +125,7 @@ mod tests {
     use super::super::adaptive::AdaptiveChoice;
     use super::super::feedback::unseen;
     use super::super::ladder::Ladders;
-    use super::super::level::Span;
-    use super::super::plan::Seen;
+    use super::super::plan::SizedView;
     use super::super::price::Prices;
     use super::super::view::{Kind, ObjectView};
     use super::*;
@@ -130,7 +135,7 @@ mod tests {
     use metachron_core::ResolutionRange;
 
     /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a separate mesh.
-    fn rows() -> Vec<Seen> {
+    fn rows() -> Vec<SizedView> {
         let row =
             |first: usize| Kind::Group { radius_m: 1.0, members: (first, 4), impostors: [12, 48, 0, 0, 0, 0, 0, 0] };
         let mesh = |most| Kind::Counted { radius_m: 0.2, least: 16, most };
@@ -147,17 +152,17 @@ mod tests {
             ..ObjectView::plain(at as u32, kind)
         };
         let views = kinds.into_iter().enumerate().map(view);
-        views.map(|view| (view, Span::of(&view))).collect()
+        views.map(SizedView::of).collect()
     }
 
     /// The input of a frame with `budget_s` seconds, all available for the choice, with everything in view.
-    fn ask<'a>(views: &'a [Seen], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> Ask<'a> {
+    fn query<'a>(views: &'a [SizedView], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> FrameQuery<'a> {
         let value = Value::Plain;
-        Ask { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
+        FrameQuery { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
     }
 
     #[test]
-    fn cuts_through_groups_in_groups_are_sound_and_near_the_best_there_is() {
+    fn cuts_through_nested_groups_are_complete_and_near_the_optimum() {
         let (views, sliders) = (rows(), Sliders::default());
         let (mut ladders, mut groups) = (Ladders::default(), Groups::default());
         ladders.update(&views, false, &Prices::default(), &sliders);
@@ -167,16 +172,16 @@ mod tests {
         let (mut inner, mut outer) = (0, 0);
         for step in 0..60 {
             let budget_s = 10e-6 * 1.1_f64.powi(step);
-            let ask = ask(&views, &ladders, &sliders, budget_s);
+            let query = query(&views, &ladders, &sliders, budget_s);
             let mut impostors = Impostors::default();
-            impostors.update(&ask, &groups);
-            let tree = Tree::new(ask.budget(), &Forest::of(&ask, &groups, &impostors).nodes).unwrap();
+            impostors.update(&query, &groups);
+            let tree = Tree::new(query.budget(), &Forest::of(&query, &groups, &impostors).nodes).unwrap();
             let best = exact(&tree, 2_000_000).unwrap();
             for (policy, least) in policies.into_iter().zip(&mut least) {
-                let mut levels: Vec<_> = views.iter().map(|(view, _)| unseen(view)).collect();
+                let mut levels: Vec<_> = views.iter().map(|seen| unseen(&seen.view)).collect();
                 let promise = match policy {
-                    Policy::Adaptive => settled(&ask, &groups, &mut levels),
-                    _ => Hierarchy::default().choose(policy, &ask, &groups, &mut levels),
+                    Policy::Adaptive => settled(&query, &groups, &mut levels),
+                    _ => Hierarchy::default().choose(policy, &query, &groups, &mut levels),
                 };
                 assert_eq!(promise.feasible, best.feasible, "{policy:?} at {budget_s}");
                 let late = promise.predicted_s > budget_s * (1.0 + 1e-9);
@@ -203,27 +208,27 @@ mod tests {
     }
 
     /// The default policy after sixty frames; its value in the unit of the others.
-    fn settled(ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
+    fn settled(query: &FrameQuery<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         let (mut choice, mut promise) = (AdaptiveChoice::default(), Promise::default());
         let usual = levels.to_vec();
         for _ in 0..60 {
             levels.copy_from_slice(&usual);
-            promise = choice.choose(ask, groups, levels);
+            promise = choice.choose(query, groups, levels);
             choice.take_up();
-            choice.observe(promise.predicted_s, (promise.predicted_s, 0.0), ask.target_s);
+            choice.observe(promise.predicted_s, promise.predicted_s, 0.0, query.target_s);
         }
         Promise { value: 4096.0 * promise.value, ..promise }
     }
 
     /// The number of pictures that show each mesh: its own, its row's, that of both rows.
-    fn covered(views: &[Seen], levels: &[LevelDemand]) -> Vec<usize> {
+    fn covered(views: &[SizedView], levels: &[LevelDemand]) -> Vec<usize> {
         let of = |at: usize| {
-            let holds = |group: &usize| match views[*group].0.kind {
+            let holds = |group: &usize| match views[*group].view.kind {
                 Kind::Group { members: (first, count), .. } => (first..first + count).contains(&at),
                 _ => *group == at,
             };
             (0..views.len()).filter(holds).filter(|it| levels[*it].polygons > 0.0).count()
         };
-        (0..views.len()).filter(|at| !views[*at].0.is_group()).map(of).collect()
+        (0..views.len()).filter(|at| !views[*at].view.is_group()).map(of).collect()
     }
 }

@@ -9,21 +9,21 @@
 
 use super::groups::{Groups, Impostors};
 use super::ladder::Rung;
-use super::query::{Ask, TICKS};
+use super::query::{FrameQuery, TICKS};
 
 /// A group changes if that gains at least this fraction of its members' least cost: the price fluctuates.
-const WORTH_IT: f64 = 0.1;
+const MIN_GAIN: f64 = 0.1;
 
 /// Share of a new price in the smoothed one that groups use, about ten frames of memory. One group changes the price of all others, so with
 /// the price of a single frame all would change simultaneously.
-const PRICE_NEWS: f64 = 0.1;
+const PRICE_SMOOTHING: f64 = 0.1;
 
 /// Frames that a closed group waits before it may open again: initial and greatest.
 const PATIENCE: (u32, u32) = (8, 512);
 
 /// The open or closed state of one group.
 #[derive(Debug, Clone, Copy)]
-struct Door {
+struct GroupState {
     closed: bool,
     /// Frames since it last changed.
     still: u32,
@@ -32,7 +32,7 @@ struct Door {
 
 /// Totals of an object, or of all of a group.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sum {
+struct Totals {
     /// Benefit minus cost at the present price, each part at its best.
     net: f64,
     /// Least cost, ticks by the prices.
@@ -42,8 +42,8 @@ struct Sum {
 /// All groups, by the numbers of their objects.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ImpostorChoice {
-    doors: Vec<Option<Door>>,
-    sums: Vec<Sum>,
+    states: Vec<Option<GroupState>>,
+    totals: Vec<Totals>,
     impostors: Impostors,
     /// Gain of a tick by the prices, smoothed; 0 before anything had a price.
     price: f64,
@@ -51,128 +51,129 @@ pub(super) struct ImpostorChoice {
 
 impl ImpostorChoice {
     /// Decides at `lambda` (gain of a tick) and `kappa` (measured ticks per tick by the prices).
-    pub fn decide(&mut self, ask: &Ask<'_>, groups: &Groups, (lambda, kappa): (f64, f64)) {
-        self.doors.resize(ask.views.len(), None);
+    pub fn decide(&mut self, query: &FrameQuery<'_>, groups: &Groups, lambda: f64, kappa: f64) {
+        self.states.resize(query.views.len(), None);
         if groups.all().is_empty() {
             return;
         }
-        self.impostors.update(ask, groups);
+        self.impostors.update(query, groups);
         let now = lambda * kappa;
-        let price = if self.price > 0.0 { self.price + PRICE_NEWS * (now - self.price) } else { now };
+        let price = if self.price > 0.0 { self.price + PRICE_SMOOTHING * (now - self.price) } else { now };
         self.price = price;
-        self.sum_leaves(ask, groups, price);
-        let mut spare = self.spare(ask, groups, kappa);
+        self.sum_leaves(query, groups, price);
+        let mut spare = self.spare(query, groups, kappa);
         for &group in groups.all() {
             if !self.impostors.is_in_view(group) {
                 continue;
             }
-            let (open, closed) = (self.sums[group], self.closed(ask, group, price));
-            let door = self.doors[group].get_or_insert(Door { closed: false, still: u32::MAX, patience: PATIENCE.0 });
-            door.still = door.still.saturating_add(1);
+            let (open, closed) = (self.totals[group], self.closed(query, group, price));
+            let state =
+                self.states[group].get_or_insert(GroupState { closed: false, still: u32::MAX, patience: PATIENCE.0 });
+            state.still = state.still.saturating_add(1);
             let taken = match closed {
-                Some(closed) => door.pass((open, closed), WORTH_IT * price * open.least, &mut spare),
+                Some(closed) => state.update(open, closed, MIN_GAIN * price * open.least, &mut spare),
                 None => {
                     // the members cost less than any impostor
-                    if door.closed {
-                        door.open();
+                    if state.closed {
+                        state.open();
                     }
                     open
                 }
             };
             if let Some(parent) = groups.parent(group) {
-                self.sums[parent].add(taken);
+                self.totals[parent].add(taken);
             }
         }
-        self.make_room(ask, groups, kappa);
+        self.make_room(query, groups, kappa);
     }
 
     /// Closes groups until the least of what is open fits, those first that lose least for the time they save.
-    fn make_room(&mut self, ask: &Ask<'_>, groups: &Groups, kappa: f64) {
-        let mut spare = self.spare(ask, groups, kappa);
+    fn make_room(&mut self, query: &FrameQuery<'_>, groups: &Groups, kappa: f64) {
+        let mut spare = self.spare(query, groups, kappa);
         while spare < 0.0 {
-            let shut = |at: usize| self.is_closed(at) || groups.is_within(at, |group| self.is_closed(group));
-            let open = groups.all().iter().filter(|group| !shut(**group));
+            let hidden = |at: usize| self.is_closed(at) || groups.is_within(at, |group| self.is_closed(group));
+            let open = groups.all().iter().filter(|group| !hidden(**group));
             let saves = |&group: &usize| {
-                let coarsest = self.impostors.rungs(ask, group).first()?;
-                let saved = self.sums[group].least - TICKS * coarsest.cost_s;
+                let coarsest = self.impostors.rungs(query, group).first()?;
+                let saved = self.totals[group].least - TICKS * coarsest.cost_s;
                 let lost = self.impostors.members_worth(group) - self.impostors.worth(group) * coarsest.accuracy;
                 (saved > 0.0).then(|| (group, saved, lost / saved))
             };
             let Some((group, saved, _)) = open.filter_map(saves).min_by(|a, b| a.2.total_cmp(&b.2)) else { return };
-            if let Some(door) = &mut self.doors[group] {
-                door.close();
+            if let Some(state) = &mut self.states[group] {
+                state.close();
             }
             for above in groups.above(group) {
-                self.sums[above].least -= saved;
+                self.totals[above].least -= saved;
             }
             spare += saved;
         }
     }
 
     /// Ticks by the prices left over when everything open or closed has its least cost; below 0 if that does not fit.
-    fn spare(&self, ask: &Ask<'_>, groups: &Groups, kappa: f64) -> f64 {
-        TICKS * ask.budget_s() / kappa - self.least(ask, groups)
+    fn spare(&self, query: &FrameQuery<'_>, groups: &Groups, kappa: f64) -> f64 {
+        TICKS * query.budget_s() / kappa - self.least(query, groups)
     }
 
     /// A group drawn by the best impostor at this price; `None` if its members in their lowest forms are cheaper than any.
-    fn closed(&self, ask: &Ask<'_>, group: usize, price: f64) -> Option<Sum> {
-        let (rungs, worth) = (self.impostors.rungs(ask, group), self.impostors.worth(group));
+    fn closed(&self, query: &FrameQuery<'_>, group: usize, price: f64) -> Option<Totals> {
+        let (rungs, worth) = (self.impostors.rungs(query, group), self.impostors.worth(group));
         let nets = rungs.iter().map(|rung| worth * rung.accuracy - price * (TICKS * rung.cost_s));
-        Some(Sum { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs.first()?.cost_s })
+        Some(Totals { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs.first()?.cost_s })
     }
 
     /// Sums objects that are drawn as themselves into their groups.
-    fn sum_leaves(&mut self, ask: &Ask<'_>, groups: &Groups, price: f64) {
-        self.sums.clear();
-        self.sums.resize(ask.views.len(), Sum::default());
-        for at in ask.drawable() {
-            let (rungs, weight) = (&ask.ladders.of(at).rungs, ask.weight(at));
+    fn sum_leaves(&mut self, query: &FrameQuery<'_>, groups: &Groups, price: f64) {
+        self.totals.clear();
+        self.totals.resize(query.views.len(), Totals::default());
+        for at in query.drawable() {
+            let (rungs, weight) = (&query.ladders.of(at).rungs, query.weight(at));
             let nets = rungs.iter().map(|rung| weight * rung.accuracy - price * TICKS * rung.cost_s);
-            let leaf = Sum { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs[0].cost_s };
-            self.sums[at] = leaf;
+            let leaf = Totals { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs[0].cost_s };
+            self.totals[at] = leaf;
             if let Some(group) = groups.parent(at) {
-                self.sums[group].add(leaf);
+                self.totals[group].add(leaf);
             }
         }
     }
 
     /// Least cost of everything at the present open and closed groups, ticks.
-    fn least(&self, ask: &Ask<'_>, groups: &Groups) -> f64 {
+    fn least(&self, query: &FrameQuery<'_>, groups: &Groups) -> f64 {
         let cost = |at: usize| {
             let hidden = groups.parent(at).is_some() && groups.is_within(at, |group| self.is_closed(group));
             match () {
                 () if hidden => 0.0,
-                () if !ask.views[at].0.is_group() => self.sums[at].least,
-                () if self.is_closed(at) => self.impostors.rungs(ask, at).first().map_or(0.0, |it| TICKS * it.cost_s),
+                () if !query.views[at].view.is_group() => self.totals[at].least,
+                () if self.is_closed(at) => self.impostors.rungs(query, at).first().map_or(0.0, |it| TICKS * it.cost_s),
                 () => 0.0,
             }
         };
-        (0..self.sums.len()).map(cost).sum()
+        (0..self.totals.len()).map(cost).sum()
     }
 
     /// Whether this object is a group that is drawn by an impostor.
     pub fn is_closed(&self, at: usize) -> bool {
-        self.doors.get(at).copied().flatten().is_some_and(|door| door.closed)
+        self.states.get(at).copied().flatten().is_some_and(|state| state.closed)
     }
 
     /// The impostors that a closed group can be drawn by, and the benefit of its finest; only its coarsest if nothing of it is in view.
-    pub fn impostors<'a>(&self, ask: &Ask<'a>, group: usize) -> (&'a [Rung], f64) {
-        let (rungs, ladder) = (self.impostors.rungs(ask, group), ask.ladders.of(group));
+    pub fn impostors<'a>(&self, query: &FrameQuery<'a>, group: usize) -> (&'a [Rung], f64) {
+        let (rungs, ladder) = (self.impostors.rungs(query, group), query.ladders.of(group));
         let drawn = if rungs.is_empty() { &ladder.rungs[..ladder.rungs.len().min(1)] } else { rungs };
         (drawn, self.impostors.worth(group))
     }
 }
 
-impl Sum {
+impl Totals {
     fn add(&mut self, other: Self) {
         self.net += other.net;
         self.least += other.least;
     }
 }
 
-impl Door {
+impl GroupState {
     /// Closes or opens the group if that gains more than `bar` and `spare` ticks allow it; gives the resulting totals.
-    fn pass(&mut self, (open, closed): (Sum, Sum), bar: f64, spare: &mut f64) -> Sum {
+    fn update(&mut self, open: Totals, closed: Totals, bar: f64, spare: &mut f64) -> Totals {
         let more = open.least - closed.least;
         if !self.closed && closed.net > open.net + bar {
             self.close();

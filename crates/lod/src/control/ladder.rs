@@ -4,8 +4,8 @@
 //! choice, or the present benefit of an object ([`crate::control::benefit`]). Theory: `docs/theory/control.md`, eq. 23.
 
 use super::benefit;
-use super::level::{Held, Span, open, polygons};
-use super::plan::Seen;
+use super::level::{Cut, LastCut, Span, open, polygons};
+use super::plan::SizedView;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
 use crate::cost::benefit::Sliders;
@@ -73,18 +73,19 @@ pub(super) struct Ladders {
 
 impl Ladders {
     /// Updates the ladders of all objects in view.
-    pub fn update(&mut self, views: &[Seen], raise: bool, prices: &Prices, sliders: &Sliders) {
+    pub fn update(&mut self, views: &[SizedView], raise: bool, prices: &Prices, sliders: &Sliders) {
         let steps = steps_an_octave(views);
         self.all.truncate(views.len());
         self.new.clear();
-        for (at, (view, span)) in views.iter().enumerate() {
+        for (at, seen) in views.iter().enumerate() {
             let before = self.all.get(at).map(|ladder| ladder.key);
+            let view = &seen.view;
             let known = before.filter(|before| before.id == view.id);
             // an object out of view keeps its ladder
             if known.is_some() && !view.visible {
                 continue;
             }
-            let key = Key::of(view, (steps, raise), before);
+            let key = Key::of(view, steps, raise, before);
             if known.is_some_and(|known| known.is_same(&key)) {
                 continue;
             }
@@ -92,7 +93,7 @@ impl Ladders {
             let alike = self.new.iter().map(|&at| &self.all[at]).find(|ladder| ladder.key.is_copy(&key));
             let ladder = match alike {
                 Some(ladder) => Ladder { key, version: self.made, ..ladder.clone() },
-                None => Ladder::new(key, self.made, (view, *span), (prices, sliders)),
+                None => Ladder::new(key, self.made, seen, prices, sliders),
             };
             if alike.is_none() {
                 self.new.push(at);
@@ -121,14 +122,14 @@ impl Ladders {
 }
 
 /// Rungs per octave: the more objects there are, the less the rounding of a single one matters.
-fn steps_an_octave(views: &[Seen]) -> usize {
-    let objects = views.iter().filter(|(_, span)| span.full > span.least).count().max(1);
+fn steps_an_octave(views: &[SizedView]) -> usize {
+    let objects = views.iter().filter(|seen| seen.span.full > seen.span.least).count().max(1);
     let wish = (STEPS / objects).clamp(STEPS_AN_OCTAVE.0, STEPS_AN_OCTAVE.1);
     1 << wish.ilog2()
 }
 
 impl Key {
-    fn of(view: &ObjectView, (steps, raise): (usize, bool), before: Option<Self>) -> Self {
+    fn of(view: &ObjectView, steps: usize, raise: bool, before: Option<Self>) -> Self {
         let held = before.filter(|before| before.id == view.id).map(|before| before.size);
         let size = hysteresis::floor(held, 2.0 * libm::log2(benefit::pixels(view).max(1.0)));
         Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps, raise }
@@ -165,15 +166,16 @@ fn is_near(a: f64, b: f64) -> bool {
 }
 
 impl Ladder {
-    fn new(key: Key, version: u64, (view, span): (&ObjectView, Span), with: (&Prices, &Sliders)) -> Self {
-        let rung = |(resolution, polygons), shading| key.rung(resolution, polygons, shading, with);
+    fn new(key: Key, version: u64, seen: &SizedView, prices: &Prices, sliders: &Sliders) -> Self {
+        let SizedView { view, span } = seen;
+        let rung = |cut, shading| key.rung(cut, shading, prices, sliders);
         if view.is_group() {
             let rungs = key.impostors(view, rung);
             return Self { key, version, asked: rungs.len(), rungs };
         }
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
-        for cut in key.cuts(view, span) {
+        for cut in key.cuts(view, *span) {
             rungs.extend(Shading::ALL.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
         }
         rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
@@ -194,23 +196,23 @@ impl Ladder {
 
 impl Key {
     /// The distinct shapes that the object can be cut to, in ascending polygons.
-    fn cuts(&self, view: &ObjectView, span: Span) -> Vec<(Resolution, f64)> {
+    fn cuts(&self, view: &ObjectView, span: Span) -> Vec<Cut> {
         // below one pixel per triangle no difference is visible
         let most = span.full.min(self.pixels()).max(span.least);
         let fine = 1.0 / self.steps as f64;
         let octaves = libm::log2(most / span.least);
         let count = if octaves.is_finite() { libm::ceil(octaves / fine) as usize } else { 0 };
         let wishes = (0..count).map(|k| span.least * libm::exp2(fine * k as f64)).chain([most]);
-        let mut cuts: Vec<_> = wishes.map(|wish| Held::default().choose(view, span, wish)).collect();
-        cuts.sort_by(|a, b| a.1.total_cmp(&b.1));
-        cuts.dedup_by(|a, b| a.1 <= b.1);
+        let mut cuts: Vec<_> = wishes.map(|wish| LastCut::default().choose(view, span, wish)).collect();
+        cuts.sort_by(|a, b| a.polygons.total_cmp(&b.polygons));
+        cuts.dedup_by(|a, b| a.polygons <= b.polygons);
         cuts
     }
 
     /// The impostors of a group, each with the best shading; accuracy is relative to the finest, whose benefit is in [`super::groups`].
-    fn impostors(&self, view: &ObjectView, rung: impl Fn((Resolution, f64), Shading) -> Rung) -> Vec<Rung> {
+    fn impostors(&self, view: &ObjectView, rung: impl Fn(Cut, Shading) -> Rung) -> Vec<Rung> {
         let at = |n| Resolution { eps_m: self.range.eps_m.1, n };
-        let one = |n| rung((at(n), polygons(view, at(n))), self.shading.1);
+        let one = |n| rung(Cut { resolution: at(n), polygons: polygons(view, at(n)) }, self.shading.1);
         let mut rungs: Vec<_> = (0..open(view)).map(one).collect();
         let finest = rungs.last().map_or(1.0, |finest| finest.accuracy);
         rungs.iter_mut().for_each(|rung| rung.accuracy /= finest);
@@ -219,7 +221,7 @@ impl Key {
 
     /// Adds rungs above the requested range: a smoother shape, soft shadows, both. Their added accuracy is negligible, so none is taken
     /// while anything else can use the time.
-    fn raise(&self, view: &ObjectView, rungs: &mut Vec<Rung>, rung: impl Fn((Resolution, f64), Shading) -> Rung) {
+    fn raise(&self, view: &ObjectView, rungs: &mut Vec<Rung>, rung: impl Fn(Cut, Shading) -> Rung) {
         let Some(full) = rungs.iter().copied().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy)) else { return };
         let Resolution { eps_m, n } = full.resolution;
         let finer = match self.kind {
@@ -230,8 +232,9 @@ impl Key {
             Kind::Counted { .. } | Kind::Group { .. } => full.polygons,
             _ => polygons(view, finer),
         };
-        let smoother = (polygons > full.polygons && polygons <= self.pixels()).then_some((finer, polygons));
-        let plain = (full.resolution, full.polygons);
+        let smoother =
+            (polygons > full.polygons && polygons <= self.pixels()).then_some(Cut { resolution: finer, polygons });
+        let plain = Cut { resolution: full.resolution, polygons: full.polygons };
         let better = [
             smoother.map(|cut| rung(cut, full.shading)),
             Some(rung(plain, Shading::Shadowed)),
@@ -242,15 +245,10 @@ impl Key {
         }
     }
 
-    fn rung(
-        &self,
-        resolution: Resolution,
-        polygons: f64,
-        shading: Shading,
-        (prices, sliders): (&Prices, &Sliders),
-    ) -> Rung {
+    fn rung(&self, cut: Cut, shading: Shading, prices: &Prices, sliders: &Sliders) -> Rung {
+        let Cut { resolution, polygons } = cut;
         let pixels = self.pixels();
-        let accuracy = benefit::accuracy(&self.kind, polygons, (shading, self.shading.1), pixels);
+        let accuracy = benefit::accuracy(&self.kind, polygons, shading, self.shading.1, pixels);
         let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
         Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
     }
@@ -265,12 +263,12 @@ mod tests {
         let kind = Kind::Group { radius_m: 1.0, members: (0, 0), impostors };
         let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
         let mut ladders = Ladders::default();
-        ladders.update(&[(view, Span::of(&view))], true, &Prices::default(), &Sliders::default());
+        ladders.update(&[SizedView::of(view)], true, &Prices::default(), &Sliders::default());
         ladders.of(0).clone()
     }
 
     #[test]
-    fn a_group_has_a_rung_for_each_impostor_and_the_finest_counts_whole() {
+    fn a_group_has_a_rung_for_each_impostor_and_the_finest_has_accuracy_one() {
         let Ladder { rungs, asked, .. } = ladder([20, 80, 320, 0, 0, 0, 0, 0]);
         assert_eq!(
             rungs.iter().map(|r| (r.resolution.n, r.polygons)).collect::<Vec<_>>(),
@@ -286,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn one_impostor_counts_whole_to_the_bit_and_none_is_no_rung() {
+    fn a_single_impostor_has_accuracy_one_and_no_impostor_gives_no_rung() {
         let one = ladder([37, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
         assert!(ladder([0; 8]).rungs.is_empty());

@@ -55,28 +55,35 @@ impl Span {
     }
 }
 
+/// A pair (ε, n), and the polygons that it makes of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cut {
+    pub resolution: Resolution,
+    pub polygons: f64,
+}
+
 /// The last cut of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Held {
+pub(super) struct LastCut {
     /// The polygons requested when it was last cut, and the level n chosen; `None` while it is out of view.
     cut: Option<(f64, u8)>,
 }
 
-impl Held {
+impl LastCut {
     /// Clears the last cut when the object goes out of view.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// The pair (ε, n) for about `wish` polygons, and the polygons that it makes.
-    pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> (Resolution, f64) {
-        let at = self.resolution(view, span, wish);
+    /// The cut with about `wish` polygons.
+    pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> Cut {
+        let resolution = self.resolution(view, span, wish);
         let makes = match (view.kind, self.cut) {
             // any count is possible: no rounding to a level
             (Kind::Counted { .. }, Some((cut, _))) => libm::floor(within(cut, span)),
-            _ => polygons(view, at),
+            _ => polygons(view, resolution),
         };
-        (at, makes)
+        Cut { resolution, polygons: makes }
     }
 
     fn resolution(&mut self, view: &ObjectView, span: Span, wish: f64) -> Resolution {
@@ -97,7 +104,7 @@ impl Held {
         };
         let before = self.cut.map(|(_, n)| n);
         let n = match view.kind {
-            Kind::Tube { length_m, radius_m } => tube_level(polygons, (length_m, radius_m), view.range, before),
+            Kind::Tube { length_m, radius_m } => tube_level(polygons, length_m, radius_m, view.range, before),
             Kind::Primitive { ref triangles, .. } => primitive_level(polygons, triangles, view.range.n, before),
             Kind::Counted { least, .. } => octaves(polygons / f64::from(least.max(1))),
             Kind::Group { .. } => open(view),
@@ -160,7 +167,7 @@ fn level(n: u8) -> usize {
 }
 
 /// The level at which a tube's quads are nearest to square: ⌊ρ⌋ with a band (control.md, eq. 15), where ε stays in its range.
-fn tube_level(polygons: f64, (length_m, radius_m): (f64, f64), range: ResolutionRange, before: Option<u8>) -> u8 {
+fn tube_level(polygons: f64, length_m: f64, radius_m: f64, range: ResolutionRange, before: Option<u8>) -> u8 {
     // ε at level n is 2ⁿ / per_m
     let per_m = polygons / (PATCH_TRIANGLES * length_m);
     let (finest, coarsest) = range.eps_m;
@@ -206,11 +213,11 @@ mod tests {
     #[test]
     fn a_switch_of_n_keeps_the_polygons_and_the_quads_near_square() {
         let view = tube((1e-4, 0.5), (0, 10));
-        let (span, mut held) = (Span::of(&view), Held::default());
+        let (span, mut held) = (Span::of(&view), LastCut::default());
         let mut levels = Vec::new();
         let mut wish = 1300.0;
         while wish < 4e5 {
-            let (at, _) = held.choose(&view, span, wish);
+            let at = held.choose(&view, span, wish).resolution;
             // HOLD, and the rounding of one interval in the 45 or more that there are
             assert!((polygons(&view, at) / wish).ln().abs() <= HOLD + 1.0 / 45.0, "{wish}: {at:?}");
             // half an octave to either side of the level, and the band
@@ -222,13 +229,13 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_that_trembles_switches_n_at_most_once() {
+    fn a_request_that_fluctuates_switches_n_at_most_once() {
         let view = tube((5e-4, 0.02), (1, 5));
         let span = Span::of(&view);
         for start in 0..200 {
-            let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), Held::default());
+            let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), LastCut::default());
             let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, √2 wide
-            let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).0.n).collect();
+            let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).resolution.n).collect();
             levels.dedup();
             assert!(levels.len() <= 2, "{middle}: {levels:?}");
         }
@@ -240,8 +247,8 @@ mod tests {
             [((5e-4, 0.02), (1, 5)), ((0.01, 0.01), (0, 6)), ((1e-3, 0.05), (3, 3)), ((0.01, 0.02), (1, 4))]
         {
             let view = tube(eps_m, n);
-            let (span, mut held) = (Span::of(&view), Held::default());
-            let mut ends = |wish| held.choose(&view, span, wish).0;
+            let (span, mut held) = (Span::of(&view), LastCut::default());
+            let mut ends = |wish| held.choose(&view, span, wish).resolution;
             assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
             assert_eq!(ends(span.full), Resolution { eps_m: eps_m.0, n: n.1 });
             assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
@@ -251,18 +258,19 @@ mod tests {
     #[test]
     fn a_tube_of_one_spacing_climbs_by_levels() {
         let view = tube((0.01, 0.01), (0, 6));
-        let (span, mut held) = (Span::of(&view), Held::default());
-        let levels: Vec<_> = (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).0.n).collect();
+        let (span, mut held) = (Span::of(&view), LastCut::default());
+        let levels: Vec<_> =
+            (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).resolution.n).collect();
         assert!(levels.is_sorted() && levels[0] == 0 && *levels.last().unwrap() == 6, "{levels:?}");
     }
 
     #[test]
-    fn what_is_cut_by_triangles_has_as_many_as_are_wished_for() {
+    fn a_mesh_with_free_triangle_count_has_as_many_as_requested() {
         let kind = Kind::Counted { radius_m: 0.1, least: 40, most: 100_000 };
         let view = ObjectView { kind, ..tube((1.0, 1.0), (0, 10)) };
-        let (span, mut held) = (Span::of(&view), Held::default());
+        let (span, mut held) = (Span::of(&view), LastCut::default());
         for wish in [1.0, 40.0, 123.4, 9_999.0, 1e9] {
-            let (_, polygons) = held.choose(&view, span, wish);
+            let polygons = held.choose(&view, span, wish).polygons;
             assert_eq!(polygons, wish.floor().clamp(40.0, 100_000.0));
         }
         assert_eq!(polygons(&view, Resolution { eps_m: 1.0, n: 3 }), 320.0);

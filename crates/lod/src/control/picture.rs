@@ -14,15 +14,15 @@ use super::groups::Groups;
 use super::hierarchy::Hierarchy;
 use super::ladder::Ladders;
 use super::level;
-use super::level::Span;
-use super::plan::{FrameWork, LevelDemand, Plan, Seen, in_view, steers};
+use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
-use super::quality_boost::Raise;
-use super::query::{Ask, Promise};
+use super::quality_boost::QualityBoost;
+use super::query::{FrameQuery, Promise};
 use super::select::Select;
 use super::status::Status;
 use super::view::ObjectView;
+use crate::adaptive::DEFAULT_MARGIN;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
@@ -38,9 +38,7 @@ const OVERHEAD_NEWS: f64 = 0.1;
 /// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
 const FIXED_TREMBLE: f64 = 0.01;
 
-/// The fraction of a frame that policies with a prediction leave free by default.
-const MARGIN: f64 = 0.02;
-/// The same for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
+/// The fraction of a frame that policies with a prediction leave free for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
 const LAG_MARGIN: f64 = 0.03;
 
 /// Chooses the level of every picture.
@@ -56,7 +54,7 @@ pub struct PictureControl {
     backdrop: Backdrop,
     frozen: bool,
     /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
-    raise: Option<Raise>,
+    raise: Option<QualityBoost>,
     /// Time of a frame outside drawing, seconds, smoothed.
     overhead_s: Option<f64>,
     /// Time of a frame that is spent whatever is chosen, seconds, as used for the last choice.
@@ -78,7 +76,7 @@ pub struct PictureControl {
     changes: Changes,
     /// Speeds on the screen, smoothed, by object.
     speeds: Vec<(AgentId, Option<f64>)>,
-    views: Vec<Seen>,
+    views: Vec<SizedView>,
     plan: Plan,
     /// The choice for the next frame, made while this one is drawn.
     ahead: Option<Ahead>,
@@ -141,7 +139,7 @@ impl PictureControl {
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
                 let drawn_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
-                self.adaptive.observe(self.chosen_part * drawn_s, (work_s, self.others_s), target_s);
+                self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
             }
             _ => {}
         }
@@ -149,7 +147,7 @@ impl PictureControl {
 
     /// Chooses the level of every object for the next frame.
     pub fn plan(&mut self, objects: &[ObjectView]) -> &Plan {
-        self.look(objects);
+        self.update_views(objects);
         let same = self.plan.levels.len() == objects.len();
         if self.frozen && same && self.plan.levels.iter().zip(objects).all(|(level, object)| level.id == object.id) {
             self.count();
@@ -170,7 +168,7 @@ impl PictureControl {
             Policy::Full => self.plan_full(levels),
             Policy::Feedback => self.feedback.plan(&self.views, levels),
             _ => {
-                levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
+                levels.extend(self.views.iter().map(|seen| unseen(&seen.view)));
                 return self.choose_by_cost(levels);
             }
         }
@@ -185,7 +183,7 @@ impl PictureControl {
     /// The fraction of a frame that is left free by policies with a prediction.
     fn margin_now(&self) -> f64 {
         let bound = self.pipeline.is_some_and(|pipeline| pipeline.lag * self.target_hz < 1.0);
-        self.margin.unwrap_or(if bound { LAG_MARGIN } else { MARGIN })
+        self.margin.unwrap_or(if bound { LAG_MARGIN } else { DEFAULT_MARGIN })
     }
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
@@ -200,7 +198,7 @@ impl PictureControl {
         if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }
-        let ask = Ask {
+        let query = FrameQuery {
             views: &self.views,
             ladders: &self.ladders,
             sliders: &self.sliders,
@@ -211,14 +209,14 @@ impl PictureControl {
             fixed_s: self.fixed_s,
         };
         let mut promise = match self.policy {
-            Policy::Adaptive => self.adaptive.choose(&ask, &self.groups, levels),
+            Policy::Adaptive => self.adaptive.choose(&query, &self.groups, levels),
             Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
-                self.hierarchy.choose(self.policy, &ask, &self.groups, levels)
+                self.hierarchy.choose(self.policy, &query, &self.groups, levels)
             }
-            policy => self.select.choose(policy, &ask, levels),
+            policy => self.select.choose(policy, &query, levels),
         };
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
-            raise.observe(&ask, levels, &promise);
+            raise.observe(&query, levels, &promise);
         }
         // time reserved for others is not spent by the frame
         promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
@@ -232,12 +230,12 @@ impl PictureControl {
     }
 
     /// Stores the objects in view with their polygon ranges and smoothed speeds.
-    fn look(&mut self, objects: &[ObjectView]) {
+    fn update_views(&mut self, objects: &[ObjectView]) {
         self.views.truncate(objects.len());
         self.speeds.resize(objects.len(), (AgentId(0), None));
         for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {
             // an unchanged object that stays out of view has no speed, and its polygon range stays
-            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|(known, _)| known == object) {
+            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|known| known.view == *object) {
                 continue;
             }
             let mut view = *object;
@@ -249,24 +247,23 @@ impl PictureControl {
                 view.speed_px_s = held.map_or(now, |before| before + SPEED_NEWS * (now - before));
                 *held = Some(view.speed_px_s);
             }
-            let seen = (view, Span::of(&view));
             match self.views.get_mut(at) {
-                Some(place) => *place = seen,
-                None => self.views.push(seen),
+                Some(place) => *place = SizedView::of(view),
+                None => self.views.push(SizedView::of(view)),
             }
         }
     }
 
     /// Updates the totals of the plan.
     fn count(&mut self) {
-        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|(seen, _)| seen.view.visible);
         self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
-        self.plan.full_polygons = in_view(&self.views).map(|(_, span)| span.full).sum();
+        self.plan.full_polygons = in_view(&self.views).map(|seen| seen.span.full).sum();
         (self.plan.changes, self.plan.reversals) = self.changes.count(&self.views, &self.plan.levels);
     }
 
     fn plan_full(&self, levels: &mut Vec<LevelDemand>) {
-        levels.extend(self.views.iter().map(|(view, span)| {
+        levels.extend(self.views.iter().map(|SizedView { view, span }| {
             let n = if view.is_group() { level::open(view) } else { view.range.n.1 };
             let resolution = Resolution { eps_m: view.range.eps_m.0, n };
             LevelDemand { id: view.id, resolution, polygons: span.full, shading: view.shading.1 }
@@ -288,8 +285,8 @@ impl PictureControl {
     /// The benefit of object `at` in the last choice at an accuracy of 1, pixels; 0 if unknown.
     #[must_use]
     pub fn weight(&self, at: usize) -> f64 {
-        let Some((view, _)) = self.views.get(at) else { return 0.0 };
-        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(view, &self.sliders, ladder.polygon_px()))
+        let Some(seen) = self.views.get(at) else { return 0.0 };
+        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(&seen.view, &self.sliders, ladder.polygon_px()))
     }
 
     /// The state of the controller; its text is for the viewer and the report.

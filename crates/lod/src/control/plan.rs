@@ -64,15 +64,25 @@ pub struct Plan {
     pub reversals: u32,
 }
 
-/// An object and its range of polygons.
-pub(super) type Seen = (ObjectView, Span);
+/// An object as the camera sees it, with its range of polygons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct SizedView {
+    pub view: ObjectView,
+    pub span: Span,
+}
+
+impl SizedView {
+    pub fn of(view: ObjectView) -> Self {
+        Self { view, span: Span::of(&view) }
+    }
+}
 
 /// The objects in view.
-pub(super) fn in_view(views: &[Seen]) -> impl Iterator<Item = &Seen> + Clone {
-    views.iter().filter(|(view, _)| view.visible)
+pub(super) fn in_view(views: &[SizedView]) -> impl Iterator<Item = &SizedView> + Clone {
+    views.iter().filter(|seen| seen.view.visible)
 }
 
 /// Whether anything in view can be drawn in more than one way.
-pub(super) fn steers(views: &[Seen]) -> bool {
-    in_view(views).any(|(view, span)| span.most > span.least || view.shading.0 < view.shading.1)
+pub(super) fn steers(views: &[SizedView]) -> bool {
+    in_view(views).any(|SizedView { view, span }| span.most > span.least || view.shading.0 < view.shading.1)
 }

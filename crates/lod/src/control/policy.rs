@@ -131,6 +131,10 @@ impl Law {
     /// The printed law with the gains of (GDC04).
     pub const PRINTED: Self = Self::Printed { alpha: 1e-4, beta: 5.0 };
 
+    /// The range of α.
+    pub const ALPHA: (f64, f64) = (1e-9, 1.0);
+    /// The range of β.
+    pub const BETA: (f64, f64) = (1e-6, 1e3);
     /// The range of κ.
     pub const KAPPA: (f64, f64) = (1e-3, 1.99);
     /// The range of λ.

@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_kept_out_of_the_fit_are_predicted_within_a_tenth_at_nineteen_of_twenty() {
+    fn held_out_pictures_are_predicted_within_a_tenth_in_nineteen_of_twenty() {
         let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel };
         let machine = Prices {
             frame_s: 1.4e-3,
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_price_that_is_none_is_twice_the_usual_one() {
+    fn an_invalid_price_is_replaced_by_twice_the_default() {
         let mut prices = Prices { frame_s: f64::NAN, pixel_s: -1.0, ..Prices::default() };
         prices.shading[1].polygon = f64::INFINITY;
         let sound = prices.sound();

@@ -4,7 +4,7 @@
 //! Theory: `docs/theory/control.md`, section 6; (RH05, §7.2) proposes it for time that would stay unspent.
 
 use super::plan::LevelDemand;
-use super::query::{Ask, Promise};
+use super::query::{FrameQuery, Promise};
 
 /// Frames in which all objects must have had their best before more is offered: half a second at 60 Hz …
 const PATIENCE: u32 = 30;
@@ -15,29 +15,29 @@ const SPARE: f64 = 0.1;
 
 /// Whether more than the requested quality is offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Raise {
+pub(super) struct QualityBoost {
     open: bool,
     /// Frames since it opened, or frames in a row in which all objects had their best.
     frames: u32,
     patience: u32,
 }
 
-impl Default for Raise {
+impl Default for QualityBoost {
     fn default() -> Self {
         Self { open: false, frames: 0, patience: PATIENCE }
     }
 }
 
-impl Raise {
+impl QualityBoost {
     /// Whether better rungs are offered.
     pub fn is_open(&self) -> bool {
         self.open
     }
 
     /// Updates the rule with a choice.
-    pub fn observe(&mut self, ask: &Ask<'_>, levels: &[LevelDemand], promise: &Promise) {
-        let has_all = promise.feasible && ask.drawable().all(|at| has_all(ask, at, &levels[at]));
-        let spare = promise.predicted_s < (1.0 - SPARE) * ask.target_s;
+    pub fn observe(&mut self, query: &FrameQuery<'_>, levels: &[LevelDemand], promise: &Promise) {
+        let has_all = promise.feasible && query.drawable().all(|at| has_all(query, at, &levels[at]));
+        let spare = promise.predicted_s < (1.0 - SPARE) * query.target_s;
         self.frames = if has_all && (self.open || spare) { self.frames.saturating_add(1) } else { 0 };
         if self.open && !has_all {
             // an offer that did not last ten times its waiting time was too early
@@ -51,8 +51,8 @@ impl Raise {
 }
 
 /// Whether an object is drawn as well as requested; an object left out for its group requests nothing.
-fn has_all(ask: &Ask<'_>, at: usize, level: &LevelDemand) -> bool {
-    let ladder = ask.ladders.of(at);
+fn has_all(query: &FrameQuery<'_>, at: usize, level: &LevelDemand) -> bool {
+    let ladder = query.ladders.of(at);
     let best = ladder.rungs[..ladder.asked].iter().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy));
     best.is_none_or(|best| level.polygons >= best.polygons && level.shading >= best.shading)
 }

@@ -1,11 +1,11 @@
 //! The input of every cost-based policy, and the promise that it gives.
 //!
-//! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
+//! In: the objects with their ladders, the time. Out: [`FrameQuery`] and [`Promise`]. Never here: a choice.
 
 use super::benefit;
 use super::ladder::{Ladder, Ladders, Rung};
 use super::level;
-use super::plan::{LevelDemand, Seen};
+use super::plan::{LevelDemand, SizedView};
 use crate::cost::benefit::Sliders;
 use crate::cost::value::Value;
 use crate::select::Entry;
@@ -22,8 +22,8 @@ const USUAL: f64 = 1e5;
 
 /// The input of a policy for one frame.
 #[derive(Clone, Copy)]
-pub(super) struct Ask<'a> {
-    pub views: &'a [Seen],
+pub(super) struct FrameQuery<'a> {
+    pub views: &'a [SizedView],
     pub ladders: &'a Ladders,
     pub sliders: &'a Sliders,
     /// The value formula of Robin Hood.
@@ -63,7 +63,7 @@ impl Promise {
     }
 }
 
-impl Ask<'_> {
+impl FrameQuery<'_> {
     /// Time for the choice, seconds.
     pub fn budget_s(&self) -> f64 {
         self.target_s * (1.0 - self.margin) - self.fixed_s
@@ -77,13 +77,13 @@ impl Ask<'_> {
 
     /// Numbers of the objects in view that are drawn as themselves, not as groups.
     pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
-        let itself = |at: &usize| !self.views[*at].0.is_group() && !self.ladders.of(*at).rungs.is_empty();
-        (0..self.views.len()).filter(|at| self.views[*at].0.visible).filter(itself)
+        let itself = |at: &usize| !self.views[*at].view.is_group() && !self.ladders.of(*at).rungs.is_empty();
+        (0..self.views.len()).filter(|at| self.views[*at].view.visible).filter(itself)
     }
 
     /// Benefit of an object in view at an accuracy of 1.
     pub fn weight(&self, at: usize) -> f64 {
-        benefit::weight(&self.views[at].0, self.sliders, self.ladders.of(at).polygon_px())
+        benefit::weight(&self.views[at].view, self.sliders, self.ladders.of(at).polygon_px())
     }
 
     /// A rung of an object as an entry of a knapsack.
@@ -93,13 +93,13 @@ impl Ask<'_> {
 }
 
 /// The demand for one rung.
-pub(super) fn demand(at: usize, views: &[Seen], rung: &Rung) -> LevelDemand {
-    LevelDemand { id: views[at].0.id, resolution: rung.resolution, polygons: rung.polygons, shading: rung.shading }
+pub(super) fn demand(at: usize, views: &[SizedView], rung: &Rung) -> LevelDemand {
+    LevelDemand { id: views[at].view.id, resolution: rung.resolution, polygons: rung.polygons, shading: rung.shading }
 }
 
 /// The demand of an object that is left out of the picture: its coarsest resolution, no triangles.
-pub(super) fn left_out(at: usize, views: &[Seen], ladder: &Ladder) -> LevelDemand {
-    let view = &views[at].0;
+pub(super) fn left_out(at: usize, views: &[SizedView], ladder: &Ladder) -> LevelDemand {
+    let view = &views[at].view;
     let usual = Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 };
     let resolution = ladder.rungs.first().map_or(usual, |rung| rung.resolution);
     let n = if view.is_group() { level::open(view) } else { resolution.n };

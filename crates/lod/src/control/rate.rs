@@ -7,7 +7,7 @@
 mod full_load;
 
 use crate::Bound;
-use crate::log_law::LESSON_MAX;
+use crate::log_law::ERROR_MAX;
 use full_load::{FullLoad, IN_A_ROW};
 
 /// Measured times of a turn.
@@ -60,8 +60,8 @@ const LATE: f64 = 1.03;
 /// κ: the share of such a delay (of logarithms) that one demand removes.
 const KAPPA: f64 = 0.5;
 
-/// Least |Δ ln| of a demand: re-meshing costs accuracy, which 10 % of ε do not justify.
-const RETUNE_MIN: f64 = 0.095;
+/// Least |Δ ln| of a demand, dimensionless: re-meshing costs accuracy, which 10 % of ε do not justify.
+pub(super) const DEMAND_MIN: f64 = 0.095;
 
 /// Windows without delay before anything gets finer: initially a second, doubled whenever that turns out to have been too early.
 const PATIENCE: (u32, u32) = (4, 128);
@@ -71,7 +71,7 @@ const REFINE_MAX: f64 = 0.223;
 /// … otherwise the fraction of the distance that one demand refines.
 const REFINE_PART: f64 = 0.5;
 
-/// The dead zone of ln(load/share), 80 % … 105 %: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
+/// The dead zone of ln(load/share), 80 % … 105 %: wider than [`DEMAND_MIN`], so that there is always an ε at which it rests.
 const DEAD: (f64, f64) = (-0.223, 0.049);
 /// Target inside the dead zone.
 const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
@@ -92,16 +92,16 @@ struct Window {
 pub struct RateControl {
     limits: RateLimits,
     /// Upper ends of the two ranges of z: ln(coarsest ε / finest ε), and that plus ln(longest dt / wanted dt).
-    landing: f64,
+    eps_end: f64,
     top: f64,
     window: Window,
     full: FullLoad,
     /// Best known target of the loop variable z.
     aim: f64,
     /// z at the last change of the target for the agent's own load.
-    asked: f64,
+    own_target: f64,
     /// ln(finest ε that makes a visible difference / finest ε), from 0.
-    plain: f64,
+    visible: f64,
     /// z of the last demand sent to the agent.
     sent: f64,
     /// Windows in a row in which others delayed the agent, and in which they did not.
@@ -117,20 +117,20 @@ impl RateControl {
     /// A controller of an agent that presently steps by `dt_wanted_s` and simulates at `eps_m`.
     #[must_use]
     pub fn new(limits: RateLimits, eps_m: Option<f64>) -> Self {
-        let landing = limits.eps_m.map_or(0.0, |(fine, coarse)| ratio_ln(coarse, fine));
-        let top = landing + ratio_ln(limits.dt_max_s, limits.dt_wanted_s);
-        let start = eps_m.zip(limits.eps_m).map_or(0.0, |(now, (fine, _))| ratio_ln(now, fine).min(landing));
+        let eps_end = limits.eps_m.map_or(0.0, |(fine, coarse)| ratio_ln(coarse, fine));
+        let top = eps_end + ratio_ln(limits.dt_max_s, limits.dt_wanted_s);
+        let start = eps_m.zip(limits.eps_m).map_or(0.0, |(now, (fine, _))| ratio_ln(now, fine).min(eps_end));
         let limits =
             RateLimits { share: if limits.share > 0.0 { limits.share.clamp(0.01, 1.0) } else { 1.0 }, ..limits };
         Self {
             limits,
-            landing,
+            eps_end,
             top,
             window: Window::default(),
             full: FullLoad::default(),
             aim: start,
-            asked: start,
-            plain: 0.0,
+            own_target: start,
+            visible: 0.0,
             sent: start,
             late: 0,
             calm: 0,
@@ -163,13 +163,13 @@ impl RateControl {
     /// demanded; afterwards the agent returns to its own target.
     pub fn set_plain(&mut self, eps_m: f64) {
         if let Some((fine, _)) = self.limits.eps_m {
-            self.plain = if eps_m == f64::INFINITY { self.landing } else { ratio_ln(eps_m, fine).min(self.landing) };
+            self.visible = if eps_m == f64::INFINITY { self.eps_end } else { ratio_ln(eps_m, fine).min(self.eps_end) };
         }
     }
 
     /// The present target of z: by load, and by visibility.
-    fn held(&self) -> f64 {
-        self.asked.max(self.plain)
+    fn target(&self) -> f64 {
+        self.own_target.max(self.visible)
     }
 
     /// Load of one core at the finest ε and the wanted rate, from 0, as the mean of the last windows; `None` before the first measurement.
@@ -223,8 +223,8 @@ impl RateControl {
     /// it may (for lack of visibility), the measurement says nothing of its full load and is skipped, unless none is known.
     fn note(&mut self, window: &Window) {
         let load = window.work_s / window.wanted_s;
-        let eased = self.sent > self.asked && load <= self.limits.share * libm::exp(DEAD.1);
-        if !eased || self.full.mean().is_none() {
+        let reduced = self.sent > self.own_target && load <= self.limits.share * libm::exp(DEAD.1);
+        if !reduced || self.full.mean().is_none() {
             self.full.note(load * libm::exp(self.sent));
         }
     }
@@ -235,33 +235,33 @@ impl RateControl {
         self.late = if lateness > LATE { self.late + 1 } else { 0 };
         self.calm = if self.late > 0 { 0 } else { self.calm.saturating_add(1) };
         if self.late >= IN_A_ROW {
-            self.give_way(lateness);
+            self.coarsen_for_others(lateness);
         }
         if self.calm >= 2 * self.patience && self.refined_from.take().is_some() {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
         let Some(full) = self.full.mean() else { return };
         let wish = libm::log(full / self.limits.share);
-        let eased = self.sent > self.asked;
-        let from = if eased { self.sent } else { self.aim };
+        let reduced = self.sent > self.own_target;
+        let from = if reduced { self.sent } else { self.aim };
         let step = wish - from;
         self.rest = match () {
             () if wish > self.top + DEAD.1 => Some(Bound::Coarsest),
-            () if self.asked == 0.0 && step < DEAD.0 => Some(Bound::Finest),
+            () if self.own_target == 0.0 && step < DEAD.0 => Some(Bound::Finest),
             () => None,
         };
         if step > DEAD.1 {
             // not into the range of dt if the range of ε suffices
-            let end = if wish <= self.landing + DEAD.1 { self.landing } else { self.top };
+            let end = if wish <= self.eps_end + DEAD.1 { self.eps_end } else { self.top };
             self.aim = (wish - MIDDLE).min(end);
-        } else if step < DEAD.0 && !eased {
-            self.rise(wish - MIDDLE);
+        } else if step < DEAD.0 && !reduced {
+            self.refine(wish - MIDDLE);
         }
     }
 
     /// Delayed by others: the last refinement was too much, is reverted, and tried again after twice the wait.
-    fn give_way(&mut self, lateness: f64) {
-        self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(LESSON_MAX)).min(self.top);
+    fn coarsen_for_others(&mut self, lateness: f64) {
+        self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(ERROR_MAX)).min(self.top);
         if let Some(before) = self.refined_from.take() {
             self.patience = (2 * self.patience).min(PATIENCE.1);
             self.aim = self.aim.max(before);
@@ -269,37 +269,37 @@ impl RateControl {
     }
 
     /// With time to spare: refines, once delays by others have ceased for long enough.
-    fn rise(&mut self, to: f64) {
+    fn refine(&mut self, to: f64) {
         if self.calm >= self.patience {
-            let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.asked - to) } else { 0.0 };
-            self.aim = to.max(self.asked - part.max(REFINE_MAX)).max(0.0);
+            let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.own_target - to) } else { 0.0 };
+            self.aim = to.max(self.own_target - part.max(REFINE_MAX)).max(0.0);
         }
     }
 
     fn demand_if_worth_it(&mut self) -> Option<RateDemand> {
-        if self.is_worth_it(self.asked, self.aim) {
-            if self.aim < self.asked {
-                (self.refined_from, self.calm) = (Some(self.asked), 0);
+        if self.is_worth_it(self.own_target, self.aim) {
+            if self.aim < self.own_target {
+                (self.refined_from, self.calm) = (Some(self.own_target), 0);
             }
-            self.asked = self.aim;
+            self.own_target = self.aim;
         }
-        if !self.is_worth_it(self.sent, self.held()) {
+        if !self.is_worth_it(self.sent, self.target()) {
             return None;
         }
-        self.sent = self.held();
+        self.sent = self.target();
         Some(self.demand())
     }
 
     fn is_worth_it(&self, from: f64, to: f64) -> bool {
-        to != from && ((to - from).abs() >= RETUNE_MIN || to <= 0.0 || to >= self.top)
+        to != from && ((to - from).abs() >= DEMAND_MIN || to <= 0.0 || to >= self.top)
     }
 
     /// The present demand (control.md, eq. 17).
     #[must_use]
     pub fn demand(&self) -> RateDemand {
-        let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
-        let eps_m = self.limits.eps_m.map(|(fine, coarse)| on_stair(fine, coarse, self.held().min(self.landing)));
-        let dt_s = on_stair(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.held() - self.landing).max(0.0));
+        let coarsened = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
+        let eps_m = self.limits.eps_m.map(|(fine, coarse)| coarsened(fine, coarse, self.target().min(self.eps_end)));
+        let dt_s = coarsened(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.target() - self.eps_end).max(0.0));
         RateDemand { dt_s, eps_m }
     }
 

@@ -61,7 +61,7 @@ impl fmt::Display for Status {
             Self::Clamped(Bound::Coarsest) => "at its coarsest: ε may not be coarser, and frames still take too long",
             Self::BetweenLevels => "between levels: there is time left, but the next finer level would be late",
             Self::Fixed => "fixed: nothing in view has a range to choose from",
-            Self::Full => "full detail: the time is not looked at",
+            Self::Full => "full detail: the frame time is ignored",
         })
     }
 }

@@ -3,7 +3,7 @@
 //! In: after every turn the agent's own error estimate, in space and in time ([`ErrorMeasure`]). Out: occasionally a [`RateDemand`]. Never
 //! here: agents, clocks, error estimation. Theory: `docs/theory/control.md`, eq. 34 … 36.
 
-use super::rate::RateDemand;
+use super::rate::{DEMAND_MIN, RateDemand};
 use crate::Bound;
 
 /// An agent's own error estimate after a turn.
@@ -39,20 +39,31 @@ const LEAST: f64 = 0.45;
 /// Greatest coarsening by one decision, and greatest refinement.
 const COARSEN_MAX: f64 = 1.5;
 const REFINE_MAX: f64 = 4.0;
-/// Least |Δ ln| of a demand: re-meshing costs accuracy, which 10 % of ε do not justify.
-const DEMAND_MIN: f64 = 0.095;
 /// Windows within the tolerance before anything gets coarser; doubled whenever that turns out to have been too early.
 const PATIENCE: (u32, u32) = (1, 32);
 /// A coarsening counts as confirmed after this many times the patience: a motion that comes and goes within it does not confirm it.
 const PROOF: u32 = 16;
 
+/// How the error grows with a value: bounds of the exponent of its power law.
+#[derive(Debug, Clone, Copy)]
+struct Orders {
+    /// The greatest possible, used to coarsen.
+    greatest: f64,
+    /// The least possible, used to refine.
+    least: f64,
+}
+
+/// A spacing ε makes an error of second order.
+const ORDERS_OF_EPS: Orders = Orders { greatest: 2.0, least: 2.0 };
+/// Steps dt make an error of first order, or of second with an integrator of second order (control.md, eq. 35 and 36).
+const ORDERS_OF_DT: Orders = Orders { greatest: 2.0, least: 1.0 };
+
 /// One controlled value, and how the error grows with it.
 #[derive(Debug, Clone, Copy)]
-struct Stair {
+struct ControlledValue {
     range: (f64, f64),
     value: f64,
-    /// Orders of the error: the greatest possible, used to coarsen, and the least, used to refine.
-    orders: (f64, f64),
+    orders: Orders,
     calm: u32,
     patience: u32,
     /// The value before the last coarsening, if that is not confirmed yet.
@@ -63,8 +74,8 @@ struct Stair {
 #[derive(Debug, Clone)]
 pub struct ErrorControl {
     tolerance_m: f64,
-    dt: Stair,
-    eps: Option<Stair>,
+    dt: ControlledValue,
+    eps: Option<ControlledValue>,
     turns: u32,
     span_s: f64,
     /// The greatest errors in space and in time in the second half of the window, metres.
@@ -72,9 +83,9 @@ pub struct ErrorControl {
     rest: Option<Bound>,
 }
 
-impl Stair {
-    fn new((fine, coarse): (f64, f64), start: f64, orders: (f64, f64)) -> Self {
-        let range = (fine, coarse.max(fine));
+impl ControlledValue {
+    fn new(range: (f64, f64), start: f64, orders: Orders) -> Self {
+        let range = (range.0, range.1.max(range.0));
         let value = start.clamp(range.0, range.1);
         Self { range, value, orders, calm: 0, patience: PATIENCE.0, coarsened_from: None }
     }
@@ -92,7 +103,7 @@ impl Stair {
     }
 
     /// Updates the value with an error of which at most `allowed_m` is allowed; gives whether the value has changed (eq. 35, 36).
-    fn learn(&mut self, error_m: f64, allowed_m: f64) -> bool {
+    fn update(&mut self, error_m: f64, allowed_m: f64) -> bool {
         let before = self.value;
         if error_m > allowed_m {
             self.refine(error_m, allowed_m);
@@ -112,7 +123,7 @@ impl Stair {
 
     fn refine(&mut self, error_m: f64, allowed_m: f64) {
         self.calm = 0;
-        let wanted = libm::pow(SET * allowed_m / error_m, 1.0 / self.orders.1).max(1.0 / REFINE_MAX);
+        let wanted = libm::pow(SET * allowed_m / error_m, 1.0 / self.orders.least).max(1.0 / REFINE_MAX);
         self.value = (self.value * wanted).max(self.range.0);
         if let Some(from) = self.coarsened_from.take() {
             self.patience = (2 * self.patience).min(PATIENCE.1);
@@ -126,7 +137,7 @@ impl Stair {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
         if error_m < LEAST * allowed_m && self.calm >= self.patience {
-            let wanted = libm::pow(SET * allowed_m / error_m.max(f64::MIN_POSITIVE), 1.0 / self.orders.0);
+            let wanted = libm::pow(SET * allowed_m / error_m.max(f64::MIN_POSITIVE), 1.0 / self.orders.greatest);
             self.value = (self.value * wanted.min(COARSEN_MAX)).min(self.range.1);
         }
     }
@@ -136,10 +147,10 @@ impl ErrorControl {
     /// A controller of an agent with the present dt and ε of `now`.
     #[must_use]
     pub fn new(limits: &ErrorLimits, now: RateDemand) -> Self {
-        let eps = limits.eps_m.zip(now.eps_m).map(|(range, eps)| Stair::new(range, eps, (2.0, 2.0)));
+        let eps = limits.eps_m.zip(now.eps_m).map(|(range, eps)| ControlledValue::new(range, eps, ORDERS_OF_EPS));
         Self {
             tolerance_m: limits.tolerance_m,
-            dt: Stair::new(limits.dt_s, now.dt_s, (2.0, 1.0)),
+            dt: ControlledValue::new(limits.dt_s, now.dt_s, ORDERS_OF_DT),
             eps,
             turns: 0,
             span_s: 0.0,
@@ -176,15 +187,15 @@ impl ErrorControl {
     /// Evaluates a window; gives whether anything is to change (eq. 34).
     fn decide(&mut self, space_m: f64, time_m: f64) -> bool {
         let whole = self.tolerance_m;
-        let left = |other: &Stair, error_m: f64| {
+        let left = |other: &ControlledValue, error_m: f64| {
             let least = if other.is_finest() { 0.0 } else { 0.5 * whole };
             (whole - error_m).max(least)
         };
         let for_time = self.eps.as_ref().map_or((whole - space_m).max(0.0), |eps| left(eps, space_m));
         let for_space = left(&self.dt, time_m);
-        let mut changed = self.dt.learn(time_m, for_time);
+        let mut changed = self.dt.update(time_m, for_time);
         if let Some(eps) = &mut self.eps {
-            changed |= eps.learn(space_m, for_space);
+            changed |= eps.update(space_m, for_space);
         }
         let finest = self.dt.is_finest() && self.eps.is_none_or(|eps| eps.is_finest());
         let coarsest = self.dt.is_coarsest() && self.eps.is_none_or(|eps| eps.is_coarsest());

@@ -29,7 +29,7 @@ impl Overlap {
                 rho * rho * frame / c.max(f64::MIN_POSITIVE)
             }
             Self::Fitted(kappa) => {
-                let kappa = crate::within(kappa, (0.0, 1.0));
+                let kappa = crate::within(kappa, 0.0, 1.0);
                 let longer = frame - kappa * logic;
                 // if drawing were the shorter of the two, it would be what lengthens the logic
                 if longer >= logic { longer } else { ((frame - logic) / kappa).min(logic) }
@@ -54,6 +54,6 @@ impl Overlap {
                 below += less * less;
             }
         }
-        Self::Fitted(if below > 0.0 { crate::within(above / below, (0.0, 1.0)) } else { 1.0 })
+        Self::Fitted(if below > 0.0 { crate::within(above / below, 0.0, 1.0) } else { 1.0 })
     }
 }

@@ -32,7 +32,7 @@ impl Pipeline {
     #[must_use]
     pub fn split(&self, cull: f64) -> Split {
         let lag = if self.lag.is_finite() && self.lag > 0.0 { self.lag } else { 0.0 };
-        let share = crate::within(self.share, (0.0, 1.0));
+        let share = crate::within(self.share, 0.0, 1.0);
         let cull = if cull.is_finite() { cull.max(0.0) } else { lag };
         let rest = (lag - cull).max(0.0);
         let choose = share * rest;

@@ -82,7 +82,7 @@ struct Path<'a> {
 
 impl<'a> Path<'a> {
     fn from(budget: f64, meshes: &'a [Mesh], last: &[f64]) -> Self {
-        let start = |at: usize, m: &Mesh| crate::within(*last.get(at).unwrap_or(&m.most), (m.least, m.most));
+        let start = |at: usize, m: &Mesh| crate::within(*last.get(at).unwrap_or(&m.most), m.least, m.most);
         let free: Vec<_> = meshes
             .iter()
             .enumerate()
@@ -131,7 +131,7 @@ impl<'a> Path<'a> {
     fn move_inside(&mut self) {
         for f in &mut self.free {
             let margin = 0.1 * (f.mesh.most - f.mesh.least);
-            f.r = crate::within(f.r, (f.mesh.least + margin, f.mesh.most - margin));
+            f.r = crate::within(f.r, f.mesh.least + margin, f.mesh.most - margin);
         }
         let least: f64 = self.free.iter().map(|f| f.mesh.time * f.mesh.least).sum();
         let (room, used) = (self.budget - least, self.budget - self.slack() - least);
@@ -188,7 +188,7 @@ impl<'a> Path<'a> {
         let lambda = if slack > 0.0 { self.epsilon / slack } else { 0.0 };
         let best = |f: &Free| {
             let root = 0.5 * f.mesh.weight / (lambda * f.mesh.time);
-            let r = crate::within(root * root, (f.mesh.least, f.mesh.most));
+            let r = crate::within(root * root, f.mesh.least, f.mesh.most);
             f.mesh.weight * libm::sqrt(r) - lambda * f.mesh.time * r
         };
         let upper = self.settled + lambda * self.budget + self.free.iter().map(best).sum::<f64>();
@@ -203,7 +203,7 @@ impl<'a> Path<'a> {
 
     fn resolutions(&self) -> Vec<f64> {
         let mut r: Vec<_> = self.meshes.iter().map(at_rest).collect();
-        self.free.iter().for_each(|f| r[f.at] = crate::within(f.r, (f.mesh.least, f.mesh.most)));
+        self.free.iter().for_each(|f| r[f.at] = crate::within(f.r, f.mesh.least, f.mesh.most));
         r
     }
 }

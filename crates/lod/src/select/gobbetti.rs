@@ -5,7 +5,7 @@
 
 use alloc::vec::Vec;
 
-use super::water::{Tap, level};
+use super::water::{Claim, level};
 
 /// A mesh whose triangle count is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,10 +34,10 @@ impl Mesh {
         }
     }
 
-    fn tap(&self) -> Tap {
+    fn claim(&self) -> Claim {
         // r = μ (w/a)², eq. 22
         let growth = if self.time > 0.0 { (self.weight / self.time) * (self.weight / self.time) } else { self.weight };
-        Tap { growth, price: self.time, least: self.least, most: self.most }
+        Claim { growth, price: self.time, least: self.least, most: self.most }
     }
 }
 
@@ -61,9 +61,9 @@ pub struct Resolutions {
 /// Maximises Σ w √r under `fixed` + Σ a r ≤ `time`: exact up to rounding, in linear time. Meshes as [`Mesh::sound`] gives them.
 #[must_use]
 pub fn closed_form(time: f64, fixed: f64, meshes: &[Mesh]) -> Resolutions {
-    let taps: Vec<_> = meshes.iter().map(Mesh::tap).collect();
-    let mu = level(time - fixed, &taps);
-    let r: Vec<_> = taps.iter().map(|t| mu.map_or(t.least, |mu| t.at(mu))).collect();
+    let claims: Vec<_> = meshes.iter().map(Mesh::claim).collect();
+    let mu = level(time - fixed, &claims);
+    let r: Vec<_> = claims.iter().map(|t| mu.map_or(t.least, |mu| t.at(mu))).collect();
     let value = value(meshes, &r);
     let lambda = match mu {
         Some(mu) if mu.is_finite() && mu > 0.0 => 0.5 / libm::sqrt(mu), // μ = 1/(4 λ²)

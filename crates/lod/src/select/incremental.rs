@@ -80,7 +80,7 @@ impl<'a> Search<'a> {
         let mut search =
             Self { problem, levels, spent, value, best, rises: BinaryHeap::new(), falls: BinaryHeap::new() };
         (0..problem.len()).for_each(|i| search.offer(i));
-        search.remember();
+        search.keep_best();
         search
     }
 
@@ -95,7 +95,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        self.remember();
+        self.keep_best();
         last
     }
 
@@ -144,7 +144,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn remember(&mut self) {
+    fn keep_best(&mut self) {
         if self.spent <= self.problem.budget() && self.value > self.best.0 {
             self.best.0 = self.value;
             self.best.1.clone_from(&self.levels);

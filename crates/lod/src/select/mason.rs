@@ -93,7 +93,7 @@ impl<'a> Search<'a> {
         for (node, level) in start.into_iter().enumerate().filter(|(_, l)| l.is_some()) {
             search.set(node, level);
         }
-        search.remember();
+        search.keep_best();
         search
     }
 
@@ -108,7 +108,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        self.remember();
+        self.keep_best();
         last
     }
 
@@ -175,7 +175,7 @@ impl<'a> Search<'a> {
         self.spent = self.spent - from.cost + to.cost;
         self.value = self.value - from.benefit + to.benefit;
         self.levels[node] = level;
-        self.tell_parent(node, was_lowest);
+        self.update_parents(node, was_lowest);
         let Some(held) = level else { return };
         let above = held + 1;
         let finer = (above as usize) < self.tree.impostors(node).len();
@@ -199,7 +199,7 @@ impl<'a> Search<'a> {
     }
 
     /// Updates upwards how many children of each parent are at their lowest.
-    fn tell_parent(&mut self, node: usize, was_lowest: bool) {
+    fn update_parents(&mut self, node: usize, was_lowest: bool) {
         let (mut node, mut was) = (node, was_lowest);
         while let Some(parent) = self.tree.parent(node) {
             let is = self.at_lowest(node);
@@ -215,7 +215,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn remember(&mut self) {
+    fn keep_best(&mut self) {
         if self.spent <= self.tree.budget() && self.best.as_ref().is_none_or(|b| self.value > b.0) {
             self.best = Some((self.value, self.levels.clone()));
         }

@@ -18,36 +18,36 @@ pub fn flat(tree: &Tree) -> Cut {
     if let Some(cut) = infeasible(tree) {
         return cut;
     }
-    let mut sack = Sack::of(tree);
-    for at in 0..sack.items.len() {
-        sack.consider(at);
+    let mut knapsack = Knapsack::of(tree);
+    for at in 0..knapsack.items.len() {
+        knapsack.consider(at);
     }
-    match sack.levels() {
+    match knapsack.levels() {
         Some(levels) => tree.judge(levels),
         // no covering set fitted in the order of the scan
         None => tree.judge(cheapest(tree)),
     }
 }
 
-struct Sack<'a> {
+struct Knapsack<'a> {
     tree: &'a Tree,
     /// All impostors in falling benefit per cost: rank, node, level.
     items: Vec<(Rank, usize, u32)>,
     /// For each node: its leaves, numbered from left to right.
     leaves: Vec<Range<usize>>,
     /// For each leaf: the item that covers it; initially one virtual item for all, without cost and benefit.
-    held: Vec<Option<usize>>,
+    covered_by: Vec<Option<usize>>,
     spent: u64,
 }
 
-impl<'a> Sack<'a> {
+impl<'a> Knapsack<'a> {
     fn of(tree: &'a Tree) -> Self {
         let of = |node| (0..).zip(tree.impostors(node)).map(move |(l, _)| (tree.rank(node, l), node, l));
         let mut items: Vec<_> = (0..tree.len()).flat_map(of).collect();
         items.sort_unstable();
         let leaves = leaves(tree);
-        let held = alloc::vec![None; leaves.first().map_or(0, |all| all.len())];
-        Self { tree, items, leaves, held, spent: 0 }
+        let covered_by = alloc::vec![None; leaves.first().map_or(0, |all| all.len())];
+        Self { tree, items, leaves, covered_by, spent: 0 }
     }
 
     fn consider(&mut self, at: usize) {
@@ -70,20 +70,20 @@ impl<'a> Sack<'a> {
         if value > old_value && self.spent - old_cost + cost <= self.tree.budget() {
             self.spent = self.spent - old_cost + cost;
             for item in set {
-                self.held[self.leaves[self.items[item].1].clone()].fill(Some(item));
+                self.covered_by[self.leaves[self.items[item].1].clone()].fill(Some(item));
             }
         }
     }
 
     /// The items that cover some of these leaves, each once.
     fn met(&self, leaves: &Range<usize>) -> Vec<Option<usize>> {
-        let mut met = self.held[leaves.clone()].to_vec();
+        let mut met = self.covered_by[leaves.clone()].to_vec();
         met.dedup(); // an item's leaves are neighbours
         met
     }
 
     fn covers(&self, item: Option<usize>) -> Range<usize> {
-        item.map_or(0..self.held.len(), |item| self.leaves[self.items[item].1].clone())
+        item.map_or(0..self.covered_by.len(), |item| self.leaves[self.items[item].1].clone())
     }
 
     /// Item `at` and the best remaining ones that cover the rest of `all`; `None` if they cannot.
@@ -113,7 +113,7 @@ impl<'a> Sack<'a> {
     /// The cut, if every leaf is covered.
     fn levels(&self) -> Option<Vec<Level>> {
         let mut levels = alloc::vec![None; self.tree.len()];
-        for item in &self.held {
+        for item in &self.covered_by {
             let (_, node, level) = self.items[(*item)?];
             levels[node] = Some(level);
         }

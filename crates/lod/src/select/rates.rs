@@ -5,7 +5,7 @@
 
 use alloc::vec::Vec;
 
-use super::water::{Tap, level};
+use super::water::{Claim, level};
 
 /// An agent whose rate is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,13 +37,13 @@ pub struct Rates {
 #[must_use]
 pub fn rates(load: f64, agents: &[Agent]) -> Rates {
     // f = √(w/(λ c)) inside its limits: a level ν = 1/√λ for all
-    let tap = |a: &Agent| {
+    let claim = |a: &Agent| {
         let growth = if a.step_s > 0.0 { libm::sqrt(a.weight / a.step_s) } else { a.weight };
-        Tap { growth, price: a.step_s, least: a.least_hz, most: a.most_hz }
+        Claim { growth, price: a.step_s, least: a.least_hz, most: a.most_hz }
     };
-    let taps: Vec<_> = agents.iter().map(tap).collect();
-    let nu = level(load, &taps);
-    let f_hz: Vec<_> = taps.iter().map(|t| nu.map_or(t.least, |nu| t.at(nu))).collect();
+    let claims: Vec<_> = agents.iter().map(claim).collect();
+    let nu = level(load, &claims);
+    let f_hz: Vec<_> = claims.iter().map(|t| nu.map_or(t.least, |nu| t.at(nu))).collect();
     let error = agents.iter().zip(&f_hz).filter(|(a, _)| a.weight > 0.0).map(|(a, f)| a.weight / f).sum();
     let lambda = nu.map_or(0.0, |nu| if nu > 0.0 { 1.0 / (nu * nu) } else { 0.0 });
     Rates { f_hz, error, lambda, feasible: nu.is_some() }

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ratios_beyond_the_precision_of_doubles_are_told_apart() {
+    fn ratios_beyond_the_precision_of_doubles_are_distinguished() {
         let (a, b) = (Ratio { benefit: (1 << 53) + 1, cost: 1 << 53 }, Ratio { benefit: 1, cost: 1 });
         assert!(a > b, "as doubles both are {} {}", a.value(), b.value());
     }

@@ -54,7 +54,7 @@ impl Feedback {
         let sound = took.is_finite() && took >= 0.0 && target.is_finite() && target > 0.0;
         if sound {
             let moved = self.threshold_px * libm::exp(0.5 * (took - target) / target);
-            self.threshold_px = crate::within(moved, (1.0, 2e5));
+            self.threshold_px = crate::within(moved, 1.0, 2e5);
         }
         sound
     }

@@ -42,11 +42,12 @@ pub fn lagrange(tree: &Tree) -> Cut {
 #[derive(Clone, Copy)]
 struct Vertex {
     entry: Entry,
-    made: Made,
+    origin: Origin,
 }
 
+/// What a vertex stands for.
 #[derive(Clone, Copy)]
-enum Made {
+enum Origin {
     /// One of the node's own impostors.
     Impostor(u32),
     /// The children's hulls, after this many of their steps.
@@ -85,15 +86,15 @@ impl Hulls {
 
     /// The hull of a node's impostors and of the sums of its children's hulls.
     fn join(&self, tree: &Tree, node: usize) -> Hull {
-        let mut points: Vec<_> = (0..).zip(tree.impostors(node)).map(|(l, &e)| (e, Made::Impostor(l))).collect();
+        let mut points: Vec<_> = (0..).zip(tree.impostors(node)).map(|(l, &e)| (e, Origin::Impostor(l))).collect();
         let steps = self.steps(tree, node);
         if !tree.children(node).is_empty() {
             let first = |&child: &usize| self.of[child].vertices[0].entry;
             let mut sum = tree.children(node).iter().map(first).fold(Entry::default(), add);
-            points.push((sum, Made::Steps(0)));
+            points.push((sum, Origin::Steps(0)));
             for (taken, &(_, gain)) in (1..).zip(&steps) {
                 sum = add(sum, gain);
-                points.push((sum, Made::Steps(taken)));
+                points.push((sum, Origin::Steps(taken)));
             }
         }
         let vertices = hull_of(&points);
@@ -130,9 +131,9 @@ impl Hulls {
         let mut levels = alloc::vec![None; tree.len()];
         let mut open: Vec<_> = (!tree.is_empty()).then_some((0, vertex)).into_iter().collect();
         while let Some((node, vertex)) = open.pop() {
-            match self.of[node].vertices[vertex].made {
-                Made::Impostor(level) => levels[node] = Some(level),
-                Made::Steps(taken) => {
+            match self.of[node].vertices[vertex].origin {
+                Origin::Impostor(level) => levels[node] = Some(level),
+                Origin::Steps(taken) => {
                     let steps = &self.of[node].steps[..taken as usize];
                     let of = |child: usize| steps.iter().filter(|&&s| s as usize == child).count();
                     open.extend(tree.children(node).iter().map(|&child| (child, of(child))));
@@ -144,14 +145,14 @@ impl Hulls {
 }
 
 /// The vertices of the concave hull of points, from the cheapest on.
-fn hull_of(points: &[(Entry, Made)]) -> Vec<Vertex> {
+fn hull_of(points: &[(Entry, Origin)]) -> Vec<Vertex> {
     let least = points.iter().copied().min_by_key(|(e, _)| (e.cost, u64::MAX - e.benefit));
-    let Some((entry, made)) = least else { return Vec::new() };
+    let Some((entry, origin)) = least else { return Vec::new() };
     let entries: Vec<_> = points.iter().map(|p| p.0).collect();
     let mut above = Vec::new();
     concave(entry, &entries, u64::MAX, &mut above);
-    let rest = above.iter().map(|&(i, entry)| Vertex { entry, made: points[i as usize].1 });
-    core::iter::once(Vertex { entry, made }).chain(rest).collect()
+    let rest = above.iter().map(|&(i, entry)| Vertex { entry, origin: points[i as usize].1 });
+    core::iter::once(Vertex { entry, origin }).chain(rest).collect()
 }
 
 fn add(a: Entry, b: Entry) -> Entry {
@@ -166,11 +167,12 @@ fn less(a: Entry, b: Entry) -> Entry {
 #[derive(Clone, Copy)]
 struct State {
     entry: Entry,
-    from: From,
+    parts: Parts,
 }
 
+/// The parts that a state joins.
 #[derive(Clone, Copy)]
-enum From {
+enum Parts {
     Nothing,
     Impostor(u32, u32),
     Both(u32, u32),
@@ -184,11 +186,11 @@ pub fn exact(tree: &Tree, states_max: usize) -> Result<Cut, TooHard> {
     if let Some(infeasible) = infeasible(tree) {
         return Ok(infeasible);
     }
-    let mut arena = alloc::vec![State { entry: Entry::default(), from: From::Nothing }];
+    let mut arena = alloc::vec![State { entry: Entry::default(), parts: Parts::Nothing }];
     let mut of: Vec<Vec<u32>> = alloc::vec![Vec::new(); tree.len()];
     for &node in tree.order().iter().rev() {
         let impostors = (0..).zip(tree.impostors(node));
-        let own = impostors.map(|(l, &entry)| State { entry, from: From::Impostor(node as u32, l) });
+        let own = impostors.map(|(l, &entry)| State { entry, parts: Parts::Impostor(node as u32, l) });
         let mut list = keep(&mut arena, own.collect(), tree.budget());
         if !tree.children(node).is_empty() {
             let mut parts = alloc::vec![0];
@@ -212,7 +214,7 @@ pub fn exact(tree: &Tree, states_max: usize) -> Result<Cut, TooHard> {
 fn product(arena: &mut Vec<State>, a: &[u32], b: &[u32], budget: u64) -> Vec<u32> {
     let pair = |&(i, j): &(u32, u32)| State {
         entry: add(arena[i as usize].entry, arena[j as usize].entry),
-        from: From::Both(i, j),
+        parts: Parts::Both(i, j),
     };
     let states = a.iter().flat_map(|&i| b.iter().map(move |&j| (i, j))).map(|p| pair(&p)).collect();
     keep(arena, states, budget)
@@ -252,10 +254,10 @@ fn trace(tree: &Tree, arena: &[State], last: u32) -> Vec<Level> {
     let mut levels = alloc::vec![None; tree.len()];
     let mut open = alloc::vec![last];
     while let Some(i) = open.pop() {
-        match arena[i as usize].from {
-            From::Nothing => {}
-            From::Impostor(node, level) => levels[node as usize] = Some(level),
-            From::Both(a, b) => open.extend([a, b]),
+        match arena[i as usize].parts {
+            Parts::Nothing => {}
+            Parts::Impostor(node, level) => levels[node as usize] = Some(level),
+            Parts::Both(a, b) => open.extend([a, b]),
         }
     }
     levels

@@ -1,13 +1,13 @@
 //! Water filling: one level μ for all, x = k μ inside its limits, Σ a x equal to the budget, exactly and in linear time.
 //!
-//! In: [`Tap`]s and a budget. Out: μ. Never here: the meaning of x ([`super::gobbetti`], [`super::rates`]), or iteration to a tolerance
+//! In: [`Claim`]s and a budget. Out: μ. Never here: the meaning of x ([`super::gobbetti`], [`super::rates`]), or iteration to a tolerance
 //! ([`crate::share`] does that from a good guess). Theory: `docs/theory/budget.md`, eq. 22 and 23.
 
 use alloc::vec::Vec;
 
 /// One unknown x that grows with the level μ.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tap {
+pub struct Claim {
     /// k: growth of x with μ; finite, ≥ 0.
     pub growth: f64,
     /// a: budget per unit of x; finite, ≥ 0.
@@ -18,14 +18,14 @@ pub struct Tap {
     pub most: f64,
 }
 
-impl Tap {
+impl Claim {
     /// x at level `mu`: k μ inside its limits. With a price of 0, x is at its most; with a growth of 0, at its least.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
         if self.price == 0.0 && self.growth > 0.0 {
             return self.most;
         }
-        if self.growth == 0.0 { self.least } else { crate::within(self.growth * mu, (self.least, self.most)) }
+        if self.growth == 0.0 { self.least } else { crate::within(self.growth * mu, self.least, self.most) }
     }
 
     fn ends(&self) -> (f64, f64) {
@@ -35,20 +35,20 @@ impl Tap {
 
 /// μ at which Σ a x(μ) is the budget; infinite if the budget pays for every most; `None` if it does not pay for every least.
 ///
-/// The sum spent is piecewise linear and rising, with two breaks per tap. Each pass rules out half of the remaining breaks, and with them
-/// the taps that are wholly on one side: linear time in all.
+/// The sum spent is piecewise linear and rising, with two breaks per claim. Each pass rules out half of the remaining breaks, and with them
+/// the claims that are wholly on one side: linear time in all.
 #[must_use]
-pub fn level(budget: f64, taps: &[Tap]) -> Option<f64> {
-    let total = |x: fn(&Tap) -> f64| taps.iter().map(|t| t.price * x(t)).sum::<f64>();
+pub fn level(budget: f64, claims: &[Claim]) -> Option<f64> {
+    let total = |x: fn(&Claim) -> f64| claims.iter().map(|t| t.price * x(t)).sum::<f64>();
     if total(|t| t.at(0.0)) > budget || budget.is_nan() {
         return None;
     }
     if total(|t| t.at(f64::INFINITY)) <= budget {
         return Some(f64::INFINITY);
     }
-    let mut left: Vec<Tap> = taps.iter().copied().filter(|t| t.price > 0.0 && t.growth > 0.0).collect();
-    // spent = settled + slope μ + the sum of the taps left
-    let mut settled: f64 = taps.iter().filter(|t| t.price > 0.0 && t.growth == 0.0).map(|t| t.price * t.least).sum();
+    let mut left: Vec<Claim> = claims.iter().copied().filter(|t| t.price > 0.0 && t.growth > 0.0).collect();
+    // spent = settled + slope μ + the sum of the claims left
+    let mut settled: f64 = claims.iter().filter(|t| t.price > 0.0 && t.growth == 0.0).map(|t| t.price * t.least).sum();
     let (mut slope, mut low, mut high) = (0.0, 0.0, f64::INFINITY);
     let mut breaks: Vec<f64> = left.iter().flat_map(|t| [t.ends().0, t.ends().1]).collect();
     while !breaks.is_empty() {
@@ -73,5 +73,5 @@ pub fn level(budget: f64, taps: &[Tap]) -> Option<f64> {
         });
     }
     let mu = if slope > 0.0 { (budget - settled) / slope } else { low };
-    Some(crate::within(mu, (low, high)))
+    Some(crate::within(mu, low, high))
 }

@@ -6,6 +6,7 @@
 use super::margins::Loop;
 use super::plant::Plant;
 use super::play::{Start, Trial, play};
+use crate::adaptive::{DEFAULT_MARGIN, SIGMA_LEAST, WANDER};
 use crate::control::{Law, PictureControl, Policy, Prices, Stages};
 
 /// A controller that can be judged.
@@ -20,10 +21,6 @@ pub enum Candidate {
     },
 }
 
-/// Least process noise of κ per frame, for uncorrelated errors, and least deviation of a measurement, as in (budget.md, eq. 34 … 36).
-const WANDER: f64 = 2e-4;
-const SIGMA_LEAST: f64 = 0.01;
-
 impl From<Law> for Candidate {
     fn from(law: Law) -> Self {
         Self::Feedback(law)
@@ -32,7 +29,7 @@ impl From<Law> for Candidate {
 
 impl Candidate {
     /// The policy with the margin of scenes that do not set one.
-    pub const ADAPTIVE: Self = Self::Adaptive { margin: 0.02 };
+    pub const ADAPTIVE: Self = Self::Adaptive { margin: DEFAULT_MARGIN };
 
     /// Target work as a fraction of the frame's time: T_set/T.
     #[must_use]
@@ -66,7 +63,7 @@ impl Candidate {
     #[must_use]
     pub fn local_loop(self, plant: &Plant, target_hz: f64, speed: f64) -> Option<Loop> {
         let set_s = self.set_share() / target_hz;
-        if !plant.reach(speed).holds(set_s) {
+        if !plant.time_range(speed).contains(set_s) {
             return None;
         }
         let share = plant.share(set_s, speed);
@@ -90,13 +87,14 @@ fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
         return 0.0;
     }
     let sigma = (plant.line.scatter * set_s * target_hz).max(SIGMA_LEAST);
-    let ratio = WANDER * (table_s * target_hz / sigma) * (table_s * target_hz / sigma);
+    // errors of the simulated plant do not correlate: the process noise is at its least
+    let ratio = WANDER.0 * (table_s * target_hz / sigma) * (table_s * target_hz / sigma);
     let filter = 0.5 * ((ratio * ratio + 4.0 * ratio).sqrt() - ratio);
     filter * (set_s - fixed_s / speed) / chosen_s
 }
 
 /// The starting ε̂ of a law that is placed at the target time.
-fn rest_of(contender: Candidate, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
-    let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(contender, target_hz) };
-    play(plant, &trial).first().map_or(1.0, |beat| beat.eps_hat)
+fn rest_of(candidate: Candidate, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
+    let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(candidate, target_hz) };
+    play(plant, &trial).first().map_or(1.0, |frame| frame.eps_hat)
 }

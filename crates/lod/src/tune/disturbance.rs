@@ -44,7 +44,7 @@ impl Disturbance {
 
     /// Whether the disturbance depends on the seed.
     #[must_use]
-    pub fn is_by_chance(self) -> bool {
+    pub fn is_random(self) -> bool {
         self == Self::Spikes
     }
 
@@ -61,7 +61,7 @@ impl Disturbance {
     }
 
     /// Changes the objects in view after the fraction `passed` of the trial.
-    pub fn look(self, passed: f64, views: &mut [ObjectView]) {
+    pub fn apply_to_views(self, passed: f64, views: &mut [ObjectView]) {
         if self != Self::CameraTurn || !in_the_middle(passed) {
             return;
         }
@@ -81,9 +81,9 @@ fn in_the_middle(passed: f64) -> bool {
 
 /// Random numbers that are identical on every machine.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Dice(u64);
+pub(super) struct Random(u64);
 
-impl Dice {
+impl Random {
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_come_and_go_and_a_speed_stays() {
+    fn a_load_ends_and_a_speed_stays() {
         let at = |d: Disturbance, passed| d.load(passed, 0.5);
         assert_eq!([0.1, 0.5, 0.9].map(|p| at(Disturbance::Load(1.4), p)), [1.0, 1.4, 1.0]);
         assert_eq!([0.1, 0.5, 0.9].map(|p| at(Disturbance::Speed(2.0), p)), [1.0, 0.5, 0.5]);
@@ -117,12 +117,12 @@ mod tests {
     }
 
     #[test]
-    fn the_dice_are_uniform_and_normal() {
-        let mut dice = Dice::new(7);
+    fn random_numbers_are_uniform_and_normal() {
+        let mut random = Random::new(7);
         let n = 20_000;
-        let mean = (0..n).map(|_| dice.uniform()).sum::<f64>() / f64::from(n);
+        let mean = (0..n).map(|_| random.uniform()).sum::<f64>() / f64::from(n);
         assert!((mean - 0.5).abs() < 0.01, "{mean}");
-        let (sum, square) = (0..n).map(|_| dice.normal()).fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
+        let (sum, square) = (0..n).map(|_| random.normal()).fold((0.0, 0.0), |(s, q), x| (s + x, q + x * x));
         assert!((sum / f64::from(n)).abs() < 0.03 && (square / f64::from(n) - 1.0).abs() < 0.05);
     }
 }

@@ -1,6 +1,6 @@
 //! Fixed points of a loop: every state at which the time is on target and a small error decays.
 //!
-//! In: a plant, a contender, a target. Out: its fixed points. For feedback the open loop is swept through its whole range; n = ⌊ρ⌋ makes
+//! In: a plant, a candidate, a target. Out: its fixed points. For feedback the open loop is swept through its whole range; n = ⌊ρ⌋ makes
 //! frames slower where ε̂ grows, so there can be two. Never here: the way to a fixed point.
 //! Theory: `docs/theory/control.md`, eq. 2, 4 and 6.
 
@@ -27,26 +27,26 @@ const FACTOR: f64 = 1.002;
 /// Steps of the printed law at most: from 1e-9 to 1e9.
 const STEPS_MAX: usize = 20_000;
 /// α used to sweep the printed law: the frame rate is then far from 0 whatever the step.
-const LEADING: f64 = 1e-2;
+const SWEEP_ALPHA: f64 = 1e-2;
 /// Time after which a predicting policy counts as settled, seconds.
 const REST_S: f64 = 5.0;
 
-/// The fixed points of `contender` on `plant` at `target_hz`, by rising ε̂.
+/// The fixed points of `candidate` on `plant` at `target_hz`, by rising ε̂.
 #[must_use]
-pub fn fixed_points(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<FixedPoint> {
-    let set_s = contender.set_share() / target_hz;
-    match contender {
-        Candidate::Feedback(Law::Corrected { .. }) => rests(&along_the_range(plant, contender, target_hz), set_s),
+pub fn fixed_points(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<FixedPoint> {
+    let set_s = candidate.set_share() / target_hz;
+    match candidate {
+        Candidate::Feedback(Law::Corrected { .. }) => crossings(&along_the_range(plant, candidate, target_hz), set_s),
         Candidate::Feedback(Law::Printed { beta, .. }) => {
-            rests(&along_the_line(plant, contender, target_hz, beta), set_s)
+            crossings(&along_the_line(plant, candidate, target_hz, beta), set_s)
         }
-        Candidate::Adaptive { .. } => where_it_ends(plant, contender, target_hz),
+        Candidate::Adaptive { .. } => end_of_calm_trial(plant, candidate, target_hz),
     }
 }
 
 /// (ε̂, seconds) over the range of the corrected law, finest first.
-fn along_the_range(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<(f64, f64)> {
-    let mut control = contender.control(plant, target_hz);
+fn along_the_range(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<(f64, f64)> {
+    let mut control = candidate.control(plant, target_hz);
     control.plan(plant.views(0));
     let place = |step: usize| {
         control.seek(step as f64 / STEPS as f64);
@@ -57,11 +57,11 @@ fn along_the_range(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<(
 }
 
 /// (ε̂, seconds) along the line ρ − β ε̂ = constant on which the printed law moves from its start, finest first.
-fn along_the_line(plant: &Plant, contender: Candidate, target_hz: f64, beta: f64) -> Vec<(f64, f64)> {
-    let mut control = contender.control(plant, target_hz);
+fn along_the_line(plant: &Plant, candidate: Candidate, target_hz: f64, beta: f64) -> Vec<(f64, f64)> {
+    let mut control = candidate.control(plant, target_hz);
     control.plan(plant.views(0));
-    control.set_law(Law::Printed { alpha: LEADING, beta });
-    lead(&mut control, target_hz, -1e6);
+    control.set_law(Law::Printed { alpha: SWEEP_ALPHA, beta });
+    step_printed_law(&mut control, target_hz, -1e6);
     let mut places: Vec<(f64, f64)> = Vec::new();
     for _ in 0..STEPS_MAX {
         let seconds = plant.seconds(control.plan(plant.views(0)).polygons, 1.0);
@@ -70,20 +70,20 @@ fn along_the_line(plant: &Plant, contender: Candidate, target_hz: f64, beta: f64
             break;
         }
         places.push((eps_hat, seconds));
-        lead(&mut control, target_hz, (FACTOR - 1.0) * eps_hat);
+        step_printed_law(&mut control, target_hz, (FACTOR - 1.0) * eps_hat);
     }
     places
 }
 
 /// Moves the printed law by `by` in ε̂, and n with it: f₀ − f = by/α.
-fn lead(control: &mut PictureControl, target_hz: f64, by: f64) {
-    let rate_hz = (target_hz - by / LEADING).clamp(1e-3 * target_hz, 1e8);
+fn step_printed_law(control: &mut PictureControl, target_hz: f64, by: f64) {
+    let rate_hz = (target_hz - by / SWEEP_ALPHA).clamp(1e-3 * target_hz, 1e8);
     let work = Duration::from_secs_f64(1.0 / rate_hz);
     control.observe(FrameWork { work, draw: work, skip: false });
 }
 
 /// The points at which the time falls through `set_s` as ε̂ rises, and ends of the range that a law would pass.
-fn rests(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
+fn crossings(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
     let (Some(&finest), Some(&coarsest)) = (places.first(), places.last()) else { return Vec::new() };
     let end = |(eps_hat, seconds): (f64, f64)| FixedPoint { eps_hat, ratio: seconds / set_s, clamped: true };
     let falls = places.windows(2).filter(|w| w[0].1 > set_s && w[1].1 <= set_s);
@@ -99,12 +99,12 @@ fn rests(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
 }
 
 /// The single fixed point of a predicting policy, which budgets by its prediction: the end of a calm trial.
-fn where_it_ends(plant: &Plant, contender: Candidate, target_hz: f64) -> Vec<FixedPoint> {
-    let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::calm(contender, target_hz) };
-    let last = play(plant, &trial).last().map(|beat| FixedPoint {
-        eps_hat: beat.eps_hat,
-        ratio: beat.ratio,
-        clamped: beat.status.clamped().is_some(),
+fn end_of_calm_trial(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<FixedPoint> {
+    let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::calm(candidate, target_hz) };
+    let last = play(plant, &trial).last().map(|frame| FixedPoint {
+        eps_hat: frame.eps_hat,
+        ratio: frame.ratio,
+        clamped: frame.status.clamped().is_some(),
     });
     last.into_iter().collect()
 }
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn the_corrected_law_has_one_place_to_rest_and_it_is_where_the_line_says() {
+    fn the_corrected_law_has_one_fixed_point_on_the_fitted_line() {
         let points = fixed_points(&plant((0, 5)), Law::CORRECTED.into(), 30.0);
         let expected = 480.0 * POLYGON_S / (0.9 / 30.0 - FIXED_S);
         assert_eq!(points.len(), 1, "{points:?}");
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_floor_of_rho_makes_two_places_and_each_is_on_its_own_flat() {
+    fn the_floor_of_rho_makes_two_fixed_points_each_on_its_own_level() {
         // from the middle of the range: ε̂ₙ = 480 · 2ⁿ c/(T − a) wherever ⌊ρ₀ + β (ε̂ₙ − ε̂₀)⌋ is n
         let plant = plant((0, 5));
         let view = plant.views(0)[0];
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_target_past_the_range_rests_on_its_end() {
+    fn a_target_beyond_the_range_has_its_fixed_point_at_the_end() {
         let points = fixed_points(&plant((0, 5)), Law::CORRECTED.into(), 190.0);
         assert!(matches!(points[..], [FixedPoint { clamped: true, .. }]) && points[0].ratio > 1.0, "{points:?}");
     }

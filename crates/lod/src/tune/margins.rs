@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_delay_an_error_shrinks_by_one_less_the_gain() {
+    fn without_delay_an_error_shrinks_by_one_minus_the_gain() {
         for gain in [0.1, 0.5, 1.5, 1.9] {
             assert!((integrator(gain, 0).radius() - (1.0_f64 - gain).abs()).abs() < 1e-9, "{gain}");
         }
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_integrator_swings_from_two_sines_on() {
+    fn a_delayed_integrator_oscillates_beyond_its_critical_gain() {
         // zᵈ⁺¹ − zᵈ + g has a root on the unit circle at g = 2 sin(π/(2(2d+1))) (control.md, eq. 28)
         for dead_time in 0..5 {
             let boundary = 2.0 * libm::sin(std::f64::consts::PI / (2.0 * (2.0 * dead_time as f64 + 1.0)));
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn the_radius_is_what_the_loop_itself_does() {
+    fn the_radius_is_the_decay_of_the_simulated_loop() {
         for (gain, lead, dead_time) in [(0.3, 0.2, 0), (0.5, 0.0, 1), (0.2, 0.1, 2), (0.9, 0.3, 1)] {
             let loops = Loop { gain, lead, dead_time };
             let mut x = vec![1.0; dead_time + 2];

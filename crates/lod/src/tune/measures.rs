@@ -2,7 +2,7 @@
 //!
 //! In: the frames of a trial. Out: numbers. Never here: their relative weights.
 
-use super::play::Beat;
+use super::play::TrialFrame;
 
 /// Settled: the median of nine frames is within this fraction of the set point, and stays there.
 pub const BAND: f64 = 0.05;
@@ -53,33 +53,33 @@ pub struct Measures {
 impl Measures {
     /// Measures the frames of a trial, at least one.
     #[must_use]
-    pub fn of(beats: &[Beat]) -> Self {
-        let count = beats.len().max(1) as f64;
-        let mean = |value: &dyn Fn(&Beat) -> f64| beats.iter().map(value).sum::<f64>() / count;
-        let second_half = &beats[beats.len() / 2..];
+    pub fn of(frames: &[TrialFrame]) -> Self {
+        let count = frames.len().max(1) as f64;
+        let mean = |value: &dyn Fn(&TrialFrame) -> f64| frames.iter().map(value).sum::<f64>() / count;
+        let second_half = &frames[frames.len() / 2..];
         Self {
-            settle_s: settle_s(beats),
-            overshoot: overshoot(beats),
+            settle_s: settle_s(frames),
+            overshoot: overshoot(frames),
             miss_share: mean(&|b| f64::from(u8::from(b.part > LATE))),
             overrun: mean(&|b| ((b.part - 1.0) / (LATE - 1.0)).clamp(0.0, 1.0)),
             error: mean(&error),
-            reversals: f64::from(reversals(beats)) / count,
+            reversals: f64::from(reversals(frames)) / count,
             chatter: f64::from(second_half.iter().map(|b| b.switches).sum::<u32>()) / second_half.len().max(1) as f64,
             quality: mean(&|b| (b.polygons / b.polygons_ideal).clamp(0.0, 1.0)),
-            cycle: cycle(&beats[beats.len() * 2 / 3..]),
-            clamped: beats.last().is_some_and(|b| b.at_end),
+            cycle: cycle(&frames[frames.len() * 2 / 3..]),
+            clamped: frames.last().is_some_and(|b| b.at_end),
         }
     }
 }
 
-fn error(beat: &Beat) -> f64 {
-    if beat.at_end { 0.0 } else { (beat.ratio - 1.0).abs() }
+fn error(frame: &TrialFrame) -> f64 {
+    if frame.at_end { 0.0 } else { (frame.ratio - 1.0).abs() }
 }
 
 /// Wall seconds after which a trial stays within ± 5 %, or rests where nothing better is possible.
-fn settle_s(beats: &[Beat]) -> Option<f64> {
-    let rows: Vec<_> = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
-    settled_after(&rows, |at| beats[at].at_end)
+fn settle_s(frames: &[TrialFrame]) -> Option<f64> {
+    let rows: Vec<_> = frames.iter().map(|b| (b.time_s, b.ratio)).collect();
+    settled_after(&rows, |at| frames[at].at_end)
 }
 
 /// The time of the frame after the last at which the running median of nine (time, t/T_set) is past ± 5 % and which does not `rest` on a
@@ -104,18 +104,19 @@ pub fn settled_after(rows: &[(f64, f64)], rests: impl Fn(usize) -> bool) -> Opti
 }
 
 /// How far the loop passed the set point to the side opposite its start.
-fn overshoot(beats: &[Beat]) -> f64 {
-    let Some(first) = beats.first() else { return 0.0 };
-    let past = |b: &Beat| if first.ratio >= 1.0 { 1.0 - b.ratio } else { b.ratio - 1.0 };
-    beats.iter().filter(|b| !b.at_end).map(past).fold(0.0, f64::max)
+fn overshoot(frames: &[TrialFrame]) -> f64 {
+    let Some(first) = frames.first() else { return 0.0 };
+    let past = |b: &TrialFrame| if first.ratio >= 1.0 { 1.0 - b.ratio } else { b.ratio - 1.0 };
+    frames.iter().filter(|b| !b.at_end).map(past).fold(0.0, f64::max)
 }
 
 /// How often ε̂ reversed its direction within three frames.
-fn reversals(beats: &[Beat]) -> u32 {
-    let way =
-        |w: &[Beat]| (w[1].eps_hat / w[0].eps_hat - 1.0).signum() * f64::from(u8::from(w[1].eps_hat != w[0].eps_hat));
+fn reversals(frames: &[TrialFrame]) -> u32 {
+    let way = |w: &[TrialFrame]| {
+        (w[1].eps_hat / w[0].eps_hat - 1.0).signum() * f64::from(u8::from(w[1].eps_hat != w[0].eps_hat))
+    };
     let (mut count, mut last) = (0, None::<(usize, f64)>);
-    for (at, now) in beats.windows(2).map(way).enumerate().filter(|(_, w)| *w != 0.0) {
+    for (at, now) in frames.windows(2).map(way).enumerate().filter(|(_, w)| *w != 0.0) {
         count += u32::from(last.is_some_and(|(k, before)| before != now && at - k <= REVERSAL));
         last = Some((at, now));
     }
@@ -123,7 +124,7 @@ fn reversals(beats: &[Beat]) -> u32 {
 }
 
 /// The oscillation of frames that should be at rest.
-fn cycle(tail: &[Beat]) -> Option<Cycle> {
+fn cycle(tail: &[TrialFrame]) -> Option<Cycle> {
     let (low, high) = tail.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), b| (l.min(b.ratio), h.max(b.ratio)));
     let amplitude = 0.5 * (high - low);
     if amplitude.is_nan() || amplitude <= CYCLE_LEAST {
@@ -144,8 +145,8 @@ mod tests {
     use super::*;
     use crate::control::Status;
 
-    fn beats(ratio: impl Fn(usize) -> f64) -> Vec<Beat> {
-        let beat = |k: usize| Beat {
+    fn frames(ratio: impl Fn(usize) -> f64) -> Vec<TrialFrame> {
+        let frame = |k: usize| TrialFrame {
             time_s: (k + 1) as f64 / 30.0,
             ratio: ratio(k),
             part: 0.9 * ratio(k),
@@ -156,13 +157,13 @@ mod tests {
             status: Status::Moving,
             at_end: false,
         };
-        (0..300).map(beat).collect()
+        (0..300).map(frame).collect()
     }
 
     #[test]
     fn a_loop_that_decays_settles_when_its_error_is_five_hundredths() {
         // 1 + 1.5·0.9^k is within 0.05 from k = 33 on
-        let measured = Measures::of(&beats(|k| 1.0 + 1.5 * 0.9_f64.powi(k as i32)));
+        let measured = Measures::of(&frames(|k| 1.0 + 1.5 * 0.9_f64.powi(k as i32)));
         let settle_s = measured.settle_s.unwrap();
         assert!((settle_s - 34.0 / 30.0).abs() < 4.0 / 30.0, "{settle_s}");
         assert!(measured.cycle.is_none() && measured.overshoot == 0.0 && measured.quality == 0.5);
@@ -170,31 +171,31 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_is_home_in_two_frames_was_not_home_before() {
+    fn a_loop_that_settles_in_two_frames_does_not_count_as_settled_before() {
         let rows = |k: usize| (0.1 * (k + 1) as f64, if k < 2 { 2.5 } else { 1.0 });
         let rows: Vec<_> = (0..20).map(rows).collect();
         assert_eq!(settled_after(&rows, |_| false), Some(rows[2].0));
     }
 
     #[test]
-    fn a_loop_that_swings_never_settles_and_says_how() {
-        let measured = Measures::of(&beats(|k| 1.0 + 0.4 * libm::sin(k as f64 * std::f64::consts::TAU / 15.0)));
+    fn an_oscillating_loop_never_settles_and_has_a_cycle() {
+        let measured = Measures::of(&frames(|k| 1.0 + 0.4 * libm::sin(k as f64 * std::f64::consts::TAU / 15.0)));
         let cycle = measured.cycle.unwrap();
         assert_eq!(measured.settle_s, None);
         assert!((cycle.amplitude - 0.4).abs() < 0.01 && (cycle.period_s - 0.5).abs() < 0.01, "{cycle:?}");
     }
 
     #[test]
-    fn a_frame_is_late_by_degrees_and_missed_from_a_twentieth_on() {
+    fn a_frame_overruns_by_degrees_and_is_missed_past_a_twentieth() {
         // 0.9 of 1.0 on time, of 1.14 half way, of 1.2 missed: a third each
-        let measured = Measures::of(&beats(|k| [1.0, 1.025 / 0.9, 1.2][k % 3]));
+        let measured = Measures::of(&frames(|k| [1.0, 1.025 / 0.9, 1.2][k % 3]));
         assert!((measured.miss_share - 1.0 / 3.0).abs() < 1e-9, "{}", measured.miss_share);
         assert!((measured.overrun - 0.5).abs() < 1e-9, "{}", measured.overrun);
     }
 
     #[test]
-    fn going_to_and_fro_is_counted() {
-        let measured = Measures::of(&beats(|k| if k % 2 == 0 { 1.0 } else { 1.01 }));
+    fn reversals_are_counted() {
+        let measured = Measures::of(&frames(|k| if k % 2 == 0 { 1.0 } else { 1.01 }));
         assert!(measured.reversals > 0.9, "{}", measured.reversals);
     }
 }

@@ -34,16 +34,16 @@ pub struct Plant {
 /// Why there is no plant to control.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NoPlant {
+pub enum IdentifyError {
     /// No object in view can be drawn in more than one way.
     #[error("nothing in view can be drawn at more than one resolution: there is nothing to control")]
     NothingToControl,
     /// Time does not increase with polygons.
     #[error(
-        "the time of a frame does not answer to its polygons ({slope_ns:.2} ns each, 95 % between {low_ns:.2} and {high_ns:.2}): \
-         no gain can hold it"
+        "the time of a frame does not depend on its polygons ({slope_ns:.2} ns each, 95 % between {low_ns:.2} and {high_ns:.2}): \
+         no gain can control it"
     )]
-    NoAnswer {
+    NoResponse {
         /// Fitted nanoseconds a polygon.
         slope_ns: f64,
         /// Lower end of its interval.
@@ -52,7 +52,7 @@ pub enum NoPlant {
         high_ns: f64,
     },
     /// Too few frames, or invalid times.
-    #[error("{frames} frames with a sound time are too few to tell how they answer: at least 30 are needed")]
+    #[error("{frames} frames with a valid time are too few to identify the plant: at least 30 are needed")]
     TooFew {
         /// Number of usable frames.
         frames: usize,
@@ -61,17 +61,17 @@ pub enum NoPlant {
 
 /// The range of times that a plant can take.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reach {
+pub struct TimeRange {
     /// With everything in view at its coarsest, seconds.
     pub least_s: f64,
     /// With everything in view as fine as a controller draws it, seconds.
     pub most_s: f64,
 }
 
-impl Reach {
+impl TimeRange {
     /// Whether a time is within the range.
     #[must_use]
-    pub fn holds(self, time_s: f64) -> bool {
+    pub fn contains(self, time_s: f64) -> bool {
         self.least_s <= time_s && time_s <= self.most_s
     }
 }
@@ -87,25 +87,25 @@ impl Plant {
     /// Fits a plant to the frames of an experiment, in their order.
     ///
     /// # Errors
-    /// [`NoPlant`] if there is none.
-    pub fn identify(observed: &[Observed]) -> Result<Self, NoPlant> {
+    /// [`IdentifyError`] if there is none.
+    pub fn identify(observed: &[Observed]) -> Result<Self, IdentifyError> {
         let sound = |o: &&Observed| o.work_s.is_finite() && o.work_s > 0.0 && o.polygons.is_finite();
         let frames = observed.iter().filter(sound).count();
         if frames < FRAMES_MIN {
-            return Err(NoPlant::TooFew { frames });
+            return Err(IdentifyError::TooFew { frames });
         }
         let (least, most) =
             observed.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), o| (l.min(o.polygons), m.max(o.polygons)));
         if most <= least {
-            return Err(NoPlant::NothingToControl);
+            return Err(IdentifyError::NothingToControl);
         }
         // polygons may come and go with the objects in view though none of these has a choice
         let (coarsest, finest) = ends(&observed[0].views);
         let (dead_time, line) =
-            best_dead_time(observed).filter(|_| finest > coarsest).ok_or(NoPlant::NothingToControl)?;
+            best_dead_time(observed).filter(|_| finest > coarsest).ok_or(IdentifyError::NothingToControl)?;
         if line.slope_95.0 <= 0.0 {
             let [slope_ns, low_ns, high_ns] = [line.slope, line.slope_95.0, line.slope_95.1].map(|s| 1e9 * s);
-            return Err(NoPlant::NoAnswer { slope_ns, low_ns, high_ns });
+            return Err(IdentifyError::NoResponse { slope_ns, low_ns, high_ns });
         }
         let frames = observed.iter().map(|o| o.views.clone()).collect();
         Ok(Self { line, dead_time, frames, points: delayed(observed, dead_time) })
@@ -139,9 +139,9 @@ impl Plant {
 
     /// The range of times of the picture between its coarsest and its finest, on a machine `speed` times as fast.
     #[must_use]
-    pub fn reach(&self, speed: f64) -> Reach {
+    pub fn time_range(&self, speed: f64) -> TimeRange {
         let (least, most) = ends(self.views(0));
-        Reach { least_s: self.seconds(least, speed), most_s: self.seconds(most, speed) }
+        TimeRange { least_s: self.seconds(least, speed), most_s: self.seconds(most, speed) }
     }
 
     /// s: the share of a frame of `time_s` seconds that scales with its polygons (control.md, eq. 3).
@@ -236,7 +236,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_plant_is_told_by_its_frames() {
+    fn a_plant_is_identified_from_its_frames() {
         for dead_time in [0, 1, 2] {
             let plant = Plant::identify(&observed(7e-3, 0.22e-6, dead_time)).unwrap();
             assert_eq!(plant.dead_time, dead_time);
@@ -246,22 +246,22 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn where_nothing_answers_there_is_no_plant() {
-        assert!(matches!(Plant::identify(&observed(7e-3, 0.0, 0)), Err(NoPlant::NoAnswer { .. })));
+    fn frames_that_do_not_respond_to_polygons_give_no_plant() {
+        assert!(matches!(Plant::identify(&observed(7e-3, 0.0, 0)), Err(IdentifyError::NoResponse { .. })));
         let mut still = observed(7e-3, 1e-6, 0);
         still.iter_mut().for_each(|o| o.polygons = 5.0);
-        assert_eq!(Plant::identify(&still), Err(NoPlant::NothingToControl));
-        assert_eq!(Plant::identify(&still[..5]), Err(NoPlant::TooFew { frames: 5 }));
+        assert_eq!(Plant::identify(&still), Err(IdentifyError::NothingToControl));
+        assert_eq!(Plant::identify(&still[..5]), Err(IdentifyError::TooFew { frames: 5 }));
         let mut fixed = observed(7e-3, 1e-6, 0);
         let fix = |view: &mut ObjectView| {
             view.range = ResolutionRange { eps_m: (view.range.eps_m.0, view.range.eps_m.0), n: (1, 1) }
         };
         fixed.iter_mut().flat_map(|o| &mut o.views).for_each(fix);
-        assert_eq!(Plant::identify(&fixed), Err(NoPlant::NothingToControl), "polygons that nobody chose");
+        assert_eq!(Plant::identify(&fixed), Err(IdentifyError::NothingToControl), "polygons that no control chose");
     }
 
     #[test]
-    fn views_run_forth_and_back() {
+    fn views_run_forwards_and_backwards() {
         let mut plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
         plant.frames.truncate(3);
         plant.frames.iter_mut().enumerate().for_each(|(k, views)| views[0].distance_m = k as f64);

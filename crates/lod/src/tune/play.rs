@@ -4,7 +4,7 @@
 //! frames on every machine. Never here: the rating of a trial.
 
 use super::candidate::Candidate;
-use super::disturbance::{Dice, Disturbance};
+use super::disturbance::{Disturbance, Random};
 use super::plant::{Plant, ends};
 use crate::Bound;
 use crate::control::{FrameWork, Law, ObjectView, PictureControl, Status};
@@ -23,7 +23,7 @@ pub enum Start {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
     /// The controller of the picture.
-    pub contender: Candidate,
+    pub candidate: Candidate,
     /// Target rate, frames per second, > 0.
     pub target_hz: f64,
     /// Speed of this machine relative to the plant's, > 0.
@@ -43,9 +43,9 @@ pub struct Trial {
 impl Trial {
     /// Ten seconds at rest on the plant's own machine, without noise.
     #[must_use]
-    pub fn calm(contender: impl Into<Candidate>, target_hz: f64) -> Self {
+    pub fn calm(candidate: impl Into<Candidate>, target_hz: f64) -> Self {
         Self {
-            contender: contender.into(),
+            candidate: candidate.into(),
             target_hz,
             speed: 1.0,
             start: Start::Target,
@@ -59,7 +59,7 @@ impl Trial {
 
 /// One frame of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Beat {
+pub struct TrialFrame {
     /// Time of completion, wall seconds after the start.
     pub time_s: f64,
     /// Frame time over the target time, t/T_set.
@@ -85,39 +85,39 @@ const WARM_UP: usize = 80;
 /// Relative distance that counts as an end of the range: a tube has whole intervals.
 const NEAR: f64 = 0.03;
 /// Corrections of a start: levels are coarser than requested.
-const AIMS: usize = 4;
+const START_CORRECTIONS: usize = 4;
 
 /// Simulates a trial.
 #[must_use]
-pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
-    let mut control = trial.contender.control(plant, trial.target_hz);
-    let set_s = trial.contender.set_share() / trial.target_hz;
-    place(&mut control, plant, trial, set_s);
-    let mut dice = Dice::new(trial.seed);
-    let mut beats: Vec<Beat> = Vec::with_capacity((trial.seconds * trial.target_hz) as usize + 1);
+pub fn play(plant: &Plant, trial: &Trial) -> Vec<TrialFrame> {
+    let mut control = trial.candidate.control(plant, trial.target_hz);
+    let set_s = trial.candidate.set_share() / trial.target_hz;
+    set_start(&mut control, plant, trial, set_s);
+    let mut random = Random::new(trial.seed);
+    let mut frames: Vec<TrialFrame> = Vec::with_capacity((trial.seconds * trial.target_hz) as usize + 1);
     let mut views: Vec<ObjectView> = Vec::new();
     let mut levels: Vec<u8> = Vec::new();
     let mut time_s = 0.0;
     while time_s < trial.seconds {
         let passed = time_s / trial.seconds;
         views.clear();
-        views.extend_from_slice(plant.views(beats.len()));
-        trial.disturbance.look(passed, &mut views);
+        views.extend_from_slice(plant.views(frames.len()));
+        trial.disturbance.apply_to_views(passed, &mut views);
         let plan = control.plan(&views);
         let polygons = plan.polygons;
         let switches = count_switches(&mut levels, plan.levels.iter().map(|level| level.resolution.n));
-        let shown = beats
+        let shown = frames
             .len()
             .checked_sub(plant.dead_time)
-            .map_or(polygons, |k| beats.get(k).map_or(polygons, |b| b.polygons));
-        let load = trial.disturbance.load(passed, dice.uniform()) * (1.0 + trial.noise * dice.normal()).max(0.1);
+            .map_or(polygons, |k| frames.get(k).map_or(polygons, |b| b.polygons));
+        let load = trial.disturbance.load(passed, random.uniform()) * (1.0 + trial.noise * random.normal()).max(0.1);
         let work_s = load * plant.seconds(shown, trial.speed);
         let work = Duration::from_secs_f64(work_s);
         control.observe(FrameWork { work, draw: work, skip: false });
         time_s += work_s.max(1.0 / trial.target_hz);
         let status = control.status();
-        let at_end = is_at_end(trial.contender, status, polygons, &views);
-        beats.push(Beat {
+        let at_end = is_at_end(trial.candidate, status, polygons, &views);
+        frames.push(TrialFrame {
             time_s,
             ratio: work_s / set_s,
             part: work_s * trial.target_hz,
@@ -133,13 +133,13 @@ pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
             at_end,
         });
     }
-    beats
+    frames
 }
 
 /// Whether a controller of this status that draws `polygons` cannot do better. The printed law ties n to ε̂, so an end of its ε̂ is not
 /// always an end of the picture's range.
-fn is_at_end(contender: Candidate, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
-    let printed = matches!(contender, Candidate::Feedback(Law::Printed { .. }));
+fn is_at_end(candidate: Candidate, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
+    let printed = matches!(candidate, Candidate::Feedback(Law::Printed { .. }));
     match status {
         Status::Clamped(bound) if printed => {
             let (least, most) = ends(views);
@@ -158,14 +158,14 @@ fn plan_full(control: &PictureControl) -> f64 {
 }
 
 /// Brings the picture to the start of the trial.
-fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64) {
+fn set_start(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64) {
     let rate = match trial.start {
         Start::Target => 1.0,
         Start::Rate(rate) => rate,
     };
-    if matches!(trial.contender, Candidate::Adaptive { .. }) {
+    if matches!(trial.candidate, Candidate::Adaptive { .. }) {
         // its state is its κ: the start is the settled state on a machine on which this picture takes exactly its time
-        return learn(control, plant, trial.speed / rate);
+        return settle(control, plant, trial.speed / rate);
     }
     // the loop was at rest before: the first error is unconfirmed
     control.plan(plant.views(0));
@@ -175,14 +175,14 @@ fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64)
         skip: false,
     });
     let wanted = plant.line.x_of(set_s / rate * trial.speed).max(1.0);
-    for _ in 0..AIMS {
+    for _ in 0..START_CORRECTIONS {
         let polygons = control.plan(plant.views(0)).polygons;
         control.coarsen(polygons / wanted);
     }
 }
 
 /// Lets the predicting policy settle on a machine of this speed.
-fn learn(control: &mut PictureControl, plant: &Plant, speed: f64) {
+fn settle(control: &mut PictureControl, plant: &Plant, speed: f64) {
     for _ in 0..WARM_UP {
         let polygons = control.plan(plant.views(0)).polygons;
         let work = Duration::from_secs_f64(plant.seconds(polygons, speed));
@@ -217,12 +217,12 @@ mod tests {
     }
 
     #[test]
-    fn a_trial_begins_where_it_should_and_ends_at_the_target() {
+    fn a_trial_begins_at_its_start_and_ends_at_the_target() {
         let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
         for (start, ratio) in [(Start::Target, 1.0), (Start::Rate(0.4), 2.5), (Start::Rate(2.5), 0.4)] {
-            let beats = play(&plant, &trial(start));
-            assert!((beats[0].ratio / ratio - 1.0).abs() < 0.05, "{start:?} begins at {}", beats[0].ratio);
-            let last = beats.last().unwrap();
+            let frames = play(&plant, &trial(start));
+            assert!((frames[0].ratio / ratio - 1.0).abs() < 0.05, "{start:?} begins at {}", frames[0].ratio);
+            let last = frames.last().unwrap();
             assert!((last.ratio - 1.0).abs() < 0.05, "{start:?} ends at {}", last.ratio);
         }
     }

@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_found_under_noise_and_wild_points() {
+    fn a_line_is_fitted_despite_noise_and_outliers() {
         let point = |k: u64| {
             let x = k as f64;
             let wild = if k % 10 == 3 { 50.0 } else { 0.0 };
@@ -114,18 +114,18 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_holds_the_truth_nineteen_times_in_twenty() {
-        let holds = |run: u64| {
+    fn the_interval_contains_the_true_slope_nineteen_times_in_twenty() {
+        let contains = |run: u64| {
             let point = |k: u64| (k as f64, 1.0 + 0.01 * k as f64 + noise(1000 * run + k));
             let line = Line::through(&(0..60).map(point).collect::<Vec<_>>()).unwrap();
             line.slope_95.0 <= 0.01 && 0.01 <= line.slope_95.1
         };
-        let kept = (1..=200).filter(|&run| holds(run)).count();
+        let kept = (1..=200).filter(|&run| contains(run)).count();
         assert!((180..=200).contains(&kept), "{kept} of 200");
     }
 
     #[test]
-    fn what_is_no_line_is_none() {
+    fn points_without_a_line_give_none() {
         assert!(Line::through(&[(1.0, 2.0); 3]).is_none(), "too few");
         assert!(Line::through(&[(1.0, 2.0); 20]).is_none(), "one x");
         assert!(Line::through(&[(f64::NAN, 2.0); 20]).is_none());

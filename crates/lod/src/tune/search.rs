@@ -25,7 +25,7 @@ pub struct Search<'a> {
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct SearchResult {
     /// The best verdict.
     pub best: Verdict,
     /// Every candidate with its objective, in the order they were tried.
@@ -34,7 +34,7 @@ pub struct Found {
     pub interrupted: bool,
 }
 
-/// A family of contenders, parametrised by a few numbers.
+/// A family of candidates, parametrised by a few numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
     /// The corrected law: κ and margin.
@@ -56,8 +56,8 @@ impl Family {
     /// Every family.
     pub const ALL: [Self; 4] = [Self::Corrected, Self::Pi, Self::Printed, Self::Adaptive];
 
-    /// The contender with the gains whose logarithms are `at`.
-    fn contender(self, at: &[f64]) -> Candidate {
+    /// The candidate with the gains whose logarithms are `at`.
+    fn candidate(self, at: &[f64]) -> Candidate {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
         let margin = (0.005, 0.5);
         match self {
@@ -65,7 +65,7 @@ impl Family {
             Self::Pi => {
                 Law::Corrected { kappa: gain(0, Law::KAPPA), lead: gain(2, Law::LEAD), margin: gain(1, margin) }.into()
             }
-            Self::Printed => Law::Printed { alpha: gain(0, (1e-9, 1.0)), beta: gain(1, (1e-6, 1e3)) }.into(),
+            Self::Printed => Law::Printed { alpha: gain(0, Law::ALPHA), beta: gain(1, Law::BETA) }.into(),
             Self::Adaptive => Candidate::Adaptive { margin: gain(0, margin) },
         }
     }
@@ -102,7 +102,7 @@ impl Family {
 }
 
 /// The state of a search, shared with the solver's cost function.
-struct Judging<'a, 'b> {
+struct SearchState<'a, 'b> {
     search: &'b mut Search<'a>,
     family: Family,
     best: Option<Verdict>,
@@ -111,15 +111,15 @@ struct Judging<'a, 'b> {
     interrupted: bool,
 }
 
-impl Judging<'_, '_> {
+impl SearchState<'_, '_> {
     fn cost(&mut self, at: &[f64]) -> Option<f64> {
         if self.interrupted {
             return None;
         }
-        let contender = self.family.contender(at);
-        let verdict = judge(self.search.plant, contender, self.search.target_hz, self.search.extent);
+        let candidate = self.family.candidate(at);
+        let verdict = judge(self.search.plant, candidate, self.search.target_hz, self.search.extent);
         let objective = verdict.objective;
-        self.tried.push((contender, objective));
+        self.tried.push((candidate, objective));
         if self.best.as_ref().is_none_or(|best| objective < best.objective) {
             self.best = Some(verdict);
         }
@@ -133,30 +133,30 @@ impl Judging<'_, '_> {
 
 /// Searches for the best gains of `family`; `None` if no candidate was judged.
 #[must_use]
-pub fn search(search: &mut Search<'_>, family: Family) -> Option<Found> {
+pub fn search(search: &mut Search<'_>, family: Family) -> Option<SearchResult> {
     let grid = family.candidates();
     let expected = grid.len() as f64 + TRIES * family.iterations() as f64;
-    let mut judging = Judging { search, family, best: None, tried: Vec::new(), expected, interrupted: false };
+    let mut state = SearchState { search, family, best: None, tried: Vec::new(), expected, interrupted: false };
     let mut corner = None::<(Vec<f64>, f64)>;
     for at in grid {
-        let Some(objective) = judging.cost(&at) else { break };
+        let Some(objective) = state.cost(&at) else { break };
         if corner.as_ref().is_none_or(|(_, held)| objective < *held) {
             corner = Some((at, objective));
         }
     }
     let (corner, _) = corner?;
-    let judging = RefCell::new(judging);
-    if !judging.borrow().interrupted {
+    let state = RefCell::new(state);
+    if !state.borrow().interrupted {
         // a search that is stopped ends as an error of its cost function; the best so far is stored in `judging`
-        let _ = polish(&judging, corner);
+        let _ = run_simplex(&state, corner);
     }
-    let Judging { best, tried, interrupted, .. } = judging.into_inner();
-    Some(Found { best: best?, tried, interrupted })
+    let SearchState { best, tried, interrupted, .. } = state.into_inner();
+    Some(SearchResult { best: best?, tried, interrupted })
 }
 
 /// Nelder and Mead's simplex from the best of the grid.
-fn polish(judging: &RefCell<Judging<'_, '_>>, corner: Vec<f64>) -> Result<(), Error> {
-    let iterations = judging.borrow().family.iterations();
+fn run_simplex(state: &RefCell<SearchState<'_, '_>>, corner: Vec<f64>) -> Result<(), Error> {
+    let iterations = state.borrow().family.iterations();
     let aside = (0..corner.len()).map(|axis| {
         let mut aside = corner.clone();
         aside[axis] += SPREAD;
@@ -164,12 +164,12 @@ fn polish(judging: &RefCell<Judging<'_, '_>>, corner: Vec<f64>) -> Result<(), Er
     });
     let simplex = std::iter::once(corner.clone()).chain(aside).collect();
     let solver = NelderMead::new(simplex).with_sd_tolerance(1e-5)?;
-    Executor::new(Cost(judging), solver).configure(|state| state.max_iters(iterations)).run()?;
+    Executor::new(Cost(state), solver).configure(|state| state.max_iters(iterations)).run()?;
     Ok(())
 }
 
 /// The cost function as the solver needs it.
-struct Cost<'a, 'b, 'c>(&'c RefCell<Judging<'a, 'b>>);
+struct Cost<'a, 'b, 'c>(&'c RefCell<SearchState<'a, 'b>>);
 
 impl CostFunction for Cost<'_, '_, '_> {
     type Param = Vec<f64>;
@@ -185,12 +185,12 @@ mod tests {
     use super::super::plant::tests::observed;
     use super::*;
 
-    fn found(family: Family, stop_after: usize) -> Found {
+    fn found(family: Family, stop_after: usize) -> SearchResult {
         let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
-        let mut told = 0;
+        let mut calls = 0;
         let mut go_on = |_: f64, _: &Verdict| {
-            told += 1;
-            told < stop_after
+            calls += 1;
+            calls < stop_after
         };
         let extent = Extent { seeds: 1, millis: 1500, threads: None };
         let mut setting = Search { plant: &plant, target_hz: 30.0, extent, go_on: &mut go_on };
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_found_is_safe_and_better_than_all_that_was_tried() {
+    fn the_result_of_a_search_is_safe_and_better_than_all_candidates() {
         let found = found(Family::Corrected, usize::MAX);
         assert!(found.tried.iter().all(|(_, objective)| *objective >= found.best.objective));
         assert!(found.best.is_safe(), "{:?}", found.best);
@@ -207,9 +207,9 @@ mod tests {
     }
 
     #[test]
-    fn no_margin_is_left_that_nothing_asks_for() {
+    fn no_margin_is_left_without_need() {
         // times scatter by 1 % at most here: a few hundredths of the frame suffice to keep frames on time
-        let Candidate::Feedback(Law::Corrected { margin, .. }) = found(Family::Corrected, usize::MAX).best.contender
+        let Candidate::Feedback(Law::Corrected { margin, .. }) = found(Family::Corrected, usize::MAX).best.candidate
         else {
             panic!("the corrected law was looked at")
         };
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_that_is_stopped_keeps_its_best() {
+    fn a_stopped_search_keeps_its_best_candidate() {
         let found = found(Family::Corrected, 5);
         assert!(found.interrupted && found.tried.len() == 5, "{}", found.tried.len());
     }

@@ -3,7 +3,7 @@
 use super::measures::Measures;
 use super::plant::Plant;
 use super::plant::tests::{plant_of, tube_alone};
-use super::play::{Beat, Start, Trial, play};
+use super::play::{Start, Trial, TrialFrame, play};
 use super::{Candidate, Disturbance, Loop};
 use crate::control::Law;
 
@@ -20,8 +20,8 @@ fn plant(dead_time: usize, n: (u8, u8)) -> Plant {
     Plant { dead_time, ..plant_of(vec![view], FIXED_S, POLYGON_S) }
 }
 
-fn played(plant: &Plant, contender: impl Into<Candidate>, rate: f64, seconds: f64) -> Vec<Beat> {
-    play(plant, &Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, TARGET_HZ) })
+fn played(plant: &Plant, candidate: impl Into<Candidate>, rate: f64, seconds: f64) -> Vec<TrialFrame> {
+    play(plant, &Trial { start: Start::Rate(rate), seconds, ..Trial::calm(candidate, TARGET_HZ) })
 }
 
 /// t/T_set of (7), (9) and (10) on x = ln polygons, with λ, worked out on exact polygons.
@@ -46,44 +46,44 @@ fn by_hand(kappa: f64, lead: f64, set_s: f64, (rate, dead_time, frames): (f64, u
 }
 
 #[test]
-fn the_logarithmic_and_the_pi_law_go_as_worked_out_by_hand() {
+fn the_logarithmic_and_the_pi_law_follow_the_recursion_worked_out_by_hand() {
     for (kappa, lead, rate, dead_time) in
         [(0.5, 0.0, 0.4, 0), (0.5, 0.0, 2.5, 0), (0.3, 0.2, 0.4, 0), (0.3, 0.2, 2.5, 0), (0.3, 0.0, 0.4, 1)]
     {
         let law = Law::Corrected { kappa, lead, margin: 0.1 };
-        let beats = played(&plant(dead_time, (0, 5)), law, rate, 2.0);
-        let hand = by_hand(kappa, lead, 0.9 / TARGET_HZ, (rate, dead_time, beats.len()));
-        for (k, (beat, expected)) in beats.iter().zip(&hand).enumerate() {
+        let frames = played(&plant(dead_time, (0, 5)), law, rate, 2.0);
+        let hand = by_hand(kappa, lead, 0.9 / TARGET_HZ, (rate, dead_time, frames.len()));
+        for (k, (frame, expected)) in frames.iter().zip(&hand).enumerate() {
             // levels are 3 % apart, and what one frame is off by the next has in its error
-            let off = (beat.ratio / expected - 1.0).abs();
-            assert!(off < 2.0 * CUT, "{law:?} from {rate}, frame {k}: {} and {expected}", beat.ratio);
+            let off = (frame.ratio / expected - 1.0).abs();
+            assert!(off < 2.0 * CUT, "{law:?} from {rate}, frame {k}: {} and {expected}", frame.ratio);
         }
     }
 }
 
 #[test]
-fn the_printed_and_the_normalised_law_go_as_worked_out_by_hand() {
+fn the_printed_and_the_normalised_law_follow_the_recursion_worked_out_by_hand() {
     for alpha in [1e-4, 4e-4, 0.046 / TARGET_HZ] {
-        let beats = played(&plant(0, (2, 2)), Law::Printed { alpha, beta: 5.0 }, 0.4, 4.0);
-        let mut eps_hat = 480.0 * 4.0 / beats[0].polygons;
-        for (k, beat) in beats.iter().enumerate() {
+        let frames = played(&plant(0, (2, 2)), Law::Printed { alpha, beta: 5.0 }, 0.4, 4.0);
+        let mut eps_hat = 480.0 * 4.0 / frames[0].polygons;
+        for (k, frame) in frames.iter().enumerate() {
             let seconds = FIXED_S + POLYGON_S * 480.0 * 4.0 / eps_hat;
-            let off = (beat.ratio * (1.0 / TARGET_HZ) / seconds - 1.0).abs();
-            assert!(off < CUT, "α = {alpha}, frame {k}: {} and {seconds} s", beat.ratio);
+            let off = (frame.ratio * (1.0 / TARGET_HZ) / seconds - 1.0).abs();
+            assert!(off < CUT, "α = {alpha}, frame {k}: {} and {seconds} s", frame.ratio);
             eps_hat = (eps_hat + alpha * (TARGET_HZ - 1.0 / seconds)).clamp(0.01, 1.0);
         }
     }
 }
 
 #[test]
-fn the_printed_law_swings_from_the_boundary_of_its_slope_on() {
+fn the_printed_law_oscillates_beyond_the_boundary_of_its_slope() {
     // near the target α df/dε̂ = 2 is α = 2 ε̂/(s f₀), eq. 4; with n fixed there is nothing else
     let set_s = 1.0 / TARGET_HZ;
     let eps_hat = 480.0 * 4.0 * POLYGON_S / (set_s - FIXED_S);
     let boundary = 2.0 * eps_hat / ((1.0 - FIXED_S / set_s) * TARGET_HZ);
     let swings = |alpha: f64| {
-        let beats = played(&plant(0, (2, 2)), Law::Printed { alpha, beta: 5.0 }, 0.8, 12.0);
-        Measures::of(&beats).cycle.is_some()
+        let frames = played(&plant(0, (2, 2)), Law::Printed { alpha, beta: 5.0 }, 0.8, 12.0);
+        Measures::of(&frames).cycle.is_some()
     };
     assert!(!swings(0.9 * boundary), "below {boundary}");
     assert!(swings(1.15 * boundary), "above {boundary}");
@@ -93,11 +93,11 @@ fn the_printed_law_swings_from_the_boundary_of_its_slope_on() {
 }
 
 #[test]
-fn a_limit_cycle_has_the_amplitude_and_the_period_that_are_worked_out_by_hand() {
+fn a_limit_cycle_has_the_amplitude_and_the_period_worked_out_by_hand() {
     // three frames late, κ s past 0.445: the swing grows until its lessons are bounded
     let (kappa, dead_time) = (0.9, 3);
-    let beats = played(&plant(dead_time, (0, 5)), Law::Corrected { kappa, lead: 0.0, margin: 0.1 }, 0.8, 12.0);
-    let found = Measures::of(&beats).cycle.expect("it swings");
+    let frames = played(&plant(dead_time, (0, 5)), Law::Corrected { kappa, lead: 0.0, margin: 0.1 }, 0.8, 12.0);
+    let found = Measures::of(&frames).cycle.expect("it swings");
     let hand = by_hand(kappa, 0.0, 0.9 / TARGET_HZ, (0.8, dead_time, 400));
     let tail = &hand[200..];
     let (low, high) = tail.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(*r), h.max(*r)));
@@ -111,24 +111,24 @@ fn a_limit_cycle_has_the_amplitude_and_the_period_that_are_worked_out_by_hand() 
 }
 
 #[test]
-fn a_clamp_is_left_as_soon_as_by_a_loop_that_never_was_there() {
+fn a_clamped_loop_leaves_its_clamp_without_windup() {
     // the coarsest takes too long for a third of the trial; then the machine is twice as fast
     let plant = plant(0, (0, 5));
-    let target_hz = 0.9 / (0.7 * plant.reach(1.0).least_s);
-    let settled = |beats: &[Beat]| beats.iter().position(|b| (b.ratio - 1.0).abs() < 0.05).expect("it settles");
+    let target_hz = 0.9 / (0.7 * plant.time_range(1.0).least_s);
+    let settled = |frames: &[TrialFrame]| frames.iter().position(|b| (b.ratio - 1.0).abs() < 0.05).expect("it settles");
     for law in [Law::CORRECTED, Law::Corrected { kappa: 0.3, lead: 0.3, margin: 0.1 }] {
         let calm = Trial { seconds: 3.0, ..Trial::calm(law, target_hz) };
-        let beats = play(&plant, &Trial { disturbance: Disturbance::Speed(2.0), ..calm });
-        assert!(beats[5].status.clamped().is_some(), "{law:?}: {:?}", beats[5].status);
-        let fast = beats.iter().position(|b| b.ratio < 1.0).expect("the machine becomes faster");
+        let frames = play(&plant, &Trial { disturbance: Disturbance::Speed(2.0), ..calm });
+        assert!(frames[5].status.clamped().is_some(), "{law:?}: {:?}", frames[5].status);
+        let fast = frames.iter().position(|b| b.ratio < 1.0).expect("the machine becomes faster");
         let fresh = settled(&play(&plant, &Trial { speed: 2.0, start: Start::Rate(1e3), ..calm }));
-        let after = settled(&beats[fast..]);
+        let after = settled(&frames[fast..]);
         assert!(after.abs_diff(fresh) <= 2, "{law:?}: {after} frames after the clamp, {fresh} without one");
     }
 }
 
 #[test]
-fn the_policy_that_predicts_corrects_what_its_filter_s_variance_says() {
+fn the_adaptive_policy_corrects_the_share_given_by_its_filter() {
     // steady state of the filter: p⁻ g = Q and g = p⁻/(p⁻ + R), iterated instead of solved
     let plant = plant(0, (0, 5));
     let near = Candidate::ADAPTIVE.local_loop(&plant, TARGET_HZ, 1.0).unwrap();
@@ -144,7 +144,7 @@ fn the_policy_that_predicts_corrects_what_its_filter_s_variance_says() {
 }
 
 #[test]
-fn the_policy_that_predicts_comes_to_the_time_it_promises_on_machines_of_other_speeds() {
+fn the_adaptive_policy_settles_at_its_predicted_time_on_machines_of_other_speeds() {
     for (speed, rate) in [(1.0, 0.4), (1.0, 2.5), (2.0, 0.4), (0.5, 2.5)] {
         let trial =
             Trial { speed, start: Start::Rate(rate), seconds: 3.0, ..Trial::calm(Candidate::ADAPTIVE, TARGET_HZ) };

@@ -1,6 +1,6 @@
 //! Judges a law: all disturbances, on machines of several speeds, with several seeds.
 //!
-//! In: a plant, a contender, a target. Out: a [`Verdict`] with one number to minimise. Trials are distributed over all cores; the verdict
+//! In: a plant, a candidate, a target. Out: a [`Verdict`] with one number to minimise. Trials are distributed over all cores; the verdict
 //! does not depend on the distribution. Never here: the choice of gains to try.
 
 use super::candidate::Candidate;
@@ -34,8 +34,8 @@ impl Extent {
 /// The result of judging a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// The contender judged.
-    pub contender: Candidate,
+    /// The candidate judged.
+    pub candidate: Candidate,
     /// The worse of the settling times from 0.4 and from 2.5 times the target rate, wall seconds; `None` if one does not settle.
     pub settle_s: Option<f64>,
     /// The worse overshoot of the two.
@@ -74,9 +74,9 @@ const STARTS: [f64; 2] = [0.4, 2.5];
 /// If frame times scatter by less than this, a five-hundredth of the settling band, a trial is not repeated with other seeds.
 const NOISE_LEAST: f64 = 1e-4;
 /// A law must settle within this time, seconds.
-const SETTLE_MAX_S: f64 = 1.0;
+pub(super) const SETTLE_MAX_S: f64 = 1.0;
 /// Least margins: a factor on the gain, and frames of delay.
-const GAIN_MARGIN: f64 = 2.0;
+pub(super) const GAIN_MARGIN: f64 = 2.0;
 const DELAY_MARGIN: usize = 2;
 
 /// Weights of a late frame, a reversal, a lost part of quality, a second of settling and a missing margin relative to an error of one.
@@ -86,19 +86,19 @@ const WEIGHTS: [f64; 5] = [2.0, 0.1, 1.0, 0.1, 1.0];
 #[must_use]
 pub fn speeds_in_reach(plant: &Plant, target_hz: f64) -> Vec<f64> {
     // by T, not by a law's own set point: a law must not influence the speeds it is tested at
-    SPEEDS.into_iter().filter(|&speed| plant.reach(speed).holds(1.0 / target_hz)).collect()
+    SPEEDS.into_iter().filter(|&speed| plant.time_range(speed).contains(1.0 / target_hz)).collect()
 }
 
-/// Judges `contender` on `plant` at `target_hz`.
+/// Judges `candidate` on `plant` at `target_hz`.
 #[must_use]
-pub fn judge(plant: &Plant, contender: impl Into<Candidate>, target_hz: f64, extent: Extent) -> Verdict {
-    let contender = contender.into();
+pub fn judge(plant: &Plant, candidate: impl Into<Candidate>, target_hz: f64, extent: Extent) -> Verdict {
+    let candidate = candidate.into();
     let asked = speeds_in_reach(plant, target_hz);
     let far = |speed: f64| libm::fabs(libm::log(speed));
     let own = asked.iter().copied().min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0);
     let seconds = 1e-3 * extent.millis as f64;
     let calm =
-        |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(contender, target_hz) };
+        |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(candidate, target_hz) };
     let starts: Vec<_> = asked.iter().flat_map(|&speed| STARTS.map(|rate| calm(speed, rate))).collect();
     let upset = disturbed(&calm(own, 1.0), plant.line.scatter, extent);
     let played = measure(plant, &[starts.clone(), upset.clone()].concat(), extent.threads);
@@ -106,9 +106,9 @@ pub fn judge(plant: &Plant, contender: impl Into<Candidate>, target_hz: f64, ext
     let mean = |value: fn(&Measures) -> f64| mean(&upset, upset_by, value);
     let at_speed = |speed: f64| starts.iter().zip(settling).filter(move |(t, _)| t.speed == speed).map(|(_, m)| *m);
     let good = |m: Measures| m.settle_s.is_some_and(|s| s <= SETTLE_MAX_S) && m.cycle.is_none();
-    let near: Vec<Loop> = asked.iter().filter_map(|&speed| contender.local_loop(plant, target_hz, speed)).collect();
+    let near: Vec<Loop> = asked.iter().filter_map(|&speed| candidate.local_loop(plant, target_hz, speed)).collect();
     let mut verdict = Verdict {
-        contender,
+        candidate,
         settle_s: at_speed(own).map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten(),
         overshoot: at_speed(own).map(|m| m.overshoot).fold(0.0, f64::max),
         miss_share: mean(|m| m.miss_share),
@@ -160,7 +160,7 @@ impl Margins {
 /// Trials with every disturbance and every seed; one of each that the seed does not change.
 fn disturbed(calm: &Trial, noise: f64, extent: Extent) -> Vec<Trial> {
     let of = |disturbance: Disturbance| {
-        let by_chance = disturbance.is_by_chance() || noise > NOISE_LEAST;
+        let by_chance = disturbance.is_random() || noise > NOISE_LEAST;
         let seeds = if by_chance { extent.seeds.max(1) } else { 1 };
         (1..=seeds).map(move |seed| Trial { disturbance, seed, noise, start: Start::Target, ..*calm })
     };
@@ -194,10 +194,10 @@ pub fn measure(plant: &Plant, trials: &[Trial], threads: Option<NonZero<usize>>)
         mine
     };
     let mut all: Vec<(usize, Measures)> = thread::scope(|scope| {
-        let hands: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
+        let handles: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
         let mut all = work();
         // a panic in a trial is our own bug: it is printed already, and its trials are missing
-        hands.into_iter().for_each(|hand| all.extend(hand.join().unwrap_or_default()));
+        handles.into_iter().for_each(|handle| all.extend(handle.join().unwrap_or_default()));
         all
     });
     all.sort_unstable_by_key(|(at, _)| *at);
@@ -231,13 +231,13 @@ mod tests {
         let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
         let verdict = judged(0.1);
         // the larger the share of the time that scales with polygons, the larger the loop's gain: the fastest machine is the worst
-        let fastest = verdict.asked.iter().copied().filter(|s| plant.reach(*s).holds(0.03)).fold(0.0, f64::max);
+        let fastest = verdict.asked.iter().copied().filter(|s| plant.time_range(*s).contains(0.03)).fold(0.0, f64::max);
         let share = plant.share(0.03, fastest);
         assert!((verdict.margins.unwrap().gain - 2.0 / (0.5 * share)).abs() < 0.01, "{verdict:?}");
     }
 
     #[test]
-    fn trials_that_no_seed_changes_are_played_once_and_weigh_as_much() {
+    fn trials_without_randomness_run_once_and_weigh_as_much() {
         let calm = Trial::calm(Law::CORRECTED, 30.0);
         let extent = Extent { seeds: 10, millis: 500, threads: None };
         let still = disturbed(&calm, 0.0, extent);

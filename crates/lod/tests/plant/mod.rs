@@ -16,9 +16,9 @@ const SETUP: f64 = 20.0;
 pub const WALK: usize = 250;
 
 /// Uniform and normal numbers from a seed: xorshift, and the sum of twelve uniforms.
-pub struct Noise(u64);
+pub struct Random(u64);
 
-impl Noise {
+impl Random {
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
     }
@@ -37,13 +37,13 @@ impl Noise {
 
 /// What is seen of an object.
 #[derive(Clone, Copy)]
-pub struct Seen {
+pub struct VisibleObject {
     pub id: u64,
     pub pixels: f64,
     pub polygons: [u32; 5],
 }
 
-impl Seen {
+impl VisibleObject {
     pub fn cost(&self, level: usize) -> f64 {
         SETUP + POLYGON * f64::from(self.polygons[level])
     }
@@ -84,7 +84,7 @@ impl Auditorium {
         }
     }
 
-    pub fn seen(&self, frame: usize) -> Vec<Seen> {
+    pub fn seen(&self, frame: usize) -> Vec<VisibleObject> {
         let (count, stage, size) = Self::view(frame);
         let visible = |i: usize| if i < 384 { (self.rank[i] as f64) < count } else { stage && i < 384 + 5 };
         let of = |i: usize| {
@@ -92,7 +92,7 @@ impl Auditorium {
             let depth = 1.0 + 4.0 * (0.5 + 0.5 * ((self.rank[i] as f64) * 2.399 + 0.01 * frame as f64).sin());
             let pixels = size * size * 25.0 / (depth * depth);
             let polygons = PARTS.map(|p| ((p * f64::from(self.polygons[i])) as u32).max(2));
-            Seen { id: i as u64, pixels, polygons }
+            VisibleObject { id: i as u64, pixels, polygons }
         };
         (0..400).filter(|&i| visible(i)).map(of).collect()
     }
@@ -100,7 +100,7 @@ impl Auditorium {
 
 /// How the machine differs from the table.
 pub struct Machine {
-    noise: Noise,
+    noise: Random,
     wander: f64,
     /// The table is this much too low.
     pub low: f64,
@@ -112,7 +112,7 @@ pub struct Machine {
 
 impl Machine {
     pub fn s1(seed: u64) -> Self {
-        Self { noise: Noise::new(seed), wander: 0.0, low: 1.0, load: 0..0, spikes: 0.0 }
+        Self { noise: Random::new(seed), wander: 0.0, low: 1.0, load: 0..0, spikes: 0.0 }
     }
 
     pub fn s2(seed: u64) -> Self {
@@ -129,13 +129,13 @@ impl Machine {
     }
 }
 
-/// What a policy is told of a frame, and what it says.
+/// The input of a policy for a frame, and its answer.
 pub trait Policy {
-    fn choose(&mut self, frame: usize, seen: &[Seen]) -> Vec<Level>;
+    fn choose(&mut self, frame: usize, seen: &[VisibleObject]) -> Vec<Level>;
     fn learn(&mut self, _frame: usize, _took: f64) {}
 }
 
-pub fn problem(seen: &[Seen], budget: f64) -> Problem {
+pub fn problem(seen: &[VisibleObject], budget: f64) -> Problem {
     let mut problem = Problem::new(Mode::ExactlyOne, budget as i64);
     for s in seen {
         let entry = |l: usize| Entry::measured(s.cost(l), 1000.0 * s.pixels * s.accuracy(l), 0.0).0;
@@ -147,7 +147,7 @@ pub fn problem(seen: &[Seen], budget: f64) -> Problem {
 pub struct Full;
 
 impl Policy for Full {
-    fn choose(&mut self, _: usize, seen: &[Seen]) -> Vec<Level> {
+    fn choose(&mut self, _: usize, seen: &[VisibleObject]) -> Vec<Level> {
         vec![Some(4); seen.len()]
     }
 }
@@ -155,7 +155,7 @@ impl Policy for Full {
 pub struct Static(pub f64);
 
 impl Policy for Static {
-    fn choose(&mut self, _: usize, seen: &[Seen]) -> Vec<Level> {
+    fn choose(&mut self, _: usize, seen: &[VisibleObject]) -> Vec<Level> {
         seen.iter().map(|s| threshold::level(s.pixels, &s.polygons, self.0)).collect()
     }
 }
@@ -164,7 +164,7 @@ impl Policy for Static {
 pub struct Feedback(pub threshold::Feedback);
 
 impl Policy for Feedback {
-    fn choose(&mut self, frame: usize, seen: &[Seen]) -> Vec<Level> {
+    fn choose(&mut self, frame: usize, seen: &[VisibleObject]) -> Vec<Level> {
         Static(self.0.threshold_px()).choose(frame, seen)
     }
 
@@ -176,26 +176,26 @@ impl Policy for Feedback {
 pub struct Greedy;
 
 impl Policy for Greedy {
-    fn choose(&mut self, _: usize, seen: &[Seen]) -> Vec<Level> {
+    fn choose(&mut self, _: usize, seen: &[VisibleObject]) -> Vec<Level> {
         funkhouser::greedy(&problem(seen, 0.98 * TARGET), funkhouser::Scan::Skip).levels
     }
 }
 
-/// Ours.
-pub struct Ours {
+/// AdaptivePolicy.
+pub struct AdaptivePolicy {
     pub adaptive: Adaptive,
     present: Vec<u64>,
     pub gaps: Vec<f64>,
 }
 
-impl Ours {
+impl AdaptivePolicy {
     pub fn new(settings: Settings) -> Self {
         Self { adaptive: Adaptive::new(settings), present: Vec::new(), gaps: Vec::new() }
     }
 }
 
-impl Policy for Ours {
-    fn choose(&mut self, frame: usize, seen: &[Seen]) -> Vec<Level> {
+impl Policy for AdaptivePolicy {
+    fn choose(&mut self, frame: usize, seen: &[VisibleObject]) -> Vec<Level> {
         let now: Vec<_> = seen.iter().map(|s| s.id).collect();
         for gone in self.present.iter().filter(|id| now.binary_search(id).is_err()) {
             self.adaptive.remove(*gone);

@@ -162,7 +162,7 @@ fn textures_are_shared_and_wrong_ones_refused_where_they_stand() {
         ("generate = \"sphere\"\ntexture = \"none.png\"", "none.png"),
         ("generate = \"sphere\"\ntexture = \"bad.png\"", "bad.png"),
         ("generate = \"sphere\"\ntexture = \"chequer\"", "`checker`"),
-        ("file = \"bad.glb\"", "only PNG"),
+        ("file = \"bad.glb\"", "PNG and JPEG are supported"),
         ("generate = \"sphere\"\ntexture_m = 2", "`texture`"),
         ("generate = \"sphere\"\ntexture = \"books\"\ntexture_m = 0", "`texture_m`"),
         ("generate = \"sphere\"\nshading = \"textured\"", "expected `texture`"),

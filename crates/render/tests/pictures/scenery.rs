@@ -84,7 +84,7 @@ fn wrong_scenery_is_refused_where_it_stands() {
         (mesh("generate = \"sphere\"\nscale = -1"), "`scale`"),
         (mesh("seed = 3\nfile = \"x.obj\""), "`seed`"),
         (mesh("generate = \"sphere\"\n[[group]]\nname = \"g\"\nmembers = [\"b\"]"), "does not exist"),
-        (mesh("generate = \"sphere\"\n[[group]]\nname = \"a\"\nmembers = [\"a\"]"), "taken"),
+        (mesh("generate = \"sphere\"\n[[group]]\nname = \"a\"\nmembers = [\"a\"]"), "the name of another object"),
         (
             mesh(
                 "generate = \"sphere\"\n[[group]]\nname = \"g\"\nmembers = [\"a\"]\n[[group]]\nname = \"h\"\nmembers = [\"a\"]",

@@ -57,30 +57,31 @@ pub(super) fn tolerance(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &CommonFile,
-    (pace, range): (PaceWish, Option<ResolutionRange>),
+    pace: PaceWish,
+    range: Option<ResolutionRange>,
 ) -> Option<f64> {
     let Some(tolerance_m) = file.tolerance_m else {
         if file.hold == Some(HoldKind::Error) {
-            let expected = "expected `tolerance_m` beside it: the error that it may have, in metres";
-            c.wrong(place, "hold", "is `error`, and nothing says which", expected);
+            let expected = "expected `tolerance_m` beside it: the allowed error, metres";
+            c.wrong(place, "hold", "is `error`, but `tolerance_m` is missing", expected);
         }
         return None;
     };
     let tolerance_m = c.number(place, "tolerance_m", tolerance_m, &TOLERANCE);
     let Some(range) = range else {
-        untolerated(c, place, file);
+        refuse_tolerance(c, place, file);
         return None;
     };
     if file.hold == Some(HoldKind::Rate) {
         c.wrong(
             place,
             "tolerance_m",
-            "stands beside `hold = \"rate\"`",
+            "contradicts `hold = \"rate\"`",
             "expected `hold = \"error\"`, or no `tolerance_m`",
         );
     }
     if pace.dt_range.0 == pace.dt_range.1 && range.eps_m.0 == range.eps_m.1 {
-        let what = "cannot be held: its step is fixed, and so is its spacing";
+        let what = "cannot be held: step and spacing are both fixed";
         let expected = "expected `dt_ms = [least, greatest]`, or for a tube `eps_m = [finest, coarsest]`";
         c.wrong(place, "tolerance_m", what, expected);
     }
@@ -88,10 +89,10 @@ pub(super) fn tolerance(
 }
 
 /// Reports `tolerance_m` and `hold = "error"` on an object that makes no error of its own.
-pub(super) fn untolerated(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
+pub(super) fn refuse_tolerance(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
     let asked = [("tolerance_m", file.tolerance_m.is_some()), ("hold", file.hold == Some(HoldKind::Error))];
     if let Some((key, _)) = asked.iter().find(|(_, there)| *there) {
-        c.wrong(place, key, "is of no use: it makes no error of its own", "expected no such key");
+        c.wrong(place, key, "has no effect: this model has no error of its own", "expected no such key");
     }
 }
 
@@ -111,14 +112,15 @@ pub(super) fn rounded(value: f64) -> f64 {
 pub(super) fn faults(
     c: &mut Checker<'_, '_>,
     place: &Place,
-    (own, world): (Option<&FaultsFile>, Option<&FaultsFile>),
+    own: Option<&FaultsFile>,
+    world: Option<&FaultsFile>,
 ) -> Faults {
     let (none, own_place) = (FaultsFile::default(), place.table("faults"));
     let (own, world) = (own.unwrap_or(&none), world.unwrap_or(&none));
     let world_jitter = world.jitter.unwrap_or(0.0);
     Faults {
-        jitter: c.number_or(&own_place, "jitter", (own.jitter, world_jitter), &JITTER),
-        loss: c.number_or(&own_place, "loss", (own.loss, world.loss.unwrap_or(0.0)), &LOSS),
+        jitter: c.optional(&own_place, "jitter", own.jitter, &JITTER).unwrap_or(world_jitter),
+        loss: c.optional(&own_place, "loss", own.loss, &LOSS).unwrap_or(world.loss.unwrap_or(0.0)),
         seed: u64::from(own.seed.or(world.seed).unwrap_or(0)),
     }
 }
@@ -126,8 +128,8 @@ pub(super) fn faults(
 /// Checks the values of `[world.faults]`.
 pub(crate) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
     let place = Place::new("world.faults", "of `[world.faults]`");
-    c.number_or(&place, "jitter", (file.jitter, 0.0), &JITTER);
-    c.number_or(&place, "loss", (file.loss, 0.0), &LOSS);
+    c.optional(&place, "jitter", file.jitter, &JITTER);
+    c.optional(&place, "loss", file.loss, &LOSS);
 }
 
 /// The levels of the drawn primitive.
@@ -149,7 +151,12 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
 /// Colour and material of an object without a texture; `default` is the material of the model.
 pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
     if file.shading == Some(ShadingKind::Textured) {
-        c.wrong(place, "shading", "has nothing to draw", "expected `texture` beside it, which only a mesh can have");
+        c.wrong(
+            place,
+            "shading",
+            "is `textured`, but the object has no texture",
+            "expected `texture` beside it, which only a mesh can have",
+        );
     }
     painted_look(c, place, file, default)
 }
@@ -164,7 +171,7 @@ pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &Common
             colour_of(material)
         }),
     };
-    let importance = c.number_or(place, "importance", (file.importance, 1.0), &IMPORTANCE);
+    let importance = c.optional(place, "importance", file.importance, &IMPORTANCE).unwrap_or(1.0);
     Look { colour, material, importance, shading: file.shading.unwrap_or_default() }
 }
 

@@ -3,9 +3,9 @@
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
 
-use super::POSITION_MAX_M;
-use super::object::{Named, Objects};
+use super::object::{NamedObject, Objects};
 use super::soft;
+use super::{DAMPING, POSITION_MAX_M, STIFFNESS};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
 use glam::DVec3;
@@ -20,8 +20,6 @@ use std::collections::BTreeMap;
 /// Most couplings of a scene.
 const COUPLINGS_MAX: usize = 10_000;
 
-const STIFFNESS: Allowed = allowed(1e-6..=1e9, "N/m");
-const DAMPING: Allowed = allowed(0.0..=1e7, "N·s/m");
 const REST: Allowed = allowed(0.0..=1e4, "m");
 
 /// The couplings of the scene.
@@ -46,28 +44,29 @@ pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects
 }
 
 fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
-    let (a, b) = (end(c, place, ("a", &file.a), objects), end(c, place, ("b", &file.b), objects));
+    let (a, b) = (end(c, place, "a", &file.a, objects), end(c, place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a == b {
-        c.wrong(place, "b", "is the object that `a` is", "expected another object: a coupling has two");
+        c.wrong(place, "b", "is the same object as `a`", "expected another object: a coupling connects two");
         return None;
     }
-    if let (Named::Tool(_), Named::Tool(_)) = (a, b) {
-        let expected = "expected a tube or a rigid object: both tools are led, neither gives way";
+    if let (NamedObject::Tool(_), NamedObject::Tool(_)) = (a, b) {
+        let expected = "expected a tube or a rigid object: both tools are driven, so neither yields";
         c.wrong(place, "b", "is a tool, as `a` is", expected);
         return None;
     }
     let before = c.count();
     let stays = matches!(file.law.unwrap_or_default(), CouplingLaw::Ledger | CouplingLaw::Off);
-    if [a, b].into_iter().any(|end| matches!(end, Named::Soft(_))) && !stays {
-        let what = format!("is `{}`, which sheets, solids and ropes do not know", file.law.unwrap_or_default().name());
+    if [a, b].into_iter().any(|end| matches!(end, NamedObject::Soft(_))) && !stays {
+        let what =
+            format!("is `{}`, which sheets, solids and ropes do not support", file.law.unwrap_or_default().name());
         c.wrong(place, "law", what, "expected `ledger` or `off`");
     }
     check_keys(c, place, file);
     let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
-        Kind::Attach => attach(c, place, file, (a, b), objects),
+        Kind::Attach => attach(c, place, file, [a, b], objects),
     };
     if c.count() > before {
         return None;
@@ -76,19 +75,21 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
 }
 
 /// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
-fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<Named> {
+fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &Objects) -> Option<NamedObject> {
     let (what, expected) = match objects.names.get(name) {
         None => {
-            let moves = |named| !matches!(named, Named::Fixed | Named::Scenery | Named::Synthetic(_));
+            let moves = |named| !matches!(named, NamedObject::Fixed | NamedObject::Scenery | NamedObject::Synthetic(_));
             c.reference(place, key, name, objects.names.only(moves));
             return None;
         }
-        Some(Named::Fixed) => (
+        Some(NamedObject::Fixed) => (
             "which is fixed",
-            "expected an object that moves: what is fixed is touched by everything, without a coupling",
+            "expected an object that moves: fixed objects collide with everything without a coupling",
         ),
-        Some(Named::Scenery) => ("which is only seen", "expected a tube, a rigid object or a tool"),
-        Some(Named::Synthetic(_)) => ("which has no matter", "expected a tube, a rigid object or a tool"),
+        Some(NamedObject::Scenery) => ("which is scenery and only drawn", "expected a tube, a rigid object or a tool"),
+        Some(NamedObject::Synthetic(_)) => {
+            ("which is a synthetic agent without a body", "expected a tube, a rigid object or a tool")
+        }
         Some(named) => return Some(named),
     };
     c.wrong(place, key, format_args!("names `{name}`, {what}"), expected);
@@ -119,7 +120,7 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
     } else if attach && matches!(law, CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) {
         let what = format!("is `{}`, a law of contacts", law.name());
-        c.wrong(place, "law", what, "expected `ledger` or `tlm`: nothing else attaches");
+        c.wrong(place, "law", what, "expected `ledger` or `tlm`: no other law attaches");
     }
 }
 
@@ -139,64 +140,85 @@ fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<La
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {
     let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS);
-    Some((stiffness, c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 0.0), &DAMPING)))
+    Some((stiffness, c.optional(place, "damping_n_s_m", file.damping_n_s_m, &DAMPING).unwrap_or(0.0)))
 }
 
 fn attach(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &CouplingFile,
-    (a, b): (Named, Named),
+    [a, b]: [NamedObject; 2],
     objects: &Objects,
 ) -> Option<CouplingKind> {
-    let at_a = anchor(c, place, ("at_a", file.at_a?), a, objects);
-    let at_b = anchor(c, place, ("at_b", file.at_b?), b, objects);
+    let at_a = Attachment { key: "at_a", object: a, spot: file.at_a? }.anchor(c, place, objects);
+    let at_b = Attachment { key: "at_b", object: b, spot: file.at_b? }.anchor(c, place, objects);
     let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
-    let rest_m = c.number_or(place, "rest_m", (file.rest_m, 0.0), &REST);
+    let rest_m = c.optional(place, "rest_m", file.rest_m, &REST).unwrap_or(0.0);
     Some(CouplingKind::Attach { at_a: at_a?, at_b: at_b?, stiffness_n_m, damping_n_s_m, rest_m })
 }
 
-/// The material point of the object `named` that `spot` denotes.
-fn anchor(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (key, spot): (&str, Spot),
-    named: Named,
-    objects: &Objects,
-) -> Option<Anchor> {
-    let id = named.agent()?;
-    if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
-        let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
-        return match spot {
-            Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, ""))),
-            Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
-            Spot::Share(_) => {
-                let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
-                c.wrong(place, key, "is a share of a length", expected);
+/// One end of an attachment: an object, and the spot on it that the key of the coupling gives.
+struct Attachment {
+    key: &'static str,
+    object: NamedObject,
+    spot: Spot,
+}
+
+impl Attachment {
+    /// The material point of the attached object that its spot denotes.
+    fn anchor(self, c: &mut Checker<'_, '_>, place: &Place, objects: &Objects) -> Option<Anchor> {
+        let Self { key, object, spot } = self;
+        let id = object.agent()?;
+        if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
+            let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
+            return match spot {
+                Spot::Share(share) if is_rope => {
+                    soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, "")))
+                }
+                Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
+                Spot::Share(_) => {
+                    let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
+                    c.wrong(
+                        place,
+                        key,
+                        "is a share of a length, but the object is neither a tube nor a rope",
+                        expected,
+                    );
+                    None
+                }
+                Spot::Point(_) => {
+                    c.wrong(
+                        place,
+                        key,
+                        "is a point, but the object is a rope",
+                        "expected a share of its length, 0 … 1",
+                    );
+                    None
+                }
+            };
+        }
+        match (spot, matches!(object, NamedObject::Tube(_))) {
+            (Spot::Share(share), true) => {
+                let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
+                Some(Anchor::Arc(share * tube_length_m(objects, id)?))
+            }
+            (Spot::Point(at), false) => {
+                let at = c.point(place, key, at, POSITION_MAX_M);
+                Some(Anchor::Local(at - centre_of_mass(objects, id)))
+            }
+            (Spot::Point(_), true) => {
+                c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
                 None
             }
-            Spot::Point(_) => {
-                c.wrong(place, key, "is a point, but the object is a rope", "expected a share of its length, 0 … 1");
+            (Spot::Share(_), false) => {
+                c.wrong(
+                    place,
+                    key,
+                    "is a share of a length, but the object is neither a tube nor a rope",
+                    "expected a point [x, y, z] in the object's axes, metres",
+                );
                 None
             }
-        };
-    }
-    match (spot, matches!(named, Named::Tube(_))) {
-        (Spot::Share(share), true) => {
-            let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
-            Some(Anchor::Arc(share * tube_length_m(objects, id)?))
-        }
-        (Spot::Point(at), false) => {
-            let at = c.point(place, key, at, POSITION_MAX_M);
-            Some(Anchor::Local(at - centre_of_mass(objects, id)))
-        }
-        (Spot::Point(_), true) => {
-            c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
-            None
-        }
-        (Spot::Share(_), false) => {
-            c.wrong(place, key, "is a share of a length", "expected a point [x, y, z] in the object's axes, metres");
-            None
         }
     }
 }

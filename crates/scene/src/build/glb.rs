@@ -37,7 +37,7 @@ struct Reader<'d> {
     primitives: Vec<(u32, [usize; 2])>,
     nodes: usize,
     /// Number of primitives visited, including those of points and lines.
-    looked_at: usize,
+    primitives_visited: usize,
 }
 
 /// Points, their texture coordinates on the image of [`image`], and triangles of a file.
@@ -54,7 +54,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
         meshes: 0,
         primitives: Vec::new(),
         nodes: 0,
-        looked_at: 0,
+        primitives_visited: 0,
     };
     for node in roots {
         reader.node(node, UPRIGHT, 0)?;
@@ -72,8 +72,8 @@ pub(super) fn image(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
     images.sort_unstable();
     images.dedup();
     let &[only] = &images[..] else { return Ok(None) };
-    let image = tables.images.get(only).ok_or_else(|| format!("it names image {only}, which is not there"))?;
-    let view = image.buffer_view.ok_or_else(|| format!("its image {only} is kept in another file"))?;
+    let image = tables.images.get(only).ok_or_else(|| format!("it refers to image {only}, which does not exist"))?;
+    let view = image.buffer_view.ok_or_else(|| format!("its image {only} is stored in another file"))?;
     tables.bytes(view, data).map(Some)
 }
 
@@ -81,10 +81,10 @@ impl Reader<'_> {
     fn node(&mut self, number: usize, above: DMat4, depth: usize) -> Result<(), String> {
         self.nodes += 1;
         if self.nodes > NODES_MAX || depth > DEPTH_MAX {
-            return Err("its nodes are too many or too deep".to_owned());
+            return Err("its nodes are too many or nested too deeply".to_owned());
         }
         let node =
-            self.tables.nodes.get(number).ok_or_else(|| format!("it names node {number}, which is not there"))?;
+            self.tables.nodes.get(number).ok_or_else(|| format!("it refers to node {number}, which does not exist"))?;
         let place = above * node.matrix();
         if node.children.len() > NODES_MAX {
             return Err(format!("its node {number} has more than {NODES_MAX} children"));
@@ -97,11 +97,14 @@ impl Reader<'_> {
     }
 
     fn mesh(&mut self, number: usize, place: DMat4) -> Result<(), String> {
-        let mesh =
-            self.tables.meshes.get(number).ok_or_else(|| format!("it names mesh {number}, which is not there"))?;
-        self.looked_at += mesh.primitives.len();
-        if self.looked_at > NODES_MAX {
-            return Err(format!("the meshes that its nodes show have more than {NODES_MAX} primitives"));
+        let mesh = self
+            .tables
+            .meshes
+            .get(number)
+            .ok_or_else(|| format!("it refers to mesh {number}, which does not exist"))?;
+        self.primitives_visited += mesh.primitives.len();
+        if self.primitives_visited > NODES_MAX {
+            return Err(format!("the meshes that its nodes instantiate have more than {NODES_MAX} primitives"));
         }
         self.meshes += 1;
         (0..mesh.primitives.len()).try_for_each(|part| self.primitive([number, part], place))
@@ -114,7 +117,7 @@ impl Reader<'_> {
         let positions = *primitive.attributes.get("POSITION").ok_or("a primitive has no positions")?;
         let first = self.points.len();
         if first.saturating_add(self.tables.count(positions)?) > POINTS_MAX {
-            return Err(format!("the meshes that its nodes show have more than {POINTS_MAX} points"));
+            return Err(format!("the meshes that its nodes instantiate have more than {POINTS_MAX} points"));
         }
         let points = tables::points(&self.tables, positions, self.data)?;
         let (first, count) = (first as u32, points.len() as u32);
@@ -250,11 +253,11 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_the_file_is_refused() {
+    fn data_outside_the_file_is_refused() {
         for bad in [json(48 + 24, 5, 12), json(48 + 24, 4, 1000), json(48 + 24, 4, 4_000_000_000), json(9000, 4, 12)] {
-            let told = read(&file(&bad), 1.0).err();
+            let message = read(&file(&bad), 1.0).err();
             // a buffer that claims more bytes than the file has is reported only where a read passes its end
-            assert!(told.is_some() || bad == json(9000, 4, 12), "{bad}");
+            assert!(message.is_some() || bad == json(9000, 4, 12), "{bad}");
         }
         let whole = tetrahedron();
         for cut in [5, 11, 12, 19, 30, whole.len() - 30, whole.len() - 1] {
@@ -265,7 +268,7 @@ mod tests {
     }
 
     /// The error for the tetrahedron with `from` replaced by `to` in its text; empty if it is read.
-    fn told(from: &str, to: &str) -> String {
+    fn message(from: &str, to: &str) -> String {
         let text = json(48 + 24, 4, 12);
         assert!(text.contains(from), "{from}");
         read(&file(&text.replace(from, to)), 1.0).err().unwrap_or_default()
@@ -273,7 +276,7 @@ mod tests {
 
     #[test]
     fn an_extension_that_is_required_is_refused_by_its_name_if_it_changes_triangles() {
-        let with = |names: &str| told("\"scene\":0", &format!("\"scene\":0,\"extensionsRequired\":[{names}]"));
+        let with = |names: &str| message("\"scene\":0", &format!("\"scene\":0,\"extensionsRequired\":[{names}]"));
         assert!(
             with("\"KHR_materials_unlit\",\"KHR_draco_mesh_compression\"").contains("`KHR_draco_mesh_compression`")
         );
@@ -282,7 +285,7 @@ mod tests {
 
     #[test]
     fn corners_that_make_no_triangles_are_refused() {
-        assert!(told("\"count\":12", "\"count\":11").contains("primitive 0 of mesh 0 has 11 corners"));
+        assert!(message("\"count\":12", "\"count\":11").contains("primitive 0 of mesh 0 has 11 corners"));
         let short = json(48 + 24, 4, 2).replace("\"indices\":1}", "\"indices\":1,\"mode\":6}");
         assert!(read(&file(&short), 1.0).unwrap_err().contains("expected three or more"));
     }
@@ -290,10 +293,10 @@ mod tests {
     #[test]
     fn a_mesh_that_branches_is_refused_and_meshes_that_touch_are_not() {
         let primitive = r#"{"attributes":{"POSITION":0},"indices":1}"#;
-        let told_twice = told(primitive, &format!("{primitive},{primitive}"));
+        let repeated = message(primitive, &format!("{primitive},{primitive}"));
         let edge = "4 triangles share the edge from vertex 0 of primitive 1 of mesh 0 to vertex";
-        assert!(told_twice.contains("not manifold") && told_twice.contains(edge), "{told_twice}");
-        assert_eq!(told("\"nodes\":[0]", "\"nodes\":[0,0]"), "");
+        assert!(repeated.contains("not manifold") && repeated.contains(edge), "{repeated}");
+        assert_eq!(message("\"nodes\":[0]", "\"nodes\":[0,0]"), "");
     }
 
     #[test]
@@ -313,7 +316,7 @@ mod tests {
             read(&packed(&text, &data), 1.0).err().unwrap_or_default()
         };
         assert_eq!(shown(2), "");
-        assert_eq!(shown(101), "the meshes that its nodes show have more than 3000000 points");
+        assert_eq!(shown(101), "the meshes that its nodes instantiate have more than 3000000 points");
         let line = r#"{"attributes":{},"mode":1}"#;
         let lines = format!("{line},").repeat(60_000) + line;
         let text = json(72, 4, 12).replace("\"primitives\":[", &format!("\"primitives\":[{lines},"));
@@ -324,9 +327,9 @@ mod tests {
 
     #[test]
     fn a_node_that_blows_its_mesh_up_past_the_bounds_of_a_scene_is_refused() {
-        let why = told("\"translation\":[5,0,0]", "\"scale\":[1e30,1e30,1e30]");
-        assert!(why.contains("it reaches 2.000e30 m"), "{why}");
-        assert!(told("\"translation\":[5,0,0]", "\"scale\":[0,0,0]").contains("has an area"));
+        let why = message("\"translation\":[5,0,0]", "\"scale\":[1e30,1e30,1e30]");
+        assert!(why.contains("it extends 2.000e30 m"), "{why}");
+        assert!(message("\"translation\":[5,0,0]", "\"scale\":[0,0,0]").contains("has an area"));
     }
 
     proptest! {

@@ -74,7 +74,8 @@ pub(super) fn copies(
     c: &mut Checker<'_, '_>,
     place: &Place,
     common: &CommonFile,
-    (can_move, most): (bool, usize),
+    can_move: bool,
+    most: usize,
 ) -> Copies {
     let Some(grid) = common.grid else {
         let scatter = common.scatter_m.is_some();
@@ -85,12 +86,17 @@ pub(super) fn copies(
             ("scatter_seed", common.scatter_seed.is_some()),
         ];
         for (key, _) in strays.into_iter().filter(|(_, given)| *given) {
-            c.wrong(place, key, "has no grid to act on", "expected `grid = [x, y, z]` beside it");
+            c.wrong(place, key, "has no effect without a grid", "expected `grid = [x, y, z]` beside it");
         }
         return Copies::single();
     };
     if !can_move {
-        c.wrong(place, "grid", "repeats an object without a place", "expected an object that has one: no tool");
+        c.wrong(
+            place,
+            "grid",
+            "repeats a tool or a synthetic agent, which has no position to offset",
+            "expected no `grid` for this model",
+        );
         return Copies::single();
     }
     let count = grid.iter().map(|n| u64::from(*n)).product::<u64>();
@@ -150,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_of_a_grid_count_along_x_first() {
+    fn copies_of_a_grid_are_numbered_along_x_first() {
         let places: Vec<_> = (0..12).map(|k| grid_place([2, 3, 2], k)).collect();
         assert_eq!(places[1], [1.0, 0.0, 0.0]);
         assert_eq!(places[2], [0.0, 1.0, 0.0]);

@@ -4,7 +4,7 @@
 //! Never here: the mesh that replaces them, and when it is drawn.
 
 use super::impostors::impostors;
-use super::object::{Named, Objects};
+use super::object::{NamedObject, Objects};
 use crate::check::{Checker, Place};
 use crate::format::GroupFile;
 use crate::source::Source;
@@ -17,7 +17,8 @@ const GROUPS_MAX: usize = 1000;
 pub(crate) fn groups(
     c: &mut Checker<'_, '_>,
     files: &[GroupFile],
-    (objects, source): (&mut Objects, &Source),
+    objects: &mut Objects,
+    source: &Source,
 ) -> Vec<Group> {
     if files.len() > GROUPS_MAX {
         let expected = format!("expected at most {GROUPS_MAX}");
@@ -26,11 +27,16 @@ pub(crate) fn groups(
     }
     let mut owner = vec![None; objects.scenery.len()];
     for (number, file) in files.iter().enumerate() {
-        let place = Place::new(format!("group.{number}"), format!("of group `{}`", file.name));
+        let place = group_place(number, file);
         if objects.names.is_known(&file.name) || files[..number].iter().any(|other| other.name == file.name) {
-            c.wrong(&place, "name", format_args!("`{}` is taken", file.name), "expected a name of its own");
+            c.wrong(
+                &place,
+                "name",
+                format_args!("is `{}`, the name of another object or group", file.name),
+                "expected a unique name",
+            );
         }
-        claim(c, &place, (number, file), (objects, &mut owner));
+        claim(c, number, file, objects, &mut owner);
     }
     let mut order: Vec<usize> = (0..owner.len()).collect();
     // scenery of no group first, then group by group
@@ -40,8 +46,8 @@ pub(crate) fn groups(
     let mut made = Vec::with_capacity(files.len());
     for (number, file) in files.iter().enumerate() {
         let end = start + owner.iter().filter(|group| **group == Some(number)).count();
-        let place = Place::new(format!("group.{number}"), format!("of group `{}`", file.name));
-        if let Some((proxy, levels)) = impostors(c, &place, file, (&objects.scenery[start..end], source)) {
+        let place = group_place(number, file);
+        if let Some((proxy, levels)) = impostors(c, &place, file, &objects.scenery[start..end], source) {
             made.push(Group { proxy, levels, members: start..end });
         }
         start = end;
@@ -49,26 +55,32 @@ pub(crate) fn groups(
     made
 }
 
-/// Assigns the members to group `number`.
-fn claim(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (number, file): (usize, &GroupFile),
-    (objects, owner): (&Objects, &mut [Option<usize>]),
-) {
+/// The place of group `number` in the scene file.
+fn group_place(number: usize, file: &GroupFile) -> Place {
+    Place::new(format!("group.{number}"), format!("of group `{}`", file.name))
+}
+
+/// Assigns its members to group `number`; `owner` holds the group of every object of the scenery.
+fn claim(c: &mut Checker<'_, '_>, number: usize, file: &GroupFile, objects: &Objects, owner: &mut [Option<usize>]) {
+    let place = &group_place(number, file);
     if file.members.is_empty() {
         c.wrong(place, "members", "is empty", "expected names of meshes and trees");
     }
     for (at, wanted) in file.members.iter().enumerate() {
         let key = format!("members.{at}");
         let found: Vec<usize> = (0..owner.len()).filter(|&i| is_meant(&objects.scenery[i].name, wanted)).collect();
-        let others = objects.names.only(|named| named != Named::Scenery);
+        let others = objects.names.only(|named| named != NamedObject::Scenery);
         if let Some(other) = others.into_iter().find(|name| is_meant(name, wanted)) {
             let what = format_args!("names `{other}`, which is neither mesh nor tree");
-            return c.wrong(place, &key, what, "expected scenery: what is simulated or fixed is drawn by itself");
+            return c.wrong(
+                place,
+                &key,
+                what,
+                "expected scenery: simulated and fixed objects cannot be members of a group",
+            );
         }
         if found.is_empty() {
-            c.reference(place, &key, wanted, objects.names.only(|named| named == Named::Scenery));
+            c.reference(place, &key, wanted, objects.names.only(|named| named == NamedObject::Scenery));
         }
         for i in found {
             if owner[i].is_some_and(|other| other != number) {
@@ -93,7 +105,7 @@ mod tests {
     use crate::{Source, load};
 
     /// The problems of a scene with a group of these members, a mesh `a1` and a falling ball `a2`; empty if there are none.
-    fn told(members: &str) -> String {
+    fn message(members: &str) -> String {
         let text = format!(
             "format = 1\n[[object]]\nname = \"a1\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n[[object]]\nname = \"a2\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n[[group]]\nname = \"g\"\nmembers = {members}\n"
         );
@@ -102,12 +114,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_simulated_is_refused_as_a_member_by_its_name_and_by_a_star() {
-        assert_eq!(told("[\"a1\"]"), "");
+    fn a_simulated_object_is_refused_as_a_group_member_by_name_and_by_star() {
+        assert_eq!(message("[\"a1\"]"), "");
         for members in ["[\"a2\"]", "[\"a1\", \"a2\"]", "[\"a*\"]"] {
-            let told = told(members);
-            assert!(told.contains("names `a2`, which is neither mesh nor tree"), "{members}: {told}");
+            let message = message(members);
+            assert!(message.contains("names `a2`, which is neither mesh nor tree"), "{members}: {message}");
         }
-        assert!(told("[\"b*\"]").contains("does not exist"));
+        assert!(message("[\"b*\"]").contains("does not exist"));
     }
 }

@@ -23,7 +23,8 @@ pub(super) fn impostors(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &GroupFile,
-    (members, source): (&[Scenery], &Source),
+    members: &[Scenery],
+    source: &Source,
 ) -> Option<(Scenery, Vec<u32>)> {
     let before = c.count();
     let wanted = file.levels.as_deref();
@@ -31,29 +32,29 @@ pub(super) fn impostors(
         check(c, place, levels);
     }
     let first = members.first()?;
-    let (tom, at) = match &file.proxy {
+    let (mesh, at) = match &file.proxy {
         Some(given) => {
-            let (tom, at) = mesh_model(c, &place.table("proxy"), given, source)?;
-            let has = tom.range().1.max(given.triangles.unwrap_or(0));
-            if let Some((key, count)) = wanted.and_then(|levels| past(levels, has)) {
+            let (mesh, at) = mesh_model(c, &place.table("proxy"), given, source)?;
+            let has = mesh.range().1.max(given.triangles.unwrap_or(0));
+            if let Some((key, count)) = wanted.and_then(|levels| first_past(levels, has)) {
                 let what = format_args!("has {count} triangles where `proxy` has {has}");
                 c.wrong(place, &key, what, format!("expected at most {has}"));
             }
-            (tom, at)
+            (mesh, at)
         }
         None if c.count() > before => return None,
-        None => made_of(c, place, members, wanted)?,
+        None => merged_mesh(c, place, members, wanted)?,
     };
     if c.count() > before {
         return None;
     }
     let levels = match wanted {
-        Some(levels) => cuts(c, place, (levels, &tom))?,
-        None => usual(&tom),
+        Some(levels) => cuts(c, place, levels, &mesh)?,
+        None => default_levels(&mesh),
     };
     let importance = members.iter().map(|m| m.look.importance).fold(0.0, f64::max);
     let look = Look { colour: mean_colour(members), importance, ..first.look };
-    Some((Scenery { name: file.name.clone(), model: Model::Mesh(tom), at, look, texture: None }, levels))
+    Some((Scenery { name: file.name.clone(), model: Model::Mesh(mesh), at, look, texture: None }, levels))
 }
 
 /// Reports levels that are wrong whatever mesh they are cut from.
@@ -73,12 +74,12 @@ fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
 }
 
 /// The first level with more triangles than `has`, and its key.
-fn past(levels: &[u32], has: u32) -> Option<(String, u32)> {
+fn first_past(levels: &[u32], has: u32) -> Option<(String, u32)> {
     levels.iter().enumerate().find(|(_, count)| **count > has).map(|(at, count)| (format!("levels.{at}"), *count))
 }
 
 /// One mesh made of all members.
-fn made_of(
+fn merged_mesh(
     c: &mut Checker<'_, '_>,
     place: &Place,
     members: &[Scenery],
@@ -90,25 +91,30 @@ fn made_of(
     let origin = members.iter().map(|m| m.at.position).sum::<DVec3>() / members.len() as f64;
     let parts: Vec<(Model, Placement)> = members.iter().map(|m| (m.model.clone(), m.at)).collect();
     match proxy(&parts, origin, finest) {
-        Ok(tom) => Some((Arc::new(tom), Placement { position: origin, rotation: DQuat::IDENTITY, scale: 1.0 })),
+        Ok(mesh) => Some((Arc::new(mesh), Placement { position: origin, rotation: DQuat::IDENTITY, scale: 1.0 })),
         Err(why) => {
-            c.wrong(place, "members", format_args!("cannot be drawn as one: {why}"), "expected meshes with an area");
+            c.wrong(
+                place,
+                "members",
+                format_args!("cannot be merged into one mesh: {why}"),
+                "expected meshes with an area",
+            );
             None
         }
     }
 }
 
 /// The triangles that the mesh has at each level; `None` where two levels are equal or one is below its coarsest, which is reported.
-fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &ProgressiveMesh)) -> Option<Vec<u32>> {
-    let (least, most) = tom.range();
+fn cuts(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32], mesh: &ProgressiveMesh) -> Option<Vec<u32>> {
+    let (least, most) = mesh.range();
     let mut made: Vec<u32> = Vec::with_capacity(levels.len());
     for (at, count) in levels.iter().enumerate() {
-        let cut = tom.cut(*count).triangles;
+        let cut = mesh.cut(*count).triangles;
         if *count < least || made.last().is_some_and(|before| *before >= cut) {
             let what = format_args!(
-                "asks for {count} triangles, which gives {cut} as the level before it or the coarsest does"
+                "requests {count} triangles, which gives {cut}, the same as the level before it or below the coarsest"
             );
-            let expected = format!("expected levels from {least} to {most}, which is what its mesh can be cut to");
+            let expected = format!("expected levels from {least} to {most} triangles, the range of its mesh");
             c.wrong(place, &format!("levels.{at}"), what, expected);
             return None;
         }
@@ -118,12 +124,12 @@ fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Progres
 }
 
 /// Default levels: all triangles of the mesh, then coarser levels as long as they have enough triangles to show a shape.
-fn usual(tom: &ProgressiveMesh) -> Vec<u32> {
-    let (least, most) = tom.range();
+fn default_levels(mesh: &ProgressiveMesh) -> Vec<u32> {
+    let (least, most) = mesh.range();
     let coarser = |count: &u32| Some(count / COARSER).filter(|count| *count >= TRIANGLES.0.max(least));
     let mut levels: Vec<u32> = std::iter::successors(Some(most), coarser).take(GROUP_LEVELS_MAX).collect();
     levels.reverse();
-    let mut levels: Vec<u32> = levels.into_iter().map(|count| tom.cut(count).triangles).collect();
+    let mut levels: Vec<u32> = levels.into_iter().map(|count| mesh.cut(count).triangles).collect();
     levels.dedup();
     levels
 }
@@ -154,7 +160,7 @@ mod tests {
         wood(keys).unwrap().groups[0].levels.clone()
     }
 
-    fn told(keys: &str) -> String {
+    fn message(keys: &str) -> String {
         let problems = wood(keys).expect_err(keys).problems;
         problems.iter().map(|p| format!("{}; {}; {}\n", p.message, p.expected, p.text)).collect()
     }
@@ -171,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn without_levels_there_are_some_from_a_twentieth_of_the_members_down_by_quarters() {
+    fn default_levels_start_at_a_twentieth_of_the_members_and_fall_by_quarters() {
         let made = levels("");
         // 25 balls of about 200 triangles: 250, 62, 15
         assert_eq!(made.len(), 3, "{made:?}");
@@ -180,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_levels_are_refused_where_they_stand() {
+    fn wrong_levels_are_refused_at_their_position() {
         let small = "proxy = { generate = \"sphere\", triangles = 100, scale = 8 }\nlevels = [20, 320]";
         let cases = [
             ("levels = []", "`levels` of group `g` has 0 entries; expected 1 to 8"),
@@ -200,8 +206,8 @@ mod tests {
             ("proxy_triangles = 20", "proxy_triangles"),
         ];
         for (keys, expected) in cases {
-            let told = told(keys);
-            assert!(told.contains(expected), "{keys}\n{told}");
+            let message = message(keys);
+            assert!(message.contains(expected), "{keys}\n{message}");
         }
     }
 }

@@ -4,9 +4,9 @@
 //! [`Checker`]. Never here: solving joints.
 
 use super::POSITION_MAX_M;
-use super::joint_keys::{Leaves, leaves};
-use super::joint_rules::{Held, check_start, contradictions};
-use super::object::{Named, Objects};
+use super::joint_keys::{FreeMotion, free_motion};
+use super::joint_rules::{PlacedJoint, check_start, contradictions};
+use super::object::{NamedObject, Objects};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, JointKind as Kind, Point};
 use glam::{DQuat, DVec3};
@@ -38,6 +38,13 @@ impl End {
     }
 }
 
+/// One end of a joint with its anchor in world coordinates, metres.
+#[derive(Debug, Clone, Copy)]
+struct Anchored {
+    end: End,
+    anchor: DVec3,
+}
+
 /// The joints of the scene.
 pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Objects) -> Vec<Joint> {
     if files.len() > JOINTS_MAX {
@@ -45,37 +52,39 @@ pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Obj
         c.wrong(&Place::new("", ""), "joint", format_args!("has {} entries", files.len()), expected);
         return Vec::new();
     }
-    let held: Vec<Held> = files.iter().enumerate().filter_map(|(i, file)| held(c, i, file, objects)).collect();
-    contradictions(c, &held);
-    held.into_iter().filter_map(Held::joint).collect()
+    let placed: Vec<PlacedJoint> =
+        files.iter().enumerate().filter_map(|(i, file)| place_joint(c, i, file, objects)).collect();
+    contradictions(c, &placed);
+    placed.into_iter().filter_map(PlacedJoint::joint).collect()
 }
 
-fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<Held> {
+/// Reads one joint and checks that it can hold at the start.
+fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<PlacedJoint> {
     let place = Place::new(format!("joint.{index}"), format!("of the joint of `{}` and `{}`", file.a, file.b));
     let before = c.count();
-    let free = leaves(c, &place, file);
-    let (a, b) = (end(c, &place, ("a", &file.a), objects), end(c, &place, ("b", &file.b), objects));
+    let free = free_motion(c, &place, file);
+    let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a.agent == b.agent {
         let (what, expected) = match a.agent {
-            Some(_) => ("is the object that `a` is", "expected another object: a joint holds two"),
-            None => ("cannot move, as `a` cannot", "expected at least one object that moves"),
+            Some(_) => ("is the same object as `a`", "expected another object: a joint connects two"),
+            None => ("is fixed, and so is `a`", "expected at least one object that moves"),
         };
         c.wrong(&place, "b", what, expected);
         return None;
     }
     let at_a_m = file.at_a_m.map_or(DVec3::ZERO, |at| c.point(&place, "at_a_m", at, POSITION_MAX_M));
     let from = a.to_world(at_a_m);
-    let to = other_anchor(c, &place, file, (b, from))?;
+    let to = other_anchor(c, &place, file, b, from)?;
     if c.count() > before {
         return None;
     }
-    let held = Held { place, ends: [a, b], anchors: [from, to], leaves: free?, collide: collide(file) };
-    check_start(c, &held).then_some(held)
+    let placed = PlacedJoint { place, ends: [a, b], anchors: [from, to], free_motion: free?, collide: collide(file) };
+    check_start(c, &placed).then_some(placed)
 }
 
 /// One end of a joint: a rigid object, the world, or a fixed object, which becomes a pose in the world.
-fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<End> {
+fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &Objects) -> Option<End> {
     if name == WORLD {
         if key == "a" {
             c.wrong(place, key, "is the world", "expected a rigid object; the world is written as `b`");
@@ -88,42 +97,44 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
         None
     };
     match objects.names.get(name) {
-        Some(Named::Rigid(id)) => {
+        Some(NamedObject::Rigid(id)) => {
             let member = objects.agents.iter().find(|member| member.id == id)?;
             let Spec::Rigid(body) = &member.spec else { return None };
             Some(End { agent: Some(id), position: body.position, rotation: body.rotation.normalize() })
         }
-        Some(Named::Fixed) => {
+        Some(NamedObject::Fixed) => {
             let solid = objects.obstacles.iter().find(|obstacle| obstacle.name == name)?;
             Some(End { agent: None, position: solid.position, rotation: solid.rotation.normalize() })
         }
-        Some(Named::Tube(_)) => wrong(
+        Some(NamedObject::Tube(_)) => wrong(
             c,
             "which is a tube",
             "expected a rigid object; a tube is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `clamp` and `pin`",
         ),
-        Some(Named::Soft(_)) => wrong(
+        Some(NamedObject::Soft(_)) => wrong(
             c,
             "which is soft",
             "expected a rigid object; a sheet, solid or rope is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `hold`",
         ),
-        Some(Named::Tool(_)) => wrong(
+        Some(NamedObject::Tool(_)) => wrong(
             c,
             "which is a tool",
             "expected a rigid object; a tool holds by its jaws, or by a `[[coupling]]` of `kind = \"attach\"`",
         ),
-        Some(Named::Synthetic(_)) => wrong(c, "which has no matter", "expected a rigid object"),
-        Some(Named::Scenery) => wrong(c, "which is only seen", "expected a rigid object"),
+        Some(NamedObject::Synthetic(_)) => {
+            wrong(c, "which is a synthetic agent without a body", "expected a rigid object")
+        }
+        Some(NamedObject::Scenery) => wrong(c, "which is scenery and only drawn", "expected a rigid object"),
         None => {
-            let held = |named| matches!(named, Named::Rigid(_) | Named::Fixed);
-            c.reference(place, key, name, objects.names.only(held));
+            let joinable = |named| matches!(named, NamedObject::Rigid(_) | NamedObject::Fixed);
+            c.reference(place, key, name, objects.names.only(joinable));
             None
         }
     }
 }
 
 /// The anchor on `b`, in the world: `at_b_m` if given; else the anchor on `a`, or for springs and ropes the origin of `b`.
-fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, (b, from): (End, DVec3)) -> Option<DVec3> {
+fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, b: End, from: DVec3) -> Option<DVec3> {
     let given = |c: &mut Checker<'_, '_>, at: Point| b.to_world(c.point(place, "at_b_m", at, POSITION_MAX_M));
     match (file.at_b_m, file.kind) {
         (Some(at), _) => Some(given(c, at)),
@@ -141,43 +152,40 @@ fn collide(file: &JointFile) -> bool {
     file.collide.unwrap_or(matches!(file.kind, Kind::Spring | Kind::Rope))
 }
 
-impl Held {
+impl PlacedJoint {
     /// The joint with an agent as `a`. Where `a` is fixed in the file, the ends are swapped and the axis is reversed: b's motion relative
     /// to a about `axis` is a's relative to b about the opposite axis.
     fn joint(self) -> Option<Joint> {
         let Self { ends: [a, b], anchors: [from, to], .. } = self;
-        match (a.agent, b.agent) {
-            (Some(id), other) => Some(self.between((id, other), (a, from), (b, to), 1.0)),
-            (None, Some(id)) => Some(self.between((id, None), (b, to), (a, from), -1.0)),
+        let (a, b) = (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to });
+        match (a.end.agent, b.end.agent) {
+            (Some(id), _) => Some(self.between(id, a, b, 1.0)),
+            (None, Some(id)) => Some(self.between(id, b, a, -1.0)),
             (None, None) => None,
         }
     }
 
-    fn between(
-        &self,
-        (id, other): (AgentId, Option<AgentId>),
-        (a, from): (End, DVec3),
-        (b, to): (End, DVec3),
-        sign: f64,
-    ) -> Joint {
+    /// The joint of the agent `id`, which is at `a`; `sign` is that of the axis.
+    fn between(&self, id: AgentId, a: Anchored, b: Anchored, sign: f64) -> Joint {
+        let (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to }) = (a, b);
         let axis = |world: DVec3| a.rotation.conjugate() * world * sign;
         let length = from.distance(to);
-        let kind = match self.leaves {
-            Leaves::Nothing => JointKind::Fixed,
-            Leaves::Turn { range_rad, .. } => JointKind::Revolute { axis: axis(self.axis()), range_rad },
-            Leaves::Turns => JointKind::Spherical,
-            Leaves::Slide { range_m, .. } => JointKind::Prismatic { axis: axis(self.axis()), range_m },
-            Leaves::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
+        let kind = match self.free_motion {
+            FreeMotion::Fixed => JointKind::Fixed,
+            FreeMotion::Revolute { range_rad, .. } => JointKind::Revolute { axis: axis(self.axis()), range_rad },
+            FreeMotion::Spherical => JointKind::Spherical,
+            FreeMotion::Prismatic { range_m, .. } => JointKind::Prismatic { axis: axis(self.axis()), range_m },
+            FreeMotion::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
                 JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: rest_m.unwrap_or(length) }
             }
-            Leaves::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
+            FreeMotion::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
         };
         // a joint to the world is given in the world's axes
-        let (anchor_b_m, rotation_b) = match other {
+        let (anchor_b_m, rotation_b) = match b.agent {
             Some(_) => (b.to_local(to), b.rotation),
             None => (to, DQuat::IDENTITY),
         };
         let rest = (a.rotation.conjugate() * rotation_b).normalize();
-        Joint { a: id, b: other, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide: self.collide }
+        Joint { a: id, b: b.agent, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide: self.collide }
     }
 }

@@ -1,5 +1,6 @@
 //! Reads the keys of a joint: which belong to its kind, and the motion that they leave free.
 
+use super::{DAMPING, STIFFNESS};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{JointFile, JointKind as Kind};
 use glam::DVec3;
@@ -13,11 +14,11 @@ const AXIS_MAX: f64 = 1e6;
 
 /// The motion that a joint leaves free, as its keys say; axes are unit vectors in the axes of `a`.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Leaves {
-    Nothing,
-    Turn { axis: DVec3, range_rad: Option<[f64; 2]> },
-    Turns,
-    Slide { axis: DVec3, range_m: Option<[f64; 2]> },
+pub(super) enum FreeMotion {
+    Fixed,
+    Revolute { axis: DVec3, range_rad: Option<[f64; 2]> },
+    Spherical,
+    Prismatic { axis: DVec3, range_m: Option<[f64; 2]> },
     Spring { stiffness_n_m: f64, damping_n_s_m: f64, rest_m: Option<f64> },
     Rope { length_m: Option<f64> },
 }
@@ -34,41 +35,41 @@ const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str
 }
 
 /// Reads the motion that the joint leaves free.
-pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<Leaves> {
+pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<FreeMotion> {
     if !check_keys(c, place, file) {
         return None;
     }
     Some(match file.kind {
-        Kind::Fixed => Leaves::Nothing,
-        Kind::Spherical => Leaves::Turns,
+        Kind::Fixed => FreeMotion::Fixed,
+        Kind::Spherical => FreeMotion::Spherical,
         Kind::Revolute => {
-            let range = range(c, place, ("range_deg", file.range_deg), 180.0);
+            let range = range(c, place, "range_deg", file.range_deg, 180.0);
             let around_start = range.is_none_or(|[least, greatest]| least <= 0.0 && greatest >= 0.0);
             if !around_start {
-                c.wrong(place, "range_deg", "does not contain the start", "expected a range with 0 among it");
+                c.wrong(
+                    place,
+                    "range_deg",
+                    "does not contain 0, the angle at the start",
+                    "expected [least, greatest] with 0 between them",
+                );
             }
-            Leaves::Turn { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
+            FreeMotion::Revolute { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
         }
         Kind::Prismatic => {
-            let range_m = range(c, place, ("range_m", file.range_m), LENGTH_MAX_M);
-            Leaves::Slide { axis: axis(c, place, file)?, range_m }
+            let range_m = range(c, place, "range_m", file.range_m, LENGTH_MAX_M);
+            FreeMotion::Prismatic { axis: axis(c, place, file)?, range_m }
         }
         Kind::Spring => {
             let length = allowed(0.0..=LENGTH_MAX_M, "m");
-            Leaves::Spring {
-                stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, &allowed(1e-6..=1e9, "N/m")),
-                damping_n_s_m: c.number_or(
-                    place,
-                    "damping_n_s_m",
-                    (file.damping_n_s_m, 0.0),
-                    &allowed(0.0..=1e7, "N·s/m"),
-                ),
+            FreeMotion::Spring {
+                stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS),
+                damping_n_s_m: c.optional(place, "damping_n_s_m", file.damping_n_s_m, &DAMPING).unwrap_or(0.0),
                 rest_m: file.rest_m.map(|rest| c.number(place, "rest_m", rest, &length)),
             }
         }
         Kind::Rope => {
             let length = allowed(1e-6..=LENGTH_MAX_M, "m");
-            Leaves::Rope { length_m: file.length_m.map(|m| c.number(place, "length_m", m, &length)) }
+            FreeMotion::Rope { length_m: file.length_m.map(|m| c.number(place, "length_m", m, &length)) }
         }
     })
 }
@@ -79,7 +80,7 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool 
     let name = file.kind.name();
     let list = needs.iter().chain(takes).map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
     let expected = if list.is_empty() {
-        format!("a {name} joint has none of its own")
+        format!("a {name} joint has no keys of its own")
     } else {
         format!("a {name} joint has {list}")
     };
@@ -115,12 +116,7 @@ fn axis(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<DVec
 }
 
 /// A range with both ends within ± `most`, in order.
-fn range(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    (key, given): (&str, Option<[f64; 2]>),
-    most: f64,
-) -> Option<[f64; 2]> {
+fn range(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<[f64; 2]>, most: f64) -> Option<[f64; 2]> {
     let [least, greatest] = given?;
     let within = |end: f64| end.abs() <= most;
     if !(within(least) && within(greatest) && least <= greatest) {

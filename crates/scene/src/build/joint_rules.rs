@@ -1,7 +1,7 @@
 //! Checks that joints can hold: each with its objects as they start, and all joints of one pair together.
 
 use super::joint::End;
-use super::joint_keys::Leaves;
+use super::joint_keys::FreeMotion;
 use crate::check::{Checker, Place};
 use glam::DVec3;
 use metachron_core::AgentId;
@@ -13,21 +13,21 @@ const SAME_DIRECTION: f64 = 1e-3;
 
 /// A joint while it is checked, in world coordinates at the start.
 #[derive(Debug, Clone)]
-pub(super) struct Held {
+pub(super) struct PlacedJoint {
     pub(super) place: Place,
     /// The ends `a` and `b`.
     pub(super) ends: [End; 2],
     /// The anchors on `a` and `b`, in the world.
     pub(super) anchors: [DVec3; 2],
-    pub(super) leaves: Leaves,
+    pub(super) free_motion: FreeMotion,
     pub(super) collide: bool,
 }
 
-impl Held {
+impl PlacedJoint {
     /// The axis of a turn or slide in the world; zero for other kinds.
     pub(super) fn axis(&self) -> DVec3 {
-        match self.leaves {
-            Leaves::Turn { axis, .. } | Leaves::Slide { axis, .. } => self.ends[0].rotation * axis,
+        match self.free_motion {
+            FreeMotion::Revolute { axis, .. } | FreeMotion::Prismatic { axis, .. } => self.ends[0].rotation * axis,
             _ => DVec3::ZERO,
         }
     }
@@ -48,12 +48,12 @@ impl Held {
 }
 
 /// Reports anchors that start where the joint cannot hold them; returns whether it can.
-pub(super) fn check_start(c: &mut Checker<'_, '_>, held: &Held) -> bool {
-    let apart = held.anchors[1] - held.anchors[0];
-    let along = apart.dot(held.axis());
-    let (key, what, expected) = match held.leaves {
-        Leaves::Spring { .. } => return true,
-        Leaves::Rope { length_m } => match length_m {
+pub(super) fn check_start(c: &mut Checker<'_, '_>, joint: &PlacedJoint) -> bool {
+    let apart = joint.anchors[1] - joint.anchors[0];
+    let along = apart.dot(joint.axis());
+    let (key, what, expected) = match joint.free_motion {
+        FreeMotion::Spring { .. } => return true,
+        FreeMotion::Rope { length_m } => match length_m {
             Some(length) if apart.length() > length + GAP_MAX_M => (
                 "length_m",
                 format!("is {length}, but its ends start {:.4} m apart", apart.length()),
@@ -61,62 +61,66 @@ pub(super) fn check_start(c: &mut Checker<'_, '_>, held: &Held) -> bool {
             ),
             _ => return true,
         },
-        Leaves::Slide { .. } if (apart - along * held.axis()).length() > GAP_MAX_M => (
+        FreeMotion::Prismatic { .. } if (apart - along * joint.axis()).length() > GAP_MAX_M => (
             "at_b_m",
-            format!("starts {:.4} m beside the axis through `at_a_m`", (apart - along * held.axis()).length()),
+            format!("is {:.4} m off the axis through `at_a_m` at the start", (apart - along * joint.axis()).length()),
             format!("expected at most {GAP_MAX_M} m"),
         ),
-        Leaves::Slide { range_m: Some([least, greatest]), .. }
+        FreeMotion::Prismatic { range_m: Some([least, greatest]), .. }
             if !(least - GAP_MAX_M..=greatest + GAP_MAX_M).contains(&along) =>
         {
             let what = format!("is [{least}, {greatest}], but the objects start at {along:.4} m");
-            ("range_m", what, "expected a range with that among it".to_owned())
+            ("range_m", what, "expected a range that contains that position".to_owned())
         }
-        Leaves::Slide { .. } => return true,
-        Leaves::Nothing | Leaves::Turn { .. } | Leaves::Turns if apart.length() > GAP_MAX_M => (
+        FreeMotion::Prismatic { .. } => return true,
+        FreeMotion::Fixed | FreeMotion::Revolute { .. } | FreeMotion::Spherical if apart.length() > GAP_MAX_M => (
             "at_b_m",
-            format!("starts {:.4} m from where `at_a_m` is", apart.length()),
-            format!("expected the same point of space, within {GAP_MAX_M} m; without `at_b_m` it is"),
+            format!("is {:.4} m away from `at_a_m` at the start", apart.length()),
+            format!("expected the same point of space, within {GAP_MAX_M} m, which is the default"),
         ),
-        Leaves::Nothing | Leaves::Turn { .. } | Leaves::Turns => return true,
+        FreeMotion::Fixed | FreeMotion::Revolute { .. } | FreeMotion::Spherical => return true,
     };
-    c.wrong(&held.place, key, what, expected);
+    c.wrong(&joint.place, key, what, expected);
     false
 }
 
 /// Reports joints of one pair that together leave less free than each of them should.
-pub(super) fn contradictions(c: &mut Checker<'_, '_>, all: &[Held]) {
-    let mut pairs: BTreeMap<_, Vec<&Held>> = BTreeMap::new();
-    for held in all {
-        let before = pairs.entry(held.pair()).or_default();
-        if let Some(why) = before.iter().find_map(|other| contradiction(other, held)) {
-            let expected = "expected joints of one pair that leave something free together, or one `fixed` joint";
-            c.wrong(&held.place, "kind", why, expected);
+pub(super) fn contradictions(c: &mut Checker<'_, '_>, all: &[PlacedJoint]) {
+    let mut pairs: BTreeMap<_, Vec<&PlacedJoint>> = BTreeMap::new();
+    for joint in all {
+        let before = pairs.entry(joint.pair()).or_default();
+        if let Some(why) = before.iter().find_map(|other| contradiction(other, joint)) {
+            let expected = "expected joints of one pair that together leave a degree of freedom, or one `fixed` joint";
+            c.wrong(&joint.place, "kind", why, expected);
         }
-        before.push(held);
+        before.push(joint);
     }
 }
 
 /// Why two joints of the same pair contradict each other.
-fn contradiction(first: &Held, second: &Held) -> Option<&'static str> {
-    use Leaves::{Nothing, Rope, Slide, Spring, Turn, Turns};
-    match (first.leaves, second.leaves) {
-        (Nothing, Nothing) => Some("holds a pair that a fixed joint holds already"),
-        (Nothing, _) | (_, Nothing) => Some("contradicts the fixed joint of the same pair, which leaves nothing free"),
-        (Turn { .. }, Turn { .. }) => {
-            let one_line = first.is_parallel(second) && first.line_passes(second.anchors[0]);
-            (!one_line)
-                .then_some("turns about another line than the revolute joint of the same pair: together they are fixed")
+fn contradiction(first: &PlacedJoint, second: &PlacedJoint) -> Option<&'static str> {
+    use FreeMotion::{Fixed, Prismatic, Revolute, Rope, Spherical, Spring};
+    match (first.free_motion, second.free_motion) {
+        (Fixed, Fixed) => Some("connects a pair that a fixed joint connects already"),
+        (Fixed, _) | (_, Fixed) => {
+            Some("contradicts the fixed joint of the same pair, which leaves no degree of freedom")
         }
-        (Slide { .. }, Slide { .. }) => (!first.is_parallel(second))
-            .then_some("slides along another axis than the prismatic joint of the same pair: together they are fixed"),
-        (Turns, Turn { .. }) => (!second.line_passes(first.anchors[0])).then_some(OFF_THE_LINE),
-        (Turn { .. }, Turns) => (!first.line_passes(second.anchors[0])).then_some(OFF_THE_LINE),
-        (Turn { .. } | Turns, Slide { .. }) | (Slide { .. }, Turn { .. } | Turns) => Some(
-            "contradicts the other joint of the same pair: one turns where the other slides, together they are fixed",
+        (Revolute { .. }, Revolute { .. }) => {
+            let one_line = first.is_parallel(second) && first.line_passes(second.anchors[0]);
+            (!one_line).then_some(
+                "rotates about another axis than the revolute joint of the same pair: together they allow no motion",
+            )
+        }
+        (Prismatic { .. }, Prismatic { .. }) => (!first.is_parallel(second)).then_some(
+            "slides along another axis than the prismatic joint of the same pair: together they allow no motion",
         ),
-        (Turns, Turns) | (Spring { .. } | Rope { .. }, _) | (_, Spring { .. } | Rope { .. }) => None,
+        (Spherical, Revolute { .. }) => (!second.line_passes(first.anchors[0])).then_some(OFF_THE_LINE),
+        (Revolute { .. }, Spherical) => (!first.line_passes(second.anchors[0])).then_some(OFF_THE_LINE),
+        (Revolute { .. } | Spherical, Prismatic { .. }) | (Prismatic { .. }, Revolute { .. } | Spherical) => Some(
+            "contradicts the other joint of the same pair: one rotates, the other slides, and together they allow no motion",
+        ),
+        (Spherical, Spherical) | (Spring { .. } | Rope { .. }, _) | (_, Spring { .. } | Rope { .. }) => None,
     }
 }
 
-const OFF_THE_LINE: &str = "holds a point beside the axis of the pair's revolute joint: together they are fixed";
+const OFF_THE_LINE: &str = "fixes a point off the axis of the pair's revolute joint: together they allow no motion";

@@ -48,13 +48,13 @@ pub(super) fn within(reach: f64, scale: f64) -> Result<(), String> {
     if metres <= POSITION_MAX_M {
         return Ok(());
     }
-    Err(format!("it reaches {metres:.3e} m from where its axes start, more than {POSITION_MAX_M:.0} m"))
+    Err(format!("it extends {metres:.3e} m from its origin, more than {POSITION_MAX_M:.0} m"))
 }
 
 /// Refuses bytes that cannot be text.
 fn text(bytes: &[u8]) -> Result<&[u8], String> {
     if bytes.trim_ascii_start().starts_with(b"{") {
-        return Err("it is no OBJ file; if it is glTF's text form, expected the binary one, .glb".to_owned());
+        return Err("it is not an OBJ file; if it is glTF in text form, expected the binary form, .glb".to_owned());
     }
     match bytes.iter().position(|byte| *byte == 0) {
         None => Ok(bytes),
@@ -120,34 +120,34 @@ mod tests {
     }
 
     #[test]
-    fn every_mesh_that_comes_with_the_program_is_let_in() {
+    fn every_mesh_that_comes_with_the_program_is_accepted() {
         for text in [include_str!("../../../../scenes/bracket.obj"), include_str!("../../../../scenes/crystal.obj")] {
-            assert_eq!(told(text), "");
+            assert_eq!(message(text), "");
         }
         for kind in Generator::ALL {
             let mesh = generate(kind, 1, 500);
             let point = |v: &PrimitiveVertex| format!("v {} {} {}\n", v.core.x, v.core.y, v.core.z);
             let face = |t: &[u32; 3]| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
             let text: String = mesh.vertices.iter().map(point).chain(mesh.triangles.iter().map(face)).collect();
-            assert_eq!(told(text), "", "{kind:?}");
+            assert_eq!(message(text), "", "{kind:?}");
         }
     }
 
     /// Why a file is refused; empty if it is read.
-    fn told(bytes: impl AsRef<[u8]>) -> String {
+    fn message(bytes: impl AsRef<[u8]>) -> String {
         read(bytes.as_ref(), 1.0).err().unwrap_or_default()
     }
 
     #[test]
-    fn what_is_no_mesh_at_all_is_told_what_it_is_not() {
-        assert_eq!(told(""), "it is empty");
+    fn a_file_that_is_no_mesh_is_refused_with_the_accepted_formats() {
+        assert_eq!(message(""), "it is empty");
         let rubbish: Vec<u8> = (0..=255).collect();
         for bytes in [&rubbish[..], b"FTlg\x02\0\0\0", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"] {
-            let told = told(bytes);
-            assert!(told.contains("neither a .glb file") && told.contains("nor an OBJ file"), "{told}");
+            let message = message(bytes);
+            assert!(message.contains("neither a .glb file") && message.contains("nor an OBJ file"), "{message}");
         }
-        assert!(told("{\"asset\":{\"version\":\"2.0\"}}").contains("expected the binary one"));
-        assert!(told("hello world\n").contains("no faces"));
+        assert!(message("{\"asset\":{\"version\":\"2.0\"}}").contains("expected the binary form"));
+        assert!(message("hello world\n").contains("no faces"));
         // bytes that are not UTF-8 are harmless in text that is not read
         assert!(read(&[b"# Gr\xf6\xdfe\n", TETRAHEDRON.as_bytes()].concat(), 1.0).is_ok());
     }
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn a_mesh_stays_within_the_bounds_of_a_scene_after_its_scale() {
         let far = TETRAHEDRON.replace("v 1 0 0", "v 2e5 0 0");
-        let why = told(&far);
+        let why = message(&far);
         assert!(
             why.contains("2.000e5 m") && why.contains("100000 m") && why.contains("(2.000e5, 0.000e0, 0.000e0)"),
             "{why}"
@@ -163,13 +163,13 @@ mod tests {
         assert!(read(far.as_bytes(), 0.4).is_ok());
         assert!(read(TETRAHEDRON.as_bytes(), 1.1e5).is_err());
         for huge in ["1e38", "-1e300", "1e154"] {
-            assert!(told(TETRAHEDRON.replace("v 1 0 0", &format!("v {huge} 0 0"))).contains("it reaches"), "{huge}");
+            assert!(message(TETRAHEDRON.replace("v 1 0 0", &format!("v {huge} 0 0"))).contains("it extends"), "{huge}");
         }
     }
 
     #[test]
     fn a_file_without_area_is_refused() {
-        assert!(told("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").contains("none of its 1 triangles has an area"));
+        assert!(message("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").contains("none of its 1 triangles has an area"));
     }
 
     proptest! {

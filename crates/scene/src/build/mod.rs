@@ -24,12 +24,38 @@ mod texture;
 mod tool;
 mod tube;
 
+use crate::check::{Allowed, allowed};
+
 pub(super) use common::world_faults;
 pub(super) use coupling::couplings;
 pub(super) use group::groups;
 pub(super) use joint::joints;
-pub(super) use object::{AGENTS_MAX, Around, Names, Objects, read_objects};
+pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};
 pub(super) use stage::{camera, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.
 pub(super) const POSITION_MAX_M: f64 = 1e5;
+
+/// Fastest start, m/s and rad/s: a faster body passes through anything within one step.
+const SPEED_MAX: f64 = 1e4;
+
+/// Greatest angle of a rotation to either side, degrees: past it double precision leaves less than a billionth of a turn.
+const ROTATION_MAX_DEG: f64 = 1e6;
+
+/// Sizes of solids, rigid or soft.
+const LENGTH: Allowed = allowed(1e-6..=1e4, "m");
+
+/// Scales of meshes: metres per unit of the file.
+const SCALE: Allowed = allowed(1e-6..=1e6, "");
+
+/// Coulomb friction coefficients of surfaces.
+const FRICTION: Allowed = allowed(0.0..=10.0, "");
+
+/// Stiffness of springs of couplings and joints.
+const STIFFNESS: Allowed = allowed(1e-6..=1e9, "N/m");
+
+/// Damping of the same springs.
+const DAMPING: Allowed = allowed(0.0..=1e7, "N·s/m");
+
+/// Times of keyframes and loads.
+const TIME: Allowed = allowed(0.0..=1e6, "s");

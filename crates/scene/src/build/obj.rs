@@ -31,7 +31,7 @@ const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 #[derive(Default)]
 struct Reader {
     points: Vec<DVec3>,
-    places: Vec<Vec2>,
+    uvs: Vec<Vec2>,
     normals: usize,
     /// Number of objects and groups begun so far.
     object: u32,
@@ -49,24 +49,24 @@ struct Face {
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = Reader::default();
-    let mut begun = Vec::new();
+    let mut pending = Vec::new();
     let last = bytes.split(|b| *b == b'\n').count();
     for (number, line) in (1..).zip(bytes.split(|b| *b == b'\n')) {
         let line = line.trim_ascii_end();
         // a backslash at its end continues a line
         if let Some(line) = line.strip_suffix(b"\\") {
-            begun.extend_from_slice(line);
-            begun.push(b' ');
+            pending.extend_from_slice(line);
+            pending.push(b' ');
             continue;
         }
-        begun.extend_from_slice(line);
+        pending.extend_from_slice(line);
         let cut =
-            if number as usize == last { "; it is the last one and has no end: the file is cut short" } else { "" };
-        reader.line(&begun, number).map_err(|why| format!("line {number}: {why}{cut}"))?;
-        begun.clear();
+            if number as usize == last { "; it is the last line and incomplete: the file is truncated" } else { "" };
+        reader.line(&pending, number).map_err(|why| format!("line {number}: {why}{cut}"))?;
+        pending.clear();
     }
-    if !begun.is_empty() {
-        return Err(format!("line {last} goes on, but nothing follows: the file is cut short"));
+    if !pending.is_empty() {
+        return Err(format!("line {last} is continued, but nothing follows: the file is truncated"));
     }
     reader.check()?;
     reader.parts()
@@ -84,7 +84,7 @@ impl Reader {
             Some(b"vt") => {
                 let [u, v] = numbers(words, "texture coordinate", 3)?;
                 // images have their first row at the top, OBJ has v = 0 at the bottom
-                self.places.push(Vec2::new(u as f32, (1.0 - v) as f32));
+                self.uvs.push(Vec2::new(u as f32, (1.0 - v) as f32));
             }
             Some(b"vn") => {
                 let [_, _, _] = numbers(words, "normal", 3)?;
@@ -99,7 +99,7 @@ impl Reader {
 
     /// A polygon as a fan of triangles about its first corner.
     fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, line: u32) -> Result<(), String> {
-        let counts = [self.points.len(), self.places.len(), self.normals];
+        let counts = [self.points.len(), self.uvs.len(), self.normals];
         let corners = words.map(|word| corner(word, counts)).collect::<Result<Vec<Corner>, String>>()?;
         if corners.len() < 3 {
             return Err(format!("a face has {} corners; expected three or more", corners.len()));
@@ -118,7 +118,7 @@ impl Reader {
 
     /// Checks that everything that corners refer to exists, also if it is defined further down.
     fn check(&self) -> Result<(), String> {
-        let counts = [self.points.len(), self.places.len(), self.normals];
+        let counts = [self.points.len(), self.uvs.len(), self.normals];
         for face in &self.faces {
             for (list, &index) in face.corners.iter().flat_map(|corner| (0..).zip(corner)) {
                 if index != NONE && index as usize >= counts[list] {
@@ -143,8 +143,8 @@ impl Reader {
             }));
         }
         let points: Vec<DVec3> = used.iter().map(|(point, _)| self.points[*point as usize]).collect();
-        let place = |(_, place): &(u32, u32)| self.places.get(*place as usize).copied().unwrap_or_default();
-        let uvs = if self.places.is_empty() { Vec::new() } else { used.iter().map(place).collect() };
+        let place = |(_, place): &(u32, u32)| self.uvs.get(*place as usize).copied().unwrap_or_default();
+        let uvs = if self.uvs.is_empty() { Vec::new() } else { used.iter().map(place).collect() };
         if let Some(found) = branch(&points, &triangles, |t| self.faces[t].object) {
             let [a, b] = found.corners.map(|corner| used[corner as usize].0 + 1);
             let (line, sharing) = (self.faces[found.triangle].line, found.sharing);
@@ -174,7 +174,7 @@ fn numbers<'w, const N: usize>(
 
 /// A corner such as `3`, `3/1`, `3//2`, `3/1/2`, or counted back from the newest: `-1/-1`.
 fn corner(word: &[u8], counts: [usize; 3]) -> Result<Corner, String> {
-    let wrong = || format!("`{}` is no corner of a face", shown(word));
+    let wrong = || format!("`{}` is not a corner of a face", shown(word));
     let mut corner = [NONE; 3];
     for (list, text) in word.split(|b| *b == b'/').enumerate() {
         let slot = corner.get_mut(list).ok_or_else(wrong)?;
@@ -203,12 +203,12 @@ mod tests {
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
     /// The error for a file of this text; empty if it is read.
-    fn told(text: &str) -> String {
+    fn message(text: &str) -> String {
         read(text.as_bytes()).err().unwrap_or_default()
     }
 
     #[test]
-    fn corners_have_their_places_from_the_top_left_and_a_seam_doubles_points() {
+    fn texture_coordinates_start_at_the_top_left_and_a_seam_doubles_points() {
         let text = format!("{SQUARE}vt 0.25 0\nvt 1 0.5\nvt 0 1 0\nf 1/1 2/2 3/3\nf 1/3 3/3 4\n");
         let (points, uvs, triangles) = read(text.as_bytes()).unwrap();
         assert_eq!(triangles, [[0, 1, 2], [3, 2, 4]]);
@@ -233,32 +233,32 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn a_wrong_line_is_reported_with_its_number() {
         for (more, why) in [
-            ("f 1 2", "line 5: a face has 2 corners; expected three or more; it is the last one and has no end"),
+            ("f 1 2", "line 5: a face has 2 corners; expected three or more; it is the last line and incomplete"),
             ("f 1 2\n", "line 5: a face has 2 corners; expected three or more"),
             ("f", "line 5: a face has 0 corners"),
-            ("v 0 0", "line 5: a vertex has 2 numbers; expected 3 to 7; it is the last one and has no end"),
-            ("v 0 0 -", "line 5: `-` is not a finite number; it is the last"),
+            ("v 0 0", "line 5: a vertex has 2 numbers; expected 3 to 7; it is the last line and incomplete"),
+            ("v 0 0 -", "line 5: `-` is not a finite number; it is the last line"),
             ("v 0 nan 0\n", "line 5: `nan` is not a finite number"),
             ("vt 1\n", "line 5: a texture coordinate has 1 numbers; expected 2 to 3"),
             ("vn 1 0\n", "line 5: a normal has 2 numbers; expected 3"),
-            ("f 1 2 3 \\", "line 5 goes on, but nothing follows"),
+            ("f 1 2 3 \\", "line 5 is continued, but nothing follows"),
             ("f 1 2 9\n", "line 5: a face uses vertex 9, but there are 4"),
             ("f 1 2 0\n", "line 5: a face uses vertex 0, but there are 4, numbered from 1"),
             ("f 1 2 -5\n", "line 5: a face uses vertex -5"),
-            ("f 1 2 99999999999999999999\n", "line 5: `99999999999999999999` is no corner"),
+            ("f 1 2 99999999999999999999\n", "line 5: `99999999999999999999` is not a corner"),
             ("f 1/1 2/1 3/1\n", "line 5: a face uses texture coordinate 1, but there are 0"),
             ("f 1//2 2//1 3//1\n", "line 5: a face uses normal 2, but there are 0"),
-            ("f a b c\n", "line 5: `a` is no corner of a face"),
-            ("f 1/2/3/4 2 3\n", "`1/2/3/4` is no corner"),
+            ("f a b c\n", "line 5: `a` is not a corner of a face"),
+            ("f 1/2/3/4 2 3\n", "`1/2/3/4` is not a corner"),
         ] {
-            let told = told(&format!("{SQUARE}{more}"));
-            assert!(told.starts_with(why) || told.contains(why) && why.starts_with('`'), "{more}: {told}");
-            assert_eq!(told.contains("cut short"), !more.ends_with('\n'), "{more}: {told}");
+            let message = message(&format!("{SQUARE}{more}"));
+            assert!(message.starts_with(why) || message.contains(why) && why.starts_with('`'), "{more}: {message}");
+            assert_eq!(message.contains("truncated"), !more.ends_with('\n'), "{more}: {message}");
         }
         let wide = format!("{SQUARE}f {}\n", "1 2 3 ".repeat(30_000));
-        assert_eq!(told(&wide), "line 5: a face has 90000 corners, more than 65536");
+        assert_eq!(message(&wide), "line 5: a face has 90000 corners, more than 65536");
     }
 
     #[test]
@@ -270,14 +270,14 @@ mod tests {
         let shared =
             star(|i| if i == 0 { "v 0 0 0\nv 0 0 1\nf 201 202 1\n".into() } else { format!("f 201 202 {}\n", i + 1) });
         let why = "200 triangles share the edge from vertex 201 to vertex 202, and only two can";
-        assert_eq!(told(&shared), format!("line 205: it is not manifold: {why}"));
+        assert_eq!(message(&shared), format!("line 205: it is not manifold: {why}"));
         // each face on two vertices of its own at the same positions
         let doubled = star(|i| format!("v 0 0 0\nv 0 0 1\nf -2 -1 {}\n", i + 1));
-        assert!(told(&doubled).contains("line 209: it is not manifold: 200 triangles"), "{}", told(&doubled));
+        assert!(message(&doubled).contains("line 209: it is not manifold: 200 triangles"), "{}", message(&doubled));
         // pages that are separate objects merely touch
-        assert_eq!(told(&star(|i| format!("g page {i}\nv 0 0 0\nv 0 0 1\nf -2 -1 {}\n", i + 1))), "");
+        assert_eq!(message(&star(|i| format!("g page {i}\nv 0 0 0\nv 0 0 1\nf -2 -1 {}\n", i + 1))), "");
         // a duplicate face, and faces without area
-        assert!(told(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 2 3 1\n")).contains("line 7: it is not manifold: 3"));
-        assert_eq!(told(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 1 1 3\nf 1 3 3\n")), "");
+        assert!(message(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 2 3 1\n")).contains("line 7: it is not manifold: 3"));
+        assert_eq!(message(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 1 1 3\nf 1 3 3\n")), "");
     }
 }

@@ -1,6 +1,6 @@
 //! Reads the objects of a scene: each by its model, with names and links.
 
-use super::common::{faults, levels, look, pace, tolerance, untolerated};
+use super::common::{faults, levels, look, pace, refuse_tolerance, tolerance};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::{rigid, scenery, soft, synthetic, tool, tube};
@@ -50,7 +50,7 @@ pub(crate) struct Objects {
 
 impl Objects {
     /// Gives every rigid agent the joints of the scene.
-    pub(crate) fn hold(&mut self, joints: &Arc<[Joint]>) {
+    pub(crate) fn set_joints(&mut self, joints: &Arc<[Joint]>) {
         for member in &mut self.agents {
             if let Spec::Rigid(body) = &mut member.spec {
                 body.joints = Arc::clone(joints);
@@ -59,8 +59,8 @@ impl Objects {
     }
 }
 
-/// Input of a model's reader in addition to its own table.
-pub(super) struct Given<'a> {
+/// What the reader of a model is given beside the model's own table.
+pub(super) struct ModelContext<'a> {
     pub(super) place: &'a Place,
     pub(super) source: &'a Source,
     pub(super) gravity: DVec3,
@@ -71,17 +71,17 @@ pub(super) struct Given<'a> {
 
 /// Names and what each denotes.
 #[derive(Debug, Default)]
-pub(crate) struct Names(BTreeMap<String, Named>);
+pub(crate) struct Names(BTreeMap<String, NamedObject>);
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Named {
+pub(crate) enum NamedObject {
     /// A fixed object.
     Fixed,
     /// A mesh or tree, which is only drawn.
     Scenery,
     /// A rigid object that moves.
     Rigid(AgentId),
-    /// An instrument.
+    /// A driven tool.
     Tool(AgentId),
     /// An agent without matter.
     Synthetic(AgentId),
@@ -91,7 +91,7 @@ pub(crate) enum Named {
     Soft(AgentId),
 }
 
-impl Named {
+impl NamedObject {
     /// The id of an object that jaws can grasp if a scene allows it: one that has matter and moves freely.
     pub(super) const fn graspable(self) -> Option<AgentId> {
         match self {
@@ -110,7 +110,7 @@ impl Named {
 }
 
 impl Names {
-    pub(crate) fn get(&self, name: &str) -> Option<Named> {
+    pub(crate) fn get(&self, name: &str) -> Option<NamedObject> {
         self.0.get(name).copied()
     }
 
@@ -119,12 +119,14 @@ impl Names {
     }
 
     /// The names of the objects that `wanted` accepts.
-    pub(super) fn only(&self, wanted: impl Fn(Named) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
+    pub(super) fn only(&self, wanted: impl Fn(NamedObject) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
         self.0.iter().filter(move |(_, n)| wanted(**n)).map(|(name, _)| name.as_str())
     }
 
     pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
-        self.0.iter().filter_map(|(name, n)| if let Named::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
+        self.0
+            .iter()
+            .filter_map(|(name, n)| if let NamedObject::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
     }
 
     pub(super) fn is_known(&self, name: &str) -> bool {
@@ -165,7 +167,7 @@ impl ModelFile {
 }
 
 /// Input that all objects of a scene share.
-pub(crate) struct Around<'a> {
+pub(crate) struct SceneContext<'a> {
     pub(crate) source: &'a Source,
     pub(crate) gravity: DVec3,
     pub(crate) faults: Option<&'a FaultsFile>,
@@ -175,7 +177,7 @@ pub(crate) struct Around<'a> {
 pub(crate) fn read_objects(
     c: &mut Checker<'_, '_>,
     list: Option<&Spanned<DeValue<'_>>>,
-    around: &Around<'_>,
+    context: &SceneContext<'_>,
 ) -> Objects {
     let Some(list) = list else { return Objects::default() };
     let DeValue::Array(items) = list.get_ref() else {
@@ -200,13 +202,13 @@ pub(crate) fn read_objects(
         entry.fixed |= entry.model.is_scenery();
         let can_move = !matches!(entry.model, ModelFile::Tool(_) | ModelFile::Synthetic(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
-        entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
+        entry.copies = copies(c, &entry.place, &entry.common, can_move, most);
     }
-    let names = name_all(c, &entries);
-    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, around.source);
+    let names = assign_names(c, &entries);
+    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, context.source);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
-    let agents = agents(c, &entries, &names, &Stage { around, obstacles: &obstacles });
-    let scenery = scenery::read(c, &entries, around.source);
+    let agents = agents(c, &entries, &names, &AgentContext { scene: context, obstacles: &obstacles });
+    let scenery = scenery::read(c, &entries, context.source);
     Objects { agents, obstacles, obstacle_looks, scenery, names }
 }
 
@@ -270,30 +272,30 @@ fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: 
 }
 
 /// Gives every object its name and every agent its id, in the order of the file.
-fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
+fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     let mut names = Names::default();
     let mut next = 0;
     for entry in entries {
         let name = &entry.common.name;
         let named = |id: AgentId| match (&entry.model, entry.fixed) {
-            (ModelFile::Mesh(_) | ModelFile::Tree(_), _) => Named::Scenery,
-            (_, true) => Named::Fixed,
-            (ModelFile::Tube(_), _) => Named::Tube(id),
-            (ModelFile::Rigid(_), _) => Named::Rigid(id),
-            (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => Named::Soft(id),
-            (ModelFile::Tool(_), _) => Named::Tool(id),
-            (ModelFile::Synthetic(_), _) => Named::Synthetic(id),
+            (ModelFile::Mesh(_) | ModelFile::Tree(_), _) => NamedObject::Scenery,
+            (_, true) => NamedObject::Fixed,
+            (ModelFile::Tube(_), _) => NamedObject::Tube(id),
+            (ModelFile::Rigid(_), _) => NamedObject::Rigid(id),
+            (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => NamedObject::Soft(id),
+            (ModelFile::Tool(_), _) => NamedObject::Tool(id),
+            (ModelFile::Synthetic(_), _) => NamedObject::Synthetic(id),
         };
         let first = next;
         next += if entry.fixed { 0 } else { entry.copies.len() as u32 };
         let length = name.chars().count();
         if name.trim().is_empty() || length > NAME_MAX || name.chars().any(char::is_control) {
-            let expected = format!("expected 1 … {NAME_MAX} characters that can be seen");
-            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a name", expected);
+            let expected = format!("expected 1 to {NAME_MAX} printable characters");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a valid name", expected);
             continue;
         }
         if name == WORLD {
-            let what = format!("is `{WORLD}`, by which joints mean what does not move");
+            let what = format!("is `{WORLD}`, the name of the fixed world in joints");
             c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected another name");
         }
         let taken = (first..).zip(entry.copies.names(name)).filter_map(|(id, name)| {
@@ -301,8 +303,8 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             before.map(|_| name)
         });
         if let Some(name) = taken.collect::<Vec<_>>().first() {
-            let what = format!("`{name}` is taken");
-            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected a name of its own");
+            let what = format!("is `{name}`, the name of another object");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected a unique name");
         }
     }
     names
@@ -314,7 +316,7 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
         let ModelFile::Rigid(file) = &entry.model else { continue };
         // checked although not used: a fixed object has no steps, but a wrong rate is still wrong
         pace(c, &entry.place, &entry.common);
-        untolerated(c, &entry.place, &entry.common);
+        refuse_tolerance(c, &entry.place, &entry.common);
         levels(c, &entry.place, &entry.common);
         let look = look(c, &entry.place, &entry.common, Material::Plastic);
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
@@ -336,12 +338,13 @@ pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: 
     c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
 }
 
-struct Stage<'a> {
-    around: &'a Around<'a>,
+/// What the agents of a scene share.
+struct AgentContext<'a> {
+    scene: &'a SceneContext<'a>,
     obstacles: &'a Arc<[Obstacle]>,
 }
 
-fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Stage<'_>) -> Vec<Member> {
+fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, context: &AgentContext<'_>) -> Vec<Member> {
     let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
     let count = moving.iter().map(|entry| entry.copies.len()).sum();
     if count > AGENTS_MAX {
@@ -352,7 +355,7 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Sta
     let mut firsts = Vec::with_capacity(moving.len());
     let mut next = 0;
     for entry in moving {
-        if let Some(member) = member(c, entry, AgentId(next), (names, stage)) {
+        if let Some(member) = member(c, entry, AgentId(next), names, context) {
             firsts.push((entry, members.len()));
             members.extend(entry.copies.members(&member));
         }
@@ -360,13 +363,13 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Sta
     }
     link(&mut members);
     if c.count() == 0 {
-        firsts.iter().for_each(|(entry, at)| try_out(c, &entry.place, &members[*at]));
+        firsts.iter().for_each(|(entry, at)| check_buildable(c, &entry.place, &members[*at]));
     }
     members
 }
 
 /// Reports what only the model can find wrong with an object: builds it once and drops it.
-fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
+fn check_buildable(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
     let verdict = match member.spec.clone() {
         Spec::Tube(spec) => match Tube::new(spec) {
             Err(TubeError::Cusp { index, degrees }) => {
@@ -393,47 +396,54 @@ fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
     }
 }
 
-fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (&Names, &Stage<'_>)) -> Option<Member> {
+fn member(
+    c: &mut Checker<'_, '_>,
+    entry: &Entry,
+    id: AgentId,
+    names: &Names,
+    context: &AgentContext<'_>,
+) -> Option<Member> {
     let Entry { place, common, model, .. } = entry;
-    let given = Given {
+    let model_context = ModelContext {
         place,
-        source: stage.around.source,
-        gravity: stage.around.gravity,
-        obstacles: stage.obstacles,
+        source: context.scene.source,
+        gravity: context.scene.gravity,
+        obstacles: context.obstacles,
         levels: levels(c, place, common),
         sleep: common.sleep.unwrap_or(true),
     };
     let pace = pace(c, place, common);
-    let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
+    let faults = faults(c, place, common.faults.as_ref(), context.scene.faults);
     let material = match model {
         ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
         ModelFile::Tool(_) => Material::Metal,
         _ => Material::Plastic,
     };
     let look = look(c, place, common, material);
-    let levels = given.levels;
+    let levels = model_context.levels;
     // a body without length has one interval: its ε has no effect
     let unit = Resolution { eps_m: 1.0, n: levels.1 };
     let flat = ResolutionRange { eps_m: (1.0, 1.0), n: levels };
     let (spec, start, simulation, picture) = match model {
         ModelFile::Tube(file) => {
-            let built = tube::build(c, file, &given);
+            let built = tube::build(c, file, &model_context);
             let (start, range) = (built.spec.resolution, built.spec.range);
             (Spec::Tube(built.spec), start, range, built.picture)
         }
-        ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &given)?), unit, flat, flat),
-        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &given)), unit, flat, flat),
-        ModelFile::Solid(file) => (Spec::Soft(soft::solid(c, file, &given)?), unit, flat, flat),
-        ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &given)), unit, flat, flat),
-        ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &given, names)), unit, flat, flat),
+        ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &model_context)?), unit, flat, flat),
+        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &model_context)), unit, flat, flat),
+        ModelFile::Solid(file) => (Spec::Soft(soft::solid(c, file, &model_context)?), unit, flat, flat),
+        ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &model_context)), unit, flat, flat),
+        ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
-            let (spec, range) = synthetic::build(c, file, &given);
+            let (spec, range) = synthetic::build(c, file, &model_context);
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
     let (name, links) = (common.name.clone(), Vec::new());
-    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Tool(_))).then_some(simulation)));
+    let range = (!matches!(spec, Spec::Tool(_))).then_some(simulation);
+    let tolerance_m = tolerance(c, place, common, pace, range);
     Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 

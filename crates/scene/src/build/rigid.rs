@@ -1,9 +1,9 @@
 //! A rigid object of the file as a [`RigidSpec`], or as an [`Obstacle`] where it is fixed.
 
-use super::POSITION_MAX_M;
 use super::mesh;
 use super::mesh::Mesh;
-use super::object::Given;
+use super::object::ModelContext;
+use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RigidFile, Shape};
 use crate::source::Source;
@@ -14,10 +14,7 @@ use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.
 const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
-/// Fastest start, m/s and rad/s.
-const SPEED_MAX: f64 = 1e4;
 
-const LENGTH: Allowed = allowed(1e-6..=1e4, "m");
 const MASS: Allowed = allowed(1e-9..=1e9, "kg");
 
 /// Rotation by angles about the world's x, then y, then z axis, in degrees.
@@ -34,7 +31,7 @@ pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile)
             place,
             "fixed",
             "is false, but the object is a plane",
-            "expected true: a plane has no end and cannot move",
+            "expected `true`: a plane is infinite and cannot move",
         );
     }
     plane || file.fixed == Some(true)
@@ -54,10 +51,10 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
 }
 
 /// Reads a moving object.
-pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>) -> Option<RigidSpec> {
-    let place = given.place;
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelContext<'_>) -> Option<RigidSpec> {
+    let place = context.place;
     let before = c.count();
-    let solid = solid(c, place, file, given.source)?;
+    let solid = solid(c, place, file, context.source)?;
     // a wrong shape gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
     let (position, rotation) = pose(c, place, file);
@@ -71,10 +68,10 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>
         mass_kg,
         restitution,
         friction,
-        gravity: given.gravity,
-        obstacles: Arc::clone(given.obstacles),
+        gravity: context.gravity,
+        obstacles: Arc::clone(context.obstacles),
         joints: Arc::new([]),
-        sleep: given.sleep,
+        sleep: context.sleep,
     })
 }
 
@@ -90,12 +87,12 @@ pub(super) fn point_or_zero(
 
 fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQuat) {
     let position = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
-    (position, rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, 1e6)))
+    (position, rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG)))
 }
 
 fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f64) {
-    let restitution = c.number_or(place, "restitution", (file.restitution, 0.2), &allowed(0.0..=1.0, ""));
-    (restitution, c.number_or(place, "friction", (file.friction, 0.5), &allowed(0.0..=10.0, "")))
+    let restitution = c.optional(place, "restitution", file.restitution, &allowed(0.0..=1.0, "")).unwrap_or(0.2);
+    (restitution, c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.5))
 }
 
 /// The keys that each shape takes, of those that describe shapes.
@@ -121,7 +118,7 @@ fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) ->
     ];
     let name = format!("{:?}", file.shape).to_lowercase();
     let list = takes.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(" and ");
-    let expected = if list.is_empty() { format!("a {name} has no measures") } else { format!("a {name} has {list}") };
+    let expected = if list.is_empty() { format!("a {name} has no dimensions") } else { format!("a {name} has {list}") };
     let mut complete = true;
     for (key, is_given) in given {
         let takes = takes.contains(&key);
@@ -173,7 +170,7 @@ type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
 
 fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
     let name = file.file.as_deref()?;
-    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read {
         Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
@@ -208,13 +205,13 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid)
         }
         return c.number(place, "mass_kg", mass, &MASS);
     }
-    let density =
-        c.number_or(place, "density_kg_m3", (file.density_kg_m3, DENSITY_DEFAULT_KG_M3), &allowed(1e-3..=1e6, "kg/m³"));
+    let density = c
+        .optional(place, "density_kg_m3", file.density_kg_m3, &allowed(1e-3..=1e6, "kg/m³"))
+        .unwrap_or(DENSITY_DEFAULT_KG_M3);
     let volume = volume_m3(solid);
     if is_flat(solid, volume) {
-        let what = format!(
-            "encloses {volume:.1e} m³, so that nothing is there to weigh: its triangles lie in one plane or do not close"
-        );
+        let what =
+            format!("encloses only {volume:.1e} m³, which gives no mass: its triangles are in one plane or not closed");
         c.wrong(place, "file", what, "expected a closed surface, or `mass_kg`, or `fixed = true`");
         return 1.0;
     }

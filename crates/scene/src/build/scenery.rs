@@ -7,7 +7,7 @@ use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
 use super::texture::Textures;
-use super::{POSITION_MAX_M, mesh};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, mesh};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{GeneratorKind, MeshFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
@@ -32,18 +32,32 @@ const LEAVES_IMPORTANCE: f64 = 0.5;
 const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
-/// Meshes already made and their greatest coordinate in their own unit, by what they were made from: equal ones are shared.
-type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<ProgressiveMesh>, f64)>;
+/// Meshes already made, by what they were made from: equal ones are shared.
+struct Meshes<'s> {
+    /// Where their files are.
+    source: &'s Source,
+    /// Each with its greatest coordinate in its own unit.
+    made: BTreeMap<MeshKey, (Arc<ProgressiveMesh>, f64)>,
+}
+
+/// What a mesh is made from: a file or generator, a seed, and the greatest and least number of triangles.
+type MeshKey = (String, u32, [Option<u32>; 2]);
+
+impl<'s> Meshes<'s> {
+    fn new(source: &'s Source) -> Self {
+        Self { source, made: BTreeMap::new() }
+    }
+}
 
 /// Reads every mesh and tree.
 pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
-    let (mut scenery, mut made, mut textures) = (Vec::new(), Made::new(), Textures::new());
+    let (mut scenery, mut meshes, mut textures) = (Vec::new(), Meshes::new(source), Textures::new(source));
     for entry in entries {
         let before = c.count();
         let parts = match &entry.model {
             ModelFile::Mesh(file) => {
-                let parts = mesh_parts(c, entry, file, (source, &mut made));
-                texture::painted(c, entry, (file, parts), (source, &mut textures))
+                let parts = mesh_parts(c, entry, file, &mut meshes);
+                texture::apply(c, entry, file, parts, &mut textures)
             }
             ModelFile::Tree(file) => tree_parts(c, entry, file),
             _ => continue,
@@ -73,25 +87,25 @@ pub(super) fn mesh_model(
     source: &Source,
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     if file.dome_m.is_some() {
-        c.wrong(place, "dome_m", "makes many of one proxy", "expected a single mesh");
+        c.wrong(place, "dome_m", "makes many meshes of one proxy", "expected a single mesh");
     }
-    mesh_of(c, place, file, (source, &mut Made::new()))
+    mesh_of(c, place, file, &mut Meshes::new(source))
 }
 
 fn mesh_of(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &MeshFile,
-    (source, made): (&Source, &mut Made),
+    meshes: &mut Meshes<'_>,
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     let count = |n: u32| f64::from(n);
     let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
     let least =
         file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), &allowed(1.0..=1e6, "")) as u32);
-    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
-    let at = Placement { scale, ..placement(c, place, (file.position_m, file.rotation_deg)) };
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let at = Placement { scale, ..placement(c, place, file.position_m, file.rotation_deg) };
     if file.seed.is_some() && file.generate.is_none() {
-        c.wrong(place, "seed", "has nothing to act on", "expected `generate` beside it");
+        c.wrong(place, "seed", "has no effect alone", "expected `generate` beside it");
     }
     let made_from = match (&file.file, file.generate) {
         (Some(name), None) => name.clone(),
@@ -106,27 +120,27 @@ fn mesh_of(
         }
     };
     let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
-    if let Some((tom, reach)) = made.get(&key) {
-        return in_bounds(c, place, "scale", (scale, *reach)).then(|| (Arc::clone(tom), at));
+    if let Some((mesh, reach)) = meshes.made.get(&key) {
+        return in_bounds(c, place, "scale", scale, *reach).then(|| (Arc::clone(mesh), at));
     }
-    let made_now = match (&file.file, file.generate) {
-        (Some(name), _) => from_file(name, source, scale),
+    let built = match (&file.file, file.generate) {
+        (Some(name), _) => from_file(name, meshes.source, scale),
         (None, kind) => {
             ProgressiveMesh::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
                 .map_err(|why| why.to_string())
         }
     };
-    match made_now {
-        Ok(tom) => {
+    match built {
+        Ok(mesh) => {
             let wanted = triangles.or(file.generate.map(|_| TRIANGLES_DEFAULT));
-            let tom = match wanted {
-                Some(most) => tom.truncated(most),
-                None => tom,
+            let mesh = match wanted {
+                Some(most) => mesh.truncated(most),
+                None => mesh,
             };
-            let tom = Arc::new(tom.no_coarser(least.unwrap_or(0)));
-            let reach = reach(&tom);
-            made.insert(key, (Arc::clone(&tom), reach));
-            in_bounds(c, place, "scale", (scale, reach)).then_some((tom, at))
+            let mesh = Arc::new(mesh.no_coarser(least.unwrap_or(0)));
+            let reach = reach(&mesh);
+            meshes.made.insert(key, (Arc::clone(&mesh), reach));
+            in_bounds(c, place, "scale", scale, reach).then_some((mesh, at))
         }
         Err(why) => {
             let what = format!("cannot be used: {}: {why}", key.0);
@@ -142,12 +156,12 @@ fn from_file(name: &str, source: &Source, scale: f64) -> Result<ProgressiveMesh,
 }
 
 /// The greatest coordinate of a mesh, in its own unit.
-fn reach(tom: &ProgressiveMesh) -> f64 {
-    tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
+fn reach(mesh: &ProgressiveMesh) -> f64 {
+    mesh.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
 }
 
 /// Whether a mesh whose coordinates go up to `reach` in its own unit is within the bounds of a scene at this scale; reports it if not.
-fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, (scale, reach): (f64, f64)) -> bool {
+fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, scale: f64, reach: f64) -> bool {
     let within = mesh::within(reach, scale);
     if let Err(why) = &within {
         c.wrong(place, key, format_args!("makes it too large: {why}"), "expected a mesh within the bounds of a scene");
@@ -171,9 +185,14 @@ const fn generator(kind: GeneratorKind) -> Generator {
     }
 }
 
-fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<Point>, Option<Point>)) -> Placement {
+fn placement(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    position: Option<Point>,
+    rotation_deg: Option<Point>,
+) -> Placement {
     let position = point_or_zero(c, place, "position_m", position, POSITION_MAX_M);
-    let rotation = rotation(point_or_zero(c, place, "rotation_deg", turn, 1e6)).normalize();
+    let rotation = rotation(point_or_zero(c, place, "rotation_deg", rotation_deg, ROTATION_MAX_DEG)).normalize();
     Placement { position, rotation, scale: 1.0 }
 }
 
@@ -181,26 +200,26 @@ fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<P
 pub(super) type Parts = Vec<(String, Scenery)>;
 
 /// Checks common keys that scenery does not use: it has no steps, but a wrong rate is still wrong.
-fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
+fn check_unused_keys(c: &mut Checker<'_, '_>, entry: &Entry) {
     pace(c, &entry.place, &entry.common);
     levels(c, &entry.place, &entry.common);
 }
 
-fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&Source, &mut Made)) -> Parts {
-    read_besides(c, entry);
+fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &mut Meshes<'_>) -> Parts {
+    check_unused_keys(c, entry);
     let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
     if file.dome_m.is_some() && file.scale.is_some() {
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
     let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
-    let Some((tom, at)) = mesh_of(c, &entry.place, file, from) else { return Parts::new() };
-    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&tom)), at, look, texture: None };
+    let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
+    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&mesh)), at, look, texture: None };
     match dome {
         None => vec![(String::new(), part(at))],
         Some(radius_m) => {
             let places: Vec<Placement> = dome_places(at, radius_m).collect();
             let scale = places.iter().map(|at| at.scale).fold(0.0, f64::max);
-            in_bounds(c, &entry.place, "dome_m", (scale, reach(&tom)));
+            in_bounds(c, &entry.place, "dome_m", scale, reach(&mesh));
             places.into_iter().enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect()
         }
     }
@@ -208,11 +227,11 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&S
 
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
     let place = &entry.place;
-    read_besides(c, entry);
+    check_unused_keys(c, entry);
     let bark = look(c, place, &entry.common, Material::Skin);
     let pieces = allowed(1.0..=PIECES_MAX, "");
     let mut count = |key: &str, given: Option<u32>, usual: u32| {
-        c.number_or(place, key, (given.map(f64::from), f64::from(usual)), &pieces) as u32
+        c.optional(place, key, given.map(f64::from), &pieces).unwrap_or(f64::from(usual)) as u32
     };
     let (branches, leaves) =
         (count("branches", file.branches, TREE_DEFAULT.0), count("leaves", file.leaves, TREE_DEFAULT.1));
@@ -223,15 +242,15 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
         leaves,
         prefix: file.lod == Some(TreeLod::Prefix),
     };
-    let share = (file.leaves_importance, LEAVES_IMPORTANCE);
-    let share = c.number_or(place, "leaves_importance", share, &allowed(1e-3..=1.0, ""));
+    let share = c.optional(place, "leaves_importance", file.leaves_importance, &allowed(1e-3..=1.0, ""));
+    let share = share.unwrap_or(LEAVES_IMPORTANCE);
     let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
-        c.wrong(place, "leaves_colour", "is no colour", "expected `#rrggbb`, such as `#5a8a42`");
+        c.wrong(place, "leaves_colour", "is not a colour", "expected `#rrggbb`, such as `#5a8a42`");
         LEAF
     });
     let leaf = Look { colour, importance: bark.importance * share, ..bark };
     let bark = Look { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
-    let at = placement(c, place, (file.position_m, file.rotation_deg));
+    let at = placement(c, place, file.position_m, file.rotation_deg);
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
     let part = |model, look| Scenery { name: String::new(), model, at, look, texture: None };
     vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]

@@ -1,8 +1,8 @@
 //! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
-use super::POSITION_MAX_M;
-use super::object::Given;
+use super::object::ModelContext;
 use super::rigid::rotation;
+use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
@@ -12,15 +12,11 @@ use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
-const LENGTH: Allowed = allowed(1e-6..=1e4, "m");
 const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
 const POISSON: Allowed = allowed(0.0..=0.49, "");
 const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
-const DAMPING: Allowed = allowed(0.0..=1e4, "1/s");
-const FRICTION: Allowed = allowed(0.0..=10.0, "");
+const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 const SEGMENTS: Allowed = allowed(1.0..=2047.0, "");
-/// Fastest start, m/s.
-const SPEED_MAX: f64 = 1e4;
 
 /// The keys that all soft bodies share.
 struct Shared {
@@ -34,8 +30,8 @@ struct Shared {
 }
 
 /// Reads a sheet.
-pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, given: &Given<'_>) -> SoftSpec {
-    let place = given.place;
+pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> SoftSpec {
+    let place = context.place;
     let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), file.size_m[i], &LENGTH));
     let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), file.segments[i]));
     let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
@@ -55,13 +51,13 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, given: &Given<'_>
         held: file.hold.iter().flatten().map(side).collect(),
     };
     let half = DVec3::new(0.5 * size_m[0], 0.5 * size_m[1], 0.0);
-    let pose = pose(c, place, (file.position_m, file.rotation_deg), half);
-    spec(c, given, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
+    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
+    spec(c, context, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
 }
 
 /// Reads a solid; `None` where its dimensions are missing.
-pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, given: &Given<'_>) -> Option<SoftSpec> {
-    let place = given.place;
+pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<SoftSpec> {
+    let place = context.place;
     let shape = solid_shape(c, place, file)?;
     let side = |side: &SolidSide| match side {
         SolidSide::Left => Side::Left,
@@ -85,8 +81,8 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, given: &Given<'_>
         held,
     };
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
-    let pose = pose(c, place, (file.position_m, file.rotation_deg), half);
-    Some(spec(c, given, shape, pose, shared))
+    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
+    Some(spec(c, context, shape, pose, shared))
 }
 
 fn solid_shape(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) -> Option<SoftShape> {
@@ -117,8 +113,8 @@ fn solid_shape(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) -> Opti
 }
 
 /// Reads a rope.
-pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, given: &Given<'_>) -> SoftSpec {
-    let place = given.place;
+pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelContext<'_>) -> SoftSpec {
+    let place = context.place;
     if file.path_m.len() < 2 {
         c.wrong(place, "path_m", format_args!("has {} points", file.path_m.len()), "expected at least 2 points");
     }
@@ -136,45 +132,53 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, given: &Given<'_>) 
     };
     let radius_m = c.number(place, "radius_m", file.radius_m, &LENGTH);
     let segments = segments(c, place, "segments", file.segments);
-    spec(c, given, SoftShape::Rope { path_m, radius_m, segments }, (DVec3::ZERO, DQuat::IDENTITY), shared)
+    let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
+    spec(c, context, SoftShape::Rope { path_m, radius_m, segments }, pose, shared)
 }
 
 fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {
     c.number(place, key, f64::from(count), &SEGMENTS) as u32
 }
 
-/// Position of the first corner, and rotation, of a body whose middle is `half` from that corner in its own axes.
-fn pose(c: &mut Checker<'_, '_>, place: &Place, at: (Option<Point>, Option<Point>), half: DVec3) -> (DVec3, DQuat) {
-    let position = at.0.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
-    let rotation = at.1.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6)));
-    (position - rotation * half, rotation)
+/// Position of the first corner and rotation of a body at the start.
+struct Pose {
+    position: DVec3,
+    rotation: DQuat,
 }
 
-fn spec(
+/// The pose of a body whose middle is `half` from its first corner in its own axes.
+fn pose(
     c: &mut Checker<'_, '_>,
-    given: &Given<'_>,
-    shape: SoftShape,
-    (position, rotation): (DVec3, DQuat),
-    shared: Shared,
-) -> SoftSpec {
-    let place = given.place;
+    place: &Place,
+    position_m: Option<Point>,
+    rotation_deg: Option<Point>,
+    half: DVec3,
+) -> Pose {
+    let position = position_m.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
+    let rotation =
+        rotation_deg.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, ROTATION_MAX_DEG)));
+    Pose { position: position - rotation * half, rotation }
+}
+
+fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, pose: Pose, shared: Shared) -> SoftSpec {
+    let place = context.place;
     let matter = SoftMatter {
         young_pa: c.number(place, "young_pa", shared.young_pa, &YOUNG),
-        poisson: c.number_or(place, "poisson", (shared.poisson, 0.4), &POISSON),
-        density_kg_m3: c.number_or(place, "density_kg_m3", (shared.density_kg_m3, 1050.0), &DENSITY),
-        damping_per_s: c.number_or(place, "damping_per_s", (shared.damping_per_s, 0.0), &DAMPING),
+        poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(0.4),
+        density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
+        damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING_RATE).unwrap_or(0.0),
     };
     SoftSpec {
         shape,
         matter,
-        position,
-        rotation,
+        position: pose.position,
+        rotation: pose.rotation,
         velocity: shared.velocity_m_s.map_or(DVec3::ZERO, |v| c.point(place, "velocity_m_s", v, SPEED_MAX)),
         held: shared.held,
-        friction: c.number_or(place, "friction", (shared.friction, 0.3), &FRICTION),
-        gravity: given.gravity,
-        obstacles: Arc::clone(given.obstacles),
-        sleep: given.sleep,
+        friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
+        gravity: context.gravity,
+        obstacles: Arc::clone(context.obstacles),
+        sleep: context.sleep,
     }
 }
 

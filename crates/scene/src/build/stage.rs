@@ -1,9 +1,11 @@
 //! Reads target, camera, machine and probes of a scene file.
 
-use super::{Names, POSITION_MAX_M};
+use super::{Names, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile, model_named};
+use crate::format::{
+    CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, TargetFile, model_named,
+};
 use glam::DVec3;
 use metachron_core::SimSpan;
 use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
@@ -26,7 +28,6 @@ const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 const EYE_NEAREST_M: f64 = 1e-6;
 
 const FOV: Allowed = allowed(1.0..=150.0, "degrees");
-const TIME: Allowed = allowed(0.0..=1e6, "s");
 
 /// The target frame rate and how it is held.
 pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
@@ -42,7 +43,7 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
     });
     Target {
         lag: lag(c, &place, file),
-        frame_hz: c.number_or(&place, "frame_hz", (frame_hz, FRAME_DEFAULT_HZ), &allowed(1.0..=1000.0, "Hz")),
+        frame_hz: c.optional(&place, "frame_hz", frame_hz, &allowed(1.0..=1000.0, "Hz")).unwrap_or(FRAME_DEFAULT_HZ),
         policy: file.and_then(|f| f.policy).unwrap_or_default(),
         value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
@@ -54,10 +55,10 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
 /// The greatest lag in seconds and the optimiser's share of it.
 fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Option<(f64, f64)> {
     let share = file.and_then(|f| f.optimiser_share);
-    let part = c.number_or(place, "optimiser_share", (share, OPTIMISER_SHARE), &allowed(1e-3..=0.5, ""));
+    let part = c.optional(place, "optimiser_share", share, &allowed(1e-3..=0.5, "")).unwrap_or(OPTIMISER_SHARE);
     let Some(lag_ms) = file.and_then(|f| f.lag_ms) else {
         if share.is_some() {
-            c.wrong(place, "optimiser_share", "has nothing to act on", "expected `lag_ms` beside it");
+            c.wrong(place, "optimiser_share", "has no effect alone", "expected `lag_ms` beside it");
         }
         return None;
     };
@@ -68,7 +69,7 @@ fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Opt
 pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Option<Camera> {
     let file = file?;
     let place = Place::new("camera", "of `[camera]`");
-    let fov_deg = c.number_or(&place, "fov_deg", (file.fov_deg, FOV_DEFAULT_DEG), &FOV);
+    let fov_deg = c.optional(&place, "fov_deg", file.fov_deg, &FOV).unwrap_or(FOV_DEFAULT_DEG);
     if let Some(keys) = &file.keyframe {
         for (key, given) in [
             ("eye_m", file.eye_m.is_some()),
@@ -76,7 +77,7 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
             ("period_s", file.period_s.is_some()),
         ] {
             if given {
-                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes alone");
+                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes only");
             }
         }
         let keys = camera_keys(c, &place, keys, fov_deg)?;
@@ -84,30 +85,30 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
     }
     for (key, given) in [("repeat", file.repeat.is_some()), ("even", file.even.is_some())] {
         if given {
-            c.wrong(&place, key, "has no path to act on", "expected `[[camera.keyframe]]` tables beside it");
+            c.wrong(&place, key, "has no effect without a path", "expected `[[camera.keyframe]]` tables beside it");
         }
     }
     let Some(eye) = file.eye_m else {
         c.wrong(&place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
         return None;
     };
-    let start = view(c, &place, (eye, file.look_at_m.unwrap_or_default()), fov_deg);
+    let start = view(c, &place, eye, file.look_at_m.unwrap_or_default(), fov_deg);
     Some(match file.period_s {
         None => Camera::Still(start),
         Some(period_s) if (0.1..=1e5).contains(&period_s.abs()) => Camera::Orbit { start, period_s },
         Some(period_s) => {
-            let expected = "expected 0.1 … 100000 s, or the same below zero to turn the other way";
+            let expected = "expected 0.1 to 100000 s, or -100000 to -0.1 s for the other direction";
             c.wrong(&place, "period_s", format_args!("is {period_s}"), expected);
             Camera::Still(start)
         }
     })
 }
 
-fn view(c: &mut Checker<'_, '_>, place: &Place, (eye, look_at): ([f64; 3], [f64; 3]), fov_deg: f64) -> View {
+fn view(c: &mut Checker<'_, '_>, place: &Place, eye: Point, look_at: Point, fov_deg: f64) -> View {
     let eye_m = c.point(place, "eye_m", eye, POSITION_MAX_M);
     let look_at_m = c.point(place, "look_at_m", look_at, POSITION_MAX_M);
     if eye_m.distance(look_at_m) < EYE_NEAREST_M && eye_m.is_finite() {
-        c.wrong(place, "eye_m", "is the point that it looks at", "expected a point away from `look_at_m`");
+        c.wrong(place, "eye_m", "is the same point as `look_at_m`", "expected a point away from `look_at_m`");
         return View { eye_m: look_at_m + DVec3::ONE, look_at_m, fov_deg };
     }
     View { eye_m, look_at_m, fov_deg }
@@ -133,12 +134,12 @@ fn camera_keys(
     for (i, file) in files.iter().enumerate() {
         let place = place.entry("keyframe", i);
         let at_s = c.number(&place, "at_s", file.at_s, &TIME);
-        let fov = c.number_or(&place, "fov_deg", (file.fov_deg, fov_deg), &FOV);
+        let fov = c.optional(&place, "fov_deg", file.fov_deg, &FOV).unwrap_or(fov_deg);
         if let Some((before, _)) = keys.last().filter(|(before, _)| *before >= at_s) {
             let expected = format!("expected a time after the keyframe before, {before} s");
             c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
         }
-        keys.push((at_s, view(c, &place, (file.eye_m, file.look_at_m), fov)));
+        keys.push((at_s, view(c, &place, file.eye_m, file.look_at_m, fov)));
     }
     Some(keys)
 }
@@ -166,8 +167,8 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
     let shading = object_costs(c, &place.table("shading"), file);
-    let step_load = load(c, &place, ("step_load", &file.step_load));
-    let load = load(c, &place, ("load", &file.load));
+    let step_load = load(c, &place, "step_load", &file.step_load);
+    let load = load(c, &place, "load", &file.load);
     Machine {
         preset,
         cores,
@@ -189,7 +190,7 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
 }
 
 /// Reads additional load of the machine, as (seconds, factor).
-fn load(c: &mut Checker<'_, '_>, place: &Place, (key, entries): (&str, &[LoadFile])) -> Vec<(f64, f64)> {
+fn load(c: &mut Checker<'_, '_>, place: &Place, key: &str, entries: &[LoadFile]) -> Vec<(f64, f64)> {
     if entries.len() > LOADS_MAX {
         let expected = format!("expected at most {LOADS_MAX}");
         c.wrong(place, key, format_args!("has {} entries", entries.len()), expected);
@@ -237,7 +238,7 @@ fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Ve
         if known.is_none() {
             let span = c.document().locate(&format!("machine.step.{model}"));
             let list = MODELS.map(|m| format!("`{m}`")).join(", ");
-            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model"));
+            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is not a model"));
             c.push(problem.expecting(format!("expected one of {list}")).helped(did_you_mean(model, MODELS)));
         }
         let place = place.table(model);
@@ -262,7 +263,7 @@ pub(crate) fn probes(c: &mut Checker<'_, '_>, files: &[ProbeFile], names: &Names
 }
 
 fn probe(c: &mut Checker<'_, '_>, place: &Place, file: &ProbeFile, names: &Names) -> Option<Probe> {
-    let at = c.number_or(place, "at", (file.at, 1.0), &allowed(0.0..=1.0, ""));
+    let at = c.optional(place, "at", file.at, &allowed(0.0..=1.0, "")).unwrap_or(1.0);
     let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, &allowed(0.01..=1e6, "ms")));
     let agent = match names.get(&file.object) {
         Some(named) if named.agent().is_some() => named.agent()?,

@@ -1,6 +1,6 @@
 //! Reads a synthetic agent of a scene file as a [`SyntheticSpec`].
 
-use super::object::Given;
+use super::object::ModelContext;
 use crate::check::{Checker, allowed};
 use crate::format::SyntheticFile;
 use metachron_core::ResolutionRange;
@@ -13,16 +13,16 @@ const EPS_DEFAULT_M: f64 = 0.01;
 pub(super) fn build(
     c: &mut Checker<'_, '_>,
     file: &SyntheticFile,
-    given: &Given<'_>,
+    context: &ModelContext<'_>,
 ) -> (SyntheticSpec, ResolutionRange) {
-    let place = given.place;
+    let place = context.place;
     let usual = (EPS_DEFAULT_M, EPS_DEFAULT_M);
     let eps_m = file.eps_m.map_or(usual, |eps| c.ends(place, "eps_m", eps, &allowed(1e-6..=1e3, "m")));
     let spec = SyntheticSpec {
         cost_us: c.number(place, "cost_us", file.cost_us, &allowed(0.0..=1e6, "µs")),
-        cost_order: c.number_or(place, "cost_order", (file.cost_order, 1.0), &allowed(0.0..=4.0, "")),
-        error_m: c.number_or(place, "error_m", (file.error_m, 0.0), &allowed(0.0..=1e3, "m")),
-        error_order: c.number_or(place, "error_order", (file.error_order, 2.0), &allowed(0.0..=8.0, "")),
+        cost_order: c.optional(place, "cost_order", file.cost_order, &allowed(0.0..=4.0, "")).unwrap_or(1.0),
+        error_m: c.optional(place, "error_m", file.error_m, &allowed(0.0..=1e3, "m")).unwrap_or(0.0),
+        error_order: c.optional(place, "error_order", file.error_order, &allowed(0.0..=8.0, "")).unwrap_or(2.0),
     };
-    (spec, ResolutionRange { eps_m, n: given.levels })
+    (spec, ResolutionRange { eps_m, n: context.levels })
 }

@@ -26,20 +26,37 @@ const SIDE_MAX: u32 = 4096;
 #[cfg(feature = "images")]
 const BYTES_MAX: u64 = 1 << 28;
 
-/// Textures already made, by what they were made from and the bits of their size.
-pub(super) type Textures = BTreeMap<(String, u64), Option<Arc<Texture>>>;
+/// Textures already made: equal ones are shared.
+pub(super) struct Textures<'s> {
+    /// Where their files are.
+    source: &'s Source,
+    /// By what they were made from and the bits of their size.
+    made: BTreeMap<(String, u64), Option<Arc<Texture>>>,
+}
+
+impl<'s> Textures<'s> {
+    pub(super) fn new(source: &'s Source) -> Self {
+        Self { source, made: BTreeMap::new() }
+    }
+}
 
 /// Applies the texture of a mesh, if it has one, to its parts.
-pub(super) fn painted(
+pub(super) fn apply(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
-    (file, mut parts): (&MeshFile, Parts),
-    from: (&Source, &mut Textures),
+    file: &MeshFile,
+    mut parts: Parts,
+    textures: &mut Textures<'_>,
 ) -> Parts {
-    let (before, found) = (c.count(), texture_of(c, entry, (file, &parts), from));
+    let (before, found) = (c.count(), texture_of(c, entry, file, &parts, textures));
     let bare = found.is_none() && c.count() == before && !parts.is_empty();
     if bare && entry.common.shading == Some(ShadingKind::Textured) {
-        c.wrong(&entry.place, "shading", "has nothing to draw", "expected `texture` beside it");
+        c.wrong(
+            &entry.place,
+            "shading",
+            "is `textured`, but the object has no texture",
+            "expected `texture` beside it",
+        );
     }
     if let Some(texture) = found {
         for (_, part) in &mut parts {
@@ -55,40 +72,46 @@ pub(super) fn painted(
 fn texture_of(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
-    (file, parts): (&MeshFile, &Parts),
-    (source, textures): (&Source, &mut Textures),
+    file: &MeshFile,
+    parts: &Parts,
+    textures: &mut Textures<'_>,
 ) -> Option<Arc<Texture>> {
     let place = &entry.place;
     if file.texture_m.is_some() && file.texture.is_none() {
-        c.wrong(place, "texture_m", "has nothing to act on", "expected `texture` beside it");
+        c.wrong(place, "texture_m", "has no effect alone", "expected `texture` beside it");
     }
-    let metres = c.number_or(place, "texture_m", (file.texture_m, 1.0), &allowed(1e-3..=1e3, "m"));
+    let metres = c.optional(place, "texture_m", file.texture_m, &allowed(1e-3..=1e3, "m")).unwrap_or(1.0);
     let (key, name) = match (&file.texture, &file.file) {
         (Some(name), _) => ("texture", name),
         // errors of a file that gave no mesh have been reported
         (None, Some(name)) if !parts.is_empty() => ("file", name),
         (None, _) => return None,
     };
-    let wrap = match key == "file" || file.texture_m.is_none() && has_places(parts) {
+    let wrap = match key == "file" || file.texture_m.is_none() && has_texture_coordinates(parts) {
         true => Wrap::Corners,
         false => Wrap::Sides(metres as f32),
     };
     let made_from = (name.clone(), if wrap == Wrap::Corners { 0 } else { metres.to_bits() });
-    if let Some(known) = textures.get(&made_from) {
+    if let Some(known) = textures.made.get(&made_from) {
         return known.clone();
     }
-    let made = if key == "file" { own(name, source) } else { named(name, (metres, wrap), source).map(Some) };
+    let source = textures.source;
+    let made = if key == "file" {
+        embedded_image(name, source)
+    } else {
+        pattern_or_file(name, metres, wrap, source).map(Some)
+    };
     let texture = made.unwrap_or_else(|why| {
         let patterns = Pattern::ALL.map(|pattern| format!("`{}`", pattern.name())).join(", ");
-        let what = format!("cannot be painted: {name}: {why}");
+        let what = format!("cannot be used as a texture: {name}: {why}");
         c.wrong(place, key, what, format!("expected {patterns} or a PNG or JPEG image beside the scene"));
         None
     });
-    textures.entry(made_from).or_insert(texture.map(Arc::new)).clone()
+    textures.made.entry(made_from).or_insert(texture.map(Arc::new)).clone()
 }
 
 /// A pattern, or an image file next to the scene.
-fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Texture, String> {
+fn pattern_or_file(name: &str, metres: f64, wrap: Wrap, source: &Source) -> Result<Texture, String> {
     if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
         return Ok(pattern.texture(metres as f32));
     }
@@ -96,13 +119,14 @@ fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Tex
 }
 
 /// Whether the file of a mesh has texture coordinates.
-fn has_places(parts: &Parts) -> bool {
-    let says = |model: &Model| matches!(model, Model::Mesh(tom) if tom.vertices().iter().any(|v| v.uv != Vec2::ZERO));
-    parts.iter().any(|(_, part)| says(&part.model))
+fn has_texture_coordinates(parts: &Parts) -> bool {
+    let textured =
+        |model: &Model| matches!(model, Model::Mesh(mesh) if mesh.vertices().iter().any(|v| v.uv != Vec2::ZERO));
+    parts.iter().any(|(_, part)| textured(&part.model))
 }
 
 /// The image inside a mesh's .glb file. Other errors of that file are reported where its triangles are read.
-fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
+fn embedded_image(name: &str, source: &Source) -> Result<Option<Texture>, String> {
     let Ok(bytes) = source.sibling(name) else { return Ok(None) };
     if !bytes.starts_with(glb::MAGIC) {
         return Ok(None);
@@ -113,7 +137,7 @@ fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
 /// Refuses every image: this build has no decoder.
 #[cfg(not(feature = "images"))]
 fn decode(_: &[u8], _: Wrap) -> Result<Texture, String> {
-    Err("this build reads no images (feature `images` of metachron-scene)".to_owned())
+    Err("this build cannot read images: it lacks the feature `images` of metachron-scene".to_owned())
 }
 
 /// The pixels of a PNG or JPEG image.
@@ -122,8 +146,8 @@ fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|why| why.to_string())?;
     match reader.format() {
         Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
-        Some(other) => return Err(format!("its image is a {other:?}; only PNG and JPEG are understood")),
-        None => return Err("its image is of no kind that is known; only PNG and JPEG are understood".to_owned()),
+        Some(other) => return Err(format!("its image format is {other:?}; PNG and JPEG are supported")),
+        None => return Err("its image format is unknown; PNG and JPEG are supported".to_owned()),
     }
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
@@ -166,15 +190,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_or_too_large_is_refused_with_its_reason() {
-        for (bytes, told) in [
-            (&b""[..], "only PNG and JPEG"),
-            (b"hello there, this is no image", "only PNG and JPEG"),
+    fn a_file_that_is_no_image_or_too_large_is_refused_with_its_reason() {
+        for (bytes, message) in [
+            (&b""[..], "PNG and JPEG are supported"),
+            (b"hello there, this is no image", "PNG and JPEG are supported"),
             (b"GIF89a\x01\x00\x01\x00", "Gif"),
             (b"\xff\xd8\xff\xe0\x00\x10JFIF\x00", ""),
         ] {
             let why = decode(bytes, Wrap::Corners).unwrap_err();
-            assert!(why.contains(told), "{why}");
+            assert!(why.contains(message), "{why}");
         }
         assert!(decode(&png(SIDE_MAX + 1, 1), Wrap::Corners).is_err());
         // a header that declares far more pixels than there are

@@ -1,8 +1,8 @@
 //! Reads a tool of a scene file as a [`ToolSpec`].
 
-use super::POSITION_MAX_M;
-use super::object::{Given, Named, Names};
+use super::object::{ModelContext, NamedObject, Names};
 use super::rigid::rotation;
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{KeyframeFile, ToolFile};
 use glam::{DQuat, DVec3};
@@ -20,23 +20,24 @@ const FORCE_DEFAULT_N: f64 = 50.0;
 /// an object of 50 g millimetres into the floor, past a hundred kilonewtons through it.
 const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
 /// See [`FORCES_N`].
-const FORCES_WHY: &str = "N: a stronger drive would press what is light into what it stands on";
+const FORCES_WHY: &str = "N: a stronger drive would push light objects into their support";
 
 /// Reads a tool.
-pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, given: &Given<'_>, names: &Names) -> ToolSpec {
-    let place = given.place;
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelContext<'_>, names: &Names) -> ToolSpec {
+    let place = context.place;
     ToolSpec {
         keyframes: keyframes(c, place, &file.keyframe),
         repeat: file.repeat.unwrap_or(false),
-        reach_m: c.number_or(place, "reach_m", (file.reach_m, REACH_DEFAULT_M), &allowed(1e-6..=100.0, "m")),
-        stiffness_n_m: c.number_or(place, "stiffness_n_m", (file.stiffness_n_m, 200.0), &allowed(1e-3..=1e7, "N/m")),
-        damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
-        max_force_n: c.number_or(
-            place,
-            "max_force_n",
-            (file.max_force_n, FORCE_DEFAULT_N),
-            &allowed(FORCES_N, FORCES_WHY),
-        ),
+        reach_m: c.optional(place, "reach_m", file.reach_m, &allowed(1e-6..=100.0, "m")).unwrap_or(REACH_DEFAULT_M),
+        stiffness_n_m: c
+            .optional(place, "stiffness_n_m", file.stiffness_n_m, &allowed(1e-3..=1e7, "N/m"))
+            .unwrap_or(200.0),
+        damping_n_s_m: c
+            .optional(place, "damping_n_s_m", file.damping_n_s_m, &allowed(0.0..=1e5, "N·s/m"))
+            .unwrap_or(1.0),
+        max_force_n: c
+            .optional(place, "max_force_n", file.max_force_n, &allowed(FORCES_N, FORCES_WHY))
+            .unwrap_or(FORCE_DEFAULT_N),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
     }
@@ -50,29 +51,29 @@ fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &ToolFile, names: &Na
         let named = names.get(name);
         if let Some(what) = named.and_then(ungraspable) {
             let expected = "expected the name of a tube, sheet, solid, rope or rigid object that moves";
-            c.wrong(place, &key, format_args!("names `{name}`, {what}, which jaws cannot hold"), expected);
+            c.wrong(place, &key, format_args!("names `{name}`, {what}, which jaws cannot grasp"), expected);
         } else if c.reference(place, &key, name, names.only(|named| named.graspable().is_some())) {
-            found.extend(named.and_then(Named::graspable).filter(|id| !found.contains(id)));
+            found.extend(named.and_then(NamedObject::graspable).filter(|id| !found.contains(id)));
         }
     }
     found
 }
 
 /// Description of an object that jaws cannot hold; `None` for one that they can.
-const fn ungraspable(named: Named) -> Option<&'static str> {
+const fn ungraspable(named: NamedObject) -> Option<&'static str> {
     match named {
-        Named::Fixed => Some("a fixed object"),
-        Named::Scenery => Some("a mesh or tree without matter"),
-        Named::Tool(_) => Some("a tool"),
-        Named::Synthetic(_) => Some("an agent without matter"),
-        Named::Rigid(_) | Named::Tube(_) | Named::Soft(_) => None,
+        NamedObject::Fixed => Some("a fixed object"),
+        NamedObject::Scenery => Some("a mesh or tree without matter"),
+        NamedObject::Tool(_) => Some("a tool"),
+        NamedObject::Synthetic(_) => Some("an agent without matter"),
+        NamedObject::Rigid(_) | NamedObject::Tube(_) | NamedObject::Soft(_) => None,
     }
 }
 
 fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> Vec<Keyframe> {
     let still = Keyframe { at_s: 0.0, tip_m: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw: 1.0 };
     if !(1..=KEYFRAMES_MAX).contains(&files.len()) {
-        let expected = format!("expected 1 … {KEYFRAMES_MAX}; one is a tool that waits for a hand");
+        let expected = format!("expected 1 … {KEYFRAMES_MAX}; with one keyframe the tool waits for the user");
         c.wrong(place, "keyframe", format_args!("has {} entries", files.len()), expected);
         return vec![still];
     }
@@ -94,9 +95,11 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> 
 
 fn keyframe(c: &mut Checker<'_, '_>, place: &Place, file: &KeyframeFile, before: Keyframe) -> Keyframe {
     Keyframe {
-        at_s: c.number_or(place, "at_s", (file.at_s, 0.0), &allowed(0.0..=1e6, "s")),
+        at_s: c.optional(place, "at_s", file.at_s, &TIME).unwrap_or(0.0),
         tip_m: c.point(place, "tip_m", file.tip_m, POSITION_MAX_M),
-        rotation: file.rotation_deg.map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6))),
-        jaw: c.number_or(place, "jaw", (file.jaw, before.jaw), &allowed(0.0..=1.0, "")),
+        rotation: file
+            .rotation_deg
+            .map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, ROTATION_MAX_DEG))),
+        jaw: c.optional(place, "jaw", file.jaw, &allowed(0.0..=1.0, "")).unwrap_or(before.jaw),
     }
 }

@@ -1,7 +1,7 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
-use super::POSITION_MAX_M;
-use super::object::Given;
+use super::object::ModelContext;
+use super::{FRICTION, POSITION_MAX_M};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
 use glam::DVec3;
@@ -40,35 +40,37 @@ pub(super) struct BuiltTube {
 }
 
 /// Reads a tube.
-pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>) -> BuiltTube {
-    let place = given.place;
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelContext<'_>) -> BuiltTube {
+    let place = context.place;
     let path_m = path(c, place, &file.path_m);
     let length_m = path_m.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>().max(SAME_POINT_M);
     let section = section(c, place, file);
-    let (resolution, range, picture) = resolutions(c, place, file, given.levels, length_m);
+    let (resolution, range, picture) = resolutions(c, place, file, context.levels, length_m);
     let (clamp, pin) = ends(c, place, file);
     let spec = TubeSpec {
         path_m,
         straight: file.straight.unwrap_or(false),
-        twist_rad: c.number_or(place, "twist_deg", (file.twist_deg, 0.0), &TWIST).to_radians(),
+        twist_rad: c.optional(place, "twist_deg", file.twist_deg, &TWIST).unwrap_or(0.0).to_radians(),
         section,
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
         integrator: file.integrator.map_or_else(Default::default, integrator),
-        substeps: c.number_or(place, "substeps", (file.substeps.map(f64::from), 1.0), &allowed(1.0..=1000.0, ""))
+        substeps: c.optional(place, "substeps", file.substeps.map(f64::from), &allowed(1.0..=1000.0, "")).unwrap_or(1.0)
             as u32,
-        damping_per_s: c.number_or(place, "damping_per_s", (file.damping_per_s, 0.0), &allowed(0.0..=1e4, "1/s")),
+        damping_per_s: c
+            .optional(place, "damping_per_s", file.damping_per_s, &allowed(0.0..=1e4, "1/s"))
+            .unwrap_or(0.0),
         clamp,
         pin,
         attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
         peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
-        pressure_pa: c.number_or(place, "pressure_pa", (file.pressure_pa, 0.0), &allowed(0.0..=1e7, "Pa")),
+        pressure_pa: c.optional(place, "pressure_pa", file.pressure_pa, &allowed(0.0..=1e7, "Pa")).unwrap_or(0.0),
         self_contact: file.self_contact.unwrap_or(true),
-        friction: c.number_or(place, "friction", (file.friction, 0.2), &allowed(0.0..=10.0, "")),
-        gravity: given.gravity,
-        obstacles: Arc::clone(given.obstacles),
-        sleep: given.sleep,
+        friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
+        gravity: context.gravity,
+        obstacles: Arc::clone(context.obstacles),
+        sleep: context.sleep,
     };
     BuiltTube { spec, picture }
 }
@@ -93,7 +95,7 @@ pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, lo
     let (name, segments) = (integrator.name(), tube.segments());
     let wanted = (longest_s / limit_s).ceil();
     let what = format!(
-        "is `{name}`, which carries substeps of {:.3} ms here, not of {:.3} ms",
+        "is `{name}`, which is stable for substeps up to {:.3} ms here, not of {:.3} ms",
         limit_s * 1e3,
         longest_s * 1e3 / f64::from(*substeps)
     );
@@ -140,8 +142,9 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
     let area_m2 = Section::hollow(radius_m, wall_m, unit).mass_per_length_kg_m;
     let young_pa = modulus(c, place, file, area_m2);
     let density_kg_m3 = density(c, place, file, area_m2);
-    let poisson = c.number_or(place, "poisson", (file.poisson, 0.45), &POISSON);
-    let shear_factor = c.number_or(place, "shear_factor", (file.shear_factor, 27.0 / 28.0), &allowed(1e-3..=2.0, ""));
+    let poisson = c.optional(place, "poisson", file.poisson, &POISSON).unwrap_or(0.45);
+    let shear_factor =
+        c.optional(place, "shear_factor", file.shear_factor, &allowed(1e-3..=2.0, "")).unwrap_or(27.0 / 28.0);
     let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
     let mut section = Section::hollow(radius_m, wall_m, material);
     for (key, given, into) in [
@@ -150,10 +153,11 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
         ("ei_n_m2", file.ei_n_m2, &mut section.ei_n_m2),
         ("gj_n_m2", file.gj_n_m2, &mut section.gj_n_m2),
     ] {
-        *into = c.number_or(place, key, (given, *into), &STIFFNESS);
+        *into = c.optional(place, key, given, &STIFFNESS).unwrap_or(*into);
     }
-    let mass = (file.mass_per_length_kg_m, section.mass_per_length_kg_m);
-    section.mass_per_length_kg_m = c.number_or(place, "mass_per_length_kg_m", mass, &allowed(1e-9..=1e9, "kg/m"));
+    section.mass_per_length_kg_m = c
+        .optional(place, "mass_per_length_kg_m", file.mass_per_length_kg_m, &allowed(1e-9..=1e9, "kg/m"))
+        .unwrap_or(section.mass_per_length_kg_m);
     section
 }
 
@@ -249,8 +253,10 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
         from,
         to,
         stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, &allowed(0.0..=1e9, "N/m²")),
-        slack_m: c.number_or(place, "slack_m", (file.slack_m, 0.0), &allowed(0.0..=100.0, "m")),
-        damping_n_s_m2: c.number_or(place, "damping_n_s_m2", (file.damping_n_s_m2, 0.0), &allowed(0.0..=1e6, "N·s/m²")),
+        slack_m: c.optional(place, "slack_m", file.slack_m, &allowed(0.0..=100.0, "m")).unwrap_or(0.0),
+        damping_n_s_m2: c
+            .optional(place, "damping_n_s_m2", file.damping_n_s_m2, &allowed(0.0..=1e6, "N·s/m²"))
+            .unwrap_or(0.0),
     }
 }
 

@@ -55,7 +55,7 @@ pub struct CommonFile {
     /// Colour as `#rrggbb` (sRGB). Default: by material.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
     pub colour: Option<String>,
-    /// Material of its surface. Default: tissue for a tube, sheet or solid, metal for an instrument, plastic for the rest.
+    /// Material of its surface. Default: tissue for a tube, sheet or solid, metal for a tool, plastic for the rest.
     pub material: Option<Material>,
     /// Shading of its surface: `flat`, `gouraud`, `per-pixel` (default), or `any`, which leaves it to the policy.
     pub shading: Option<ShadingKind>,

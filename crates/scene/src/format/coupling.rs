@@ -17,7 +17,7 @@ pub struct CouplingFile {
     /// Law of the coupling. Default `ledger`.
     pub law: Option<CouplingLaw>,
     /// Point of `a` that an `attach` holds: 0 start … 1 end of a tube's or rope's rest length; or `[x, y, z]`, metres, in the axes of a
-    /// rigid object's shape, of an instrument's tip, or of a sheet or solid from its middle (the nearest vertex).
+    /// rigid object's shape, of a tool's tip, or of a sheet or solid from its middle (the nearest vertex).
     pub at_a: Option<Spot>,
     /// Point of `b` that an `attach` holds, as `at_a`.
     pub at_b: Option<Spot>,

@@ -236,7 +236,7 @@ pub struct ProbeFile {
     /// Name of the object.
     pub object: String,
     /// Point of a tube: 0 start … 1 end, arc length along the rest shape. Default 1.
-    /// A rigid object reports its centre of mass, an instrument its tip.
+    /// A rigid object reports its centre of mass, a tool its tip.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub at: Option<f64>,
     /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` as well. Default: only the last state.

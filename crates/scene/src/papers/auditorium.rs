@@ -3,7 +3,7 @@
 //! In: a seed. Out: the scene's text. At ten frames a second the walk has the paper's 250: A, many seats across the view (frame 40);
 //! B, few and small ones (130); C, the sudden turn from the stage to the seats (178 … 184).
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{FLOOR, head};
 
 /// Triangles of a seat; the pieces of the stage have the rest of 87,565.
@@ -18,7 +18,7 @@ pub(super) fn text(seed: u32) -> String {
     let head = head(
         "384 seats in rising rows before a stage, 87,565 triangles, and a walk that turns round in six frames (FS93).",
         "an auditorium of 384 seats, and a walk that turns round suddenly",
-        &way(),
+        &path(),
     );
     format!(
         r##"{head}
@@ -72,7 +72,7 @@ colour = "#4a4f78"
     )
 }
 
-fn way() -> Way {
+fn path() -> CameraPath {
     let stops = vec![
         stop(0.0, [-0.5, -9.0, 2.2], 42.0, -8.0),
         stop(6.0, [0.5, -9.5, 2.2], 44.0, -8.0),
@@ -83,5 +83,5 @@ fn way() -> Way {
         stop(18.4, [1.0, 0.0, 1.9], 0.0, 5.0),
         stop(25.0, [-0.5, 0.0, 2.1], -8.0, 3.0),
     ];
-    Way { stops, fov_deg: 60.0 }
+    CameraPath { stops, fov_deg: 60.0 }
 }

@@ -25,7 +25,7 @@ pub(super) struct Stop {
 
 /// A path, linear from stop to stop.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(super) struct CameraPath {
     pub stops: Vec<Stop>,
     pub fov_deg: f64,
 }
@@ -35,7 +35,7 @@ pub(super) const fn stop(at_s: f64, [x, y, z]: [f64; 3], yaw_deg: f64, pitch_deg
     Stop { at_s, eye_m: DVec3::new(x, y, z), yaw_deg, pitch_deg }
 }
 
-impl Way {
+impl CameraPath {
     /// The `[camera]` table.
     pub(super) fn text(&self) -> String {
         let mut text = format!("[camera]\nfov_deg = {:?}\neven = true\nrepeat = true\nkeyframe = [\n", self.fov_deg);

@@ -3,7 +3,7 @@
 //! In: nothing. Out: the scene's text. A strut has 4 to 24 triangles, so the cheapest picture without groups has the paper's 3840.
 //! In the paper domes spin and swing; here the camera circles them at a varying distance.
 
-use super::camera_path::{Stop, Way, point};
+use super::camera_path::{CameraPath, Stop, point};
 use super::head;
 use glam::DVec3;
 use std::f64::consts::TAU;
@@ -21,7 +21,7 @@ pub(super) fn text() -> String {
     let mut text = head(
         "8 domes of 120 struts: 3840 triangles at their coarsest, and a coarse ball for each from afar (MB97).",
         "domes of struts, each of which may be drawn as one ball",
-        &way(),
+        &path(),
     );
     let [x, y] = GRID;
     text += &format!(
@@ -60,12 +60,12 @@ proxy = {{ generate = "sphere", triangles = 20, position_m = {} }}
     )
 }
 
-fn way() -> Way {
+fn path() -> CameraPath {
     let at = |k: u32| {
         let part = f64::from(k) / f64::from(STOPS);
         let (angle, far) = (TAU * part, FAR_M.0 + FAR_M.1 * libm::sin(3.0 * TAU * part));
         let eye_m = DVec3::new(-far * libm::cos(angle), -far * libm::sin(angle), 2.0);
         Stop { at_s: ROUND_S * part, eye_m, yaw_deg: 360.0 * part, pitch_deg: -8.0 }
     };
-    Way { stops: (0..=STOPS).map(at).collect(), fov_deg: 50.0 }
+    CameraPath { stops: (0..=STOPS).map(at).collect(), fov_deg: 50.0 }
 }

@@ -3,12 +3,25 @@
 //! In: the number of trees, which path, whether trees have levels, a seed. Out: the scene's text. At twenty frames a second the linear
 //! path has 1000 frames, with most trees in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{Choices, FLOOR, head};
 
-/// Boughs (10 triangles each) and leaves (2 each) of each kind: 620 + 480, 890 + 720, 1740 + 1800 triangles.
-const KINDS: [(&str, u32, u32, &str); 3] =
-    [("birch", 62, 240, "#7fa650"), ("beech", 89, 360, "#5a8a42"), ("oak", 174, 900, "#47713c")];
+/// A kind of tree.
+struct Kind {
+    name: &'static str,
+    /// Boughs, of 10 triangles each.
+    branches: u32,
+    /// Leaves, of 2 triangles each.
+    leaves: u32,
+    leaves_colour: &'static str,
+}
+
+/// The kinds of the paper: 620 + 480, 890 + 720, 1740 + 1800 triangles.
+const KINDS: [Kind; 3] = [
+    Kind { name: "birch", branches: 62, leaves: 240, leaves_colour: "#7fa650" },
+    Kind { name: "beech", branches: 89, leaves: 360, leaves_colour: "#5a8a42" },
+    Kind { name: "oak", branches: 174, leaves: 900, leaves_colour: "#47713c" },
+];
 /// Side of the square for 600 trees, metres; the area grows with their number.
 const SIDE_M: f64 = 240.0;
 const TREES: f64 = 600.0;
@@ -21,16 +34,16 @@ pub(super) fn text(choices: &Choices) -> String {
             choices.trees
         ),
         &format!("a walk along a grove of {} trees", choices.trees),
-        &way(choices.zigzag, side_m),
+        &path(choices.zigzag, side_m),
     );
     for (number, kind) in (0..).zip(KINDS) {
-        text += &trees(choices, (number, kind), 0.5 * side_m);
+        text += &trees(choices, number, &kind, 0.5 * side_m);
     }
     text + FLOOR
 }
 
-fn trees(choices: &Choices, (number, kind): (u32, (&str, u32, u32, &str)), half_m: f64) -> String {
-    let (name, branches, leaves, colour) = kind;
+fn trees(choices: &Choices, number: u32, kind: &Kind, half_m: f64) -> String {
+    let Kind { name, branches, leaves, leaves_colour } = kind;
     let count = (choices.trees + 2 - number) / 3;
     let (seed, lod) = (choices.seed + number, if choices.prefix { "prefix" } else { "levels" });
     format!(
@@ -48,12 +61,12 @@ grid = [{count}, 1, 1]
 spacing_m = [0.0, 0.0, 0.0]
 scatter_m = [{half_m:?}, {half_m:?}, 0.0]
 scatter_seed = {seed}
-leaves_colour = "{colour}"
+leaves_colour = "{leaves_colour}"
 "##
     )
 }
 
-fn way(zigzag: bool, side_m: f64) -> Way {
+fn path(zigzag: bool, side_m: f64) -> CameraPath {
     let place = |x: f64, y: f64| [x * side_m, y * side_m, 6.0];
     let stops = if zigzag {
         vec![
@@ -67,5 +80,5 @@ fn way(zigzag: bool, side_m: f64) -> Way {
     } else {
         vec![stop(0.0, place(-0.1, -0.1), 90.0, -3.0), stop(50.0, place(1.1, -0.1), 90.0, -3.0)]
     };
-    Way { stops, fov_deg: 50.0 }
+    CameraPath { stops, fov_deg: 50.0 }
 }

@@ -3,11 +3,19 @@
 //! In: nothing. Out: the scene's text. 32 chairs, 8 tables, 24 shelves, 10 doors and 96 sets of books are 19,800 triangles; the paper has
 //! 19,821.
 
-use super::camera_path::{Way, stop};
+use super::camera_path::{CameraPath, stop};
 use super::{FLOOR, head};
 
-/// Position of the first, numbers along x, y, z, spacing (metres), rotation about z (degrees).
-type Row = ([f64; 3], [u32; 3], [f64; 3], f64);
+/// A grid of equal pieces.
+struct Row {
+    /// Position of the first, metres.
+    position_m: [f64; 3],
+    /// Numbers along x, y, z.
+    grid: [u32; 3],
+    spacing_m: [f64; 3],
+    /// Rotation of each about z, degrees.
+    yaw_deg: f64,
+}
 
 /// Furniture of one kind.
 struct Furniture {
@@ -20,19 +28,24 @@ struct Furniture {
 }
 
 const SEATS: &[Row] = &[
-    ([0.0, -1.75, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 0.0),
-    ([0.0, -0.45, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 180.0),
-    ([0.0, 0.45, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 0.0),
-    ([0.0, 1.75, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 180.0),
+    Row { position_m: [0.0, -1.75, 0.0], grid: [8, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 0.0 },
+    Row { position_m: [0.0, -0.45, 0.0], grid: [8, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 180.0 },
+    Row { position_m: [0.0, 0.45, 0.0], grid: [8, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 0.0 },
+    Row { position_m: [0.0, 1.75, 0.0], grid: [8, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 180.0 },
 ];
-const TABLES: &[Row] = &[([0.5, -1.1, 0.0], [4, 2, 1], [2.0, 2.2, 0.0], 0.0)];
-const SHELVES: &[Row] =
-    &[([-1.4, 2.9, 0.0], [12, 1, 1], [1.0, 0.0, 0.0], 0.0), ([-1.4, -2.9, 0.0], [12, 1, 1], [1.0, 0.0, 0.0], 180.0)];
-const DOORS: &[Row] =
-    &[([10.5, -2.4, 0.0], [1, 5, 1], [0.0, 1.2, 0.0], 90.0), ([10.5, -2.4, 2.1], [1, 5, 1], [0.0, 1.2, 0.0], 90.0)];
+const TABLES: &[Row] =
+    &[Row { position_m: [0.5, -1.1, 0.0], grid: [4, 2, 1], spacing_m: [2.0, 2.2, 0.0], yaw_deg: 0.0 }];
+const SHELVES: &[Row] = &[
+    Row { position_m: [-1.4, 2.9, 0.0], grid: [12, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 0.0 },
+    Row { position_m: [-1.4, -2.9, 0.0], grid: [12, 1, 1], spacing_m: [1.0, 0.0, 0.0], yaw_deg: 180.0 },
+];
+const DOORS: &[Row] = &[
+    Row { position_m: [10.5, -2.4, 0.0], grid: [1, 5, 1], spacing_m: [0.0, 1.2, 0.0], yaw_deg: 90.0 },
+    Row { position_m: [10.5, -2.4, 2.1], grid: [1, 5, 1], spacing_m: [0.0, 1.2, 0.0], yaw_deg: 90.0 },
+];
 const BOOKS: &[Row] = &[
-    ([-1.65, 2.85, 1.015], [24, 1, 2], [0.5, 0.0, 0.7], 0.0),
-    ([-1.65, -2.85, 1.015], [24, 1, 2], [0.5, 0.0, 0.7], 180.0),
+    Row { position_m: [-1.65, 2.85, 1.015], grid: [24, 1, 2], spacing_m: [0.5, 0.0, 0.7], yaw_deg: 0.0 },
+    Row { position_m: [-1.65, -2.85, 1.015], grid: [24, 1, 2], spacing_m: [0.5, 0.0, 0.7], yaw_deg: 180.0 },
 ];
 
 const FURNITURE: [Furniture; 5] = [
@@ -47,7 +60,7 @@ pub(super) fn text() -> String {
     let mut text = head(
         "A textured room of 19,800 triangles in which the policy chooses the shading as well (FS93, fig. 11).",
         "a library whose triangles and shading are chosen together",
-        &way(),
+        &path(),
     );
     for furniture in &FURNITURE {
         for (number, row) in furniture.rows.iter().enumerate() {
@@ -58,7 +71,8 @@ pub(super) fn text() -> String {
 }
 
 impl Furniture {
-    fn row(&self, number: usize, (place, grid, spacing, turn): &Row) -> String {
+    fn row(&self, number: usize, row: &Row) -> String {
+        let Row { position_m, grid, spacing_m, yaw_deg } = row;
         let Self { kind, triangles, colour, texture, .. } = self;
         let painted = texture.map_or(String::new(), |name| format!("\ntexture = \"{name}\""));
         format!(
@@ -68,10 +82,10 @@ name = "{kind}-{number}"
 model = "mesh"
 generate = "{kind}"
 triangles = {triangles}
-position_m = {place:?}
-rotation_deg = [0.0, 0.0, {turn:?}]
+position_m = {position_m:?}
+rotation_deg = [0.0, 0.0, {yaw_deg:?}]
 grid = {grid:?}
-spacing_m = {spacing:?}
+spacing_m = {spacing_m:?}
 shading = "any"{painted}
 colour = "{colour}"
 "##
@@ -79,7 +93,7 @@ colour = "{colour}"
     }
 }
 
-fn way() -> Way {
+fn path() -> CameraPath {
     let stops = vec![stop(0.0, [-5.0, -0.5, 1.7], 0.0, -4.0), stop(6.0, [-4.5, 0.5, 1.7], 4.0, -4.0)];
-    Way { stops, fov_deg: 60.0 }
+    CameraPath { stops, fov_deg: 60.0 }
 }

@@ -75,8 +75,8 @@ impl Paper {
 }
 
 /// The head of a file: comment, description, target, path of the camera.
-fn head(comment: &str, description: &str, way: &camera_path::Way) -> String {
-    format!("# {comment}\nformat = 1\ndescription = \"{description}\"\n\n[target]\nframe_hz = 30.0\n\n{}", way.text())
+fn head(comment: &str, description: &str, path: &camera_path::CameraPath) -> String {
+    format!("# {comment}\nformat = 1\ndescription = \"{description}\"\n\n[target]\nframe_hz = 30.0\n\n{}", path.text())
 }
 
 /// A floor.
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn no_way_turns_so_far_between_keyframes_that_it_looks_at_its_eye() {
+    fn no_camera_path_turns_so_far_between_keyframes_that_it_looks_at_its_eye() {
         for (paper, zigzag) in Paper::ALL.map(|p| (p, false)).into_iter().chain([(Paper::Grove, true)]) {
             let camera = scene(paper, &Choices { zigzag, ..Choices::default() }).camera.unwrap();
             let length = camera.length_s().unwrap();

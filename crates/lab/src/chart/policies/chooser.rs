@@ -1,7 +1,7 @@
 //! The policies by name, over the visible part of a scene in numbers.
 //!
 //! In: things in view with their levels' costs and gains, the time of a frame, measured times. Out: a level for each, and a
-//! predicted time. Never here: a policy's own arithmetic (the crate `metachron-budget` has it), the machine.
+//! predicted time. Never here: a policy's own arithmetic (the crate `metachron-lod` has it), the machine.
 
 mod ours;
 mod sharing;

@@ -5,8 +5,7 @@
 //! Theory: `docs/theory/control.md`, section 6.
 
 use super::super::feedback::unseen;
-use super::super::level::Span;
-use super::super::plan::LevelDemand;
+use super::super::plan::{LevelDemand, SizedView};
 use super::super::policy::Policy;
 use super::super::query::{Promise, demand};
 use super::super::view::ObjectView;
@@ -29,7 +28,7 @@ impl PictureControl {
         if self.frozen {
             return;
         }
-        self.look(objects);
+        self.update_views(objects);
         let mut levels = self.ahead.take().map_or_else(Vec::new, |ahead| ahead.levels);
         levels.clear();
         let promise = self.choose(&mut levels);
@@ -46,14 +45,14 @@ impl PictureControl {
         };
         let Some(mut ahead) = self.ahead.take().filter(|ahead| ours(ahead) && !self.frozen) else { return false };
         let chosen_s = self.drawn_s(&ahead.levels);
-        for (((known, span), object), level) in self.views.iter_mut().zip(objects).zip(&mut ahead.levels) {
-            if object.visible && !known.visible {
+        for ((known, object), level) in self.views.iter_mut().zip(objects).zip(&mut ahead.levels) {
+            if object.visible && !known.view.visible {
                 level.shading = object.shading.0;
-                known.speed_px_s = object.speed_px_s;
+                known.view.speed_px_s = object.speed_px_s;
             }
-            let now = ObjectView { speed_px_s: known.speed_px_s, ..*object };
-            if *known != now {
-                (*known, *span) = (now, Span::of(&now));
+            let now = ObjectView { speed_px_s: known.view.speed_px_s, ..*object };
+            if known.view != now {
+                *known = SizedView::of(now);
             }
         }
         self.plan.levels = ahead.levels;
@@ -71,7 +70,7 @@ impl PictureControl {
             return;
         }
         let chosen_s = self.drawn_s(&self.plan.levels);
-        for (at, ((view, _), level)) in self.views.iter().zip(&mut self.plan.levels).enumerate() {
+        for (at, (SizedView { view, .. }, level)) in self.views.iter().zip(&mut self.plan.levels).enumerate() {
             if !(view.visible && level.polygons > 0.0) {
                 continue;
             }
@@ -81,7 +80,7 @@ impl PictureControl {
             };
         }
         self.drawn_otherwise(chosen_s);
-        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|(seen, _)| seen.view.visible);
         self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
     }
 
@@ -104,6 +103,6 @@ impl PictureControl {
     /// Time of the objects in view at these levels by the prices, seconds.
     fn drawn_s(&self, levels: &[LevelDemand]) -> f64 {
         let prices = self.policy.prices(&self.prices);
-        prices.objects_s(self.views.iter().map(|(view, _)| view), levels)
+        prices.objects_s(self.views.iter().map(|seen| &seen.view), levels)
     }
 }

@@ -4,7 +4,7 @@
 
 use super::super::policy::{Law, Policy};
 use super::super::price::{Backdrop, Prices};
-use super::super::quality_boost::Raise;
+use super::super::quality_boost::QualityBoost;
 use super::PictureControl;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
@@ -21,7 +21,7 @@ impl PictureControl {
             if other {
                 self.forget_ladders();
             }
-            self.raise = self.raise.map(|_| Raise::default());
+            self.raise = self.raise.map(|_| QualityBoost::default());
             self.take_over();
         }
     }
@@ -111,7 +111,7 @@ impl PictureControl {
     /// Whether the default policy and Robin Hood may spend time on smoother shapes and softer shadows once everything has its requested
     /// range; initially they may not.
     pub fn set_raise(&mut self, raise: bool) {
-        self.raise = raise.then(Raise::default);
+        self.raise = raise.then(QualityBoost::default);
     }
 
     /// Whether levels are frozen.

@@ -120,13 +120,14 @@ fn a_settled_picture_does_not_change_any_more() {
 }
 
 #[test]
-fn out_of_reach_it_rests_on_its_clamp_says_so_and_leaves_without_windup() {
+fn a_target_out_of_range_clamps_is_reported_and_leaves_without_windup() {
     for (slower, bound) in [(20.0, Bound::Coarsest), (1e-3, Bound::Finest)] {
         let mut run = Run::new(Law::CORRECTED, 30.0, slower);
         run.frames(2000);
         assert_eq!(run.control.status(), Status::Clamped(bound));
         let resting = run.control.plan(&run.objects).polygons;
-        let (least, full) = in_view(&run.control.views).fold((0.0, 0.0), |(l, f), (_, s)| (l + s.least, f + s.most));
+        let (least, full) =
+            in_view(&run.control.views).fold((0.0, 0.0), |(l, f), s| (l + s.span.least, f + s.span.most));
         assert_eq!(resting, if bound == Bound::Finest { full } else { least });
         run.plant.slower = 1.0;
         run.frames(2); // the first lesson on the other machine, and the picture made of it
@@ -166,7 +167,7 @@ fn work_that_scatters_by_five_percent_misses_fewer_than_one_frame_in_a_hundred()
 }
 
 #[test]
-fn frames_that_must_not_teach_do_not() {
+fn skipped_frames_are_not_learnt_from() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     run.frames(100);
     let (before, status) = (run.control.plan(&run.objects).clone(), run.control.status());
@@ -195,7 +196,7 @@ fn far_fast_and_unimportant_tubes_are_coarser() {
 }
 
 #[test]
-fn what_is_out_of_sight_takes_nothing_and_comes_back_at_once() {
+fn an_object_out_of_view_takes_no_polygons_and_returns_at_once() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     run.objects.push(tube(6));
     run.frames(100);
@@ -230,7 +231,7 @@ fn feedback_draws_the_members_of_a_group_as_themselves() {
 }
 
 #[test]
-fn full_draws_the_finest_and_feedback_goes_on_from_there() {
+fn full_draws_the_finest_and_feedback_continues_from_there() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     run.frames(100);
     run.control.set_policy(Policy::Full);
@@ -243,7 +244,7 @@ fn full_draws_the_finest_and_feedback_goes_on_from_there() {
 }
 
 #[test]
-fn another_law_goes_on_from_the_picture_as_it_is() {
+fn another_law_continues_from_the_present_picture() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     run.frames(100);
     let before = run.control.plan(&run.objects).levels[0];
@@ -257,7 +258,7 @@ fn another_law_goes_on_from_the_picture_as_it_is() {
 }
 
 #[test]
-fn fixed_pictures_are_said_to_be_fixed() {
+fn fixed_pictures_have_the_status_fixed() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     let at = Resolution { eps_m: 0.01, n: 2 };
     run.objects = vec![ObjectView { range: ResolutionRange::fixed(at), ..tube(0) }];
@@ -268,7 +269,7 @@ fn fixed_pictures_are_said_to_be_fixed() {
 }
 
 #[test]
-fn a_few_solids_of_whole_octaves_come_to_rest_below_the_target() {
+fn a_few_solids_with_octave_levels_settle_below_the_target() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
     // dear enough that one level more of one ball is half a frame
     run.objects = (0..3).map(|id| ObjectView { pixels: f64::INFINITY, ..ball(id) }).collect();
@@ -312,7 +313,7 @@ fn the_printed_law_is_slow_at_thirty_frames_a_second() {
 
 proptest! {
     #[test]
-    fn no_sequence_of_times_takes_a_picture_out_of_its_range(
+    fn no_sequence_of_times_moves_a_picture_out_of_its_range(
         frames in prop::collection::vec((0_u64..20_000_000_000, any::<bool>()), 1..100),
         numbers in prop::collection::vec(any::<f64>(), 4),
         printed in any::<bool>(),
@@ -333,7 +334,7 @@ proptest! {
 }
 
 #[test]
-fn what_the_coarse_levels_of_bodies_cannot_use_goes_to_the_tube() {
+fn time_unused_by_coarse_levels_of_bodies_goes_to_the_tube() {
     // two tools whose next level is four times as dear: most of what falls to them they cannot use
     let tool = Kind::Primitive { radius_m: 0.1, triangles: std::array::from_fn(|n| 100 << (2 * n)) };
     let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 60.0);

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// Number of windows: four seconds, after which a burst no longer counts. More frequent bursts are covered by the mean.
 const WINDOWS: usize = 16;
 /// A window this much above the mean counts as expensive …
-const DEAR: f64 = 1.25;
+const EXPENSIVE: f64 = 1.25;
 /// … and this many in a row, a second, are not a burst: the work has grown, and older windows are discarded.
 pub(super) const IN_A_ROW: usize = 4;
 
@@ -16,21 +16,21 @@ pub(super) const IN_A_ROW: usize = 4;
 #[derive(Debug, Clone, Default)]
 pub(super) struct FullLoad {
     windows: VecDeque<f64>,
-    dear: usize,
+    expensive: usize,
 }
 
 impl FullLoad {
     /// Adds the load of a window.
     pub fn note(&mut self, load: f64) {
-        let dear = self.mean().is_some_and(|mean| load > DEAR * mean);
-        self.dear = if dear { self.dear + 1 } else { 0 };
+        let expensive = self.mean().is_some_and(|mean| load > EXPENSIVE * mean);
+        self.expensive = if expensive { self.expensive + 1 } else { 0 };
         if self.windows.len() == WINDOWS {
             self.windows.pop_front();
         }
         self.windows.push_back(load);
-        if self.dear >= IN_A_ROW {
+        if self.expensive >= IN_A_ROW {
             self.windows.drain(..self.windows.len() - IN_A_ROW);
-            self.dear = 0;
+            self.expensive = 0;
         }
     }
 

@@ -61,7 +61,7 @@ impl Agent {
 }
 
 #[test]
-fn an_agent_with_time_to_spare_is_left_as_fine_as_it_is() {
+fn an_agent_with_spare_time_keeps_its_resolution() {
     let mut agent = Agent::new(0.1 * PERIOD_S);
     agent.run(20.0);
     assert!(agent.demands.is_empty() && agent.control.rest() == Some(Bound::Finest));
@@ -93,7 +93,7 @@ fn an_agent_ten_times_too_slow_slows_down_last_and_comes_back_in_the_reverse_ord
 }
 
 #[test]
-fn retunes_stop_once_the_load_is_right() {
+fn demands_stop_once_the_load_is_on_target() {
     for full in [0.7, 1.0, 1.7, 3.0, 6.0] {
         let mut agent = Agent::new(full * PERIOD_S);
         agent.run(20.0);
@@ -104,7 +104,7 @@ fn retunes_stop_once_the_load_is_right() {
 }
 
 #[test]
-fn an_agent_kept_late_by_others_tries_again_ever_more_rarely() {
+fn an_agent_delayed_by_others_refines_ever_more_rarely() {
     let mut control = RateControl::new(limits(), Some(0.005));
     let (mut now, mut time_s, mut retunes) = (control.demand(), 0.0, Vec::new());
     while time_s < 240.0 {
@@ -123,7 +123,7 @@ fn an_agent_kept_late_by_others_tries_again_ever_more_rarely() {
 }
 
 #[test]
-fn one_hiccup_of_the_scheduler_changes_nothing() {
+fn one_delay_by_the_scheduler_changes_nothing() {
     let mut control = RateControl::new(limits(), Some(0.005));
     for turn in 0..5000 {
         let work_s = if turn == 2500 { 0.05 } else { 0.45 * PERIOD_S };
@@ -133,7 +133,7 @@ fn one_hiccup_of_the_scheduler_changes_nothing() {
 }
 
 #[test]
-fn fixed_values_switch_it_off() {
+fn fixed_values_switch_the_controller_off() {
     let fixed = RateLimits { dt_max_s: PERIOD_S, eps_m: Some((0.01, 0.01)), ..limits() };
     for limits in [fixed, RateLimits { eps_m: None, ..fixed }] {
         let mut control = RateControl::new(limits, Some(0.01));
@@ -154,7 +154,7 @@ fn a_model_without_eps_slows_down() {
 }
 
 #[test]
-fn turns_that_are_none_are_left_out() {
+fn invalid_turns_are_left_out() {
     let mut control = RateControl::new(limits(), Some(0.005));
     for bad in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
         for at in 0..4 {
@@ -182,7 +182,7 @@ fn demands_stay_in_their_ranges_whatever_is_measured() {
 }
 
 #[test]
-fn nothing_finer_is_asked_for_than_can_be_seen_and_what_was_held_comes_back() {
+fn no_resolution_finer_than_visible_is_demanded_and_the_own_target_returns() {
     // one with time to spare, and one that rests at an ε which its share pays for
     for full in [0.1, 0.9] {
         let mut agent = Agent::new(full * PERIOD_S);
@@ -202,7 +202,7 @@ fn nothing_finer_is_asked_for_than_can_be_seen_and_what_was_held_comes_back() {
 }
 
 #[test]
-fn an_agent_that_is_late_out_of_sight_still_slows_down() {
+fn a_late_agent_out_of_view_still_slows_down() {
     let mut agent = Agent::new(4.0 * PERIOD_S);
     agent.control.set_plain(0.01);
     agent.run(20.0);
@@ -225,7 +225,7 @@ const BURSTS: [(Bursts, f64); 5] = {
 };
 
 #[test]
-fn bursts_that_go_on_are_paid_for_by_their_mean() {
+fn continued_bursts_count_by_their_mean() {
     for (bursts, mean) in BURSTS {
         let mut agent = Agent { bursts: Some(bursts), ..Agent::new(0.7 * PERIOD_S) };
         agent.run(30.0);
@@ -256,7 +256,7 @@ fn after_bursts_an_agent_is_as_fine_as_before_within_ten_seconds() {
 }
 
 #[test]
-fn who_is_kept_late_by_the_bursts_of_others_now_and_then_stays_as_it_is() {
+fn an_agent_delayed_now_and_then_by_bursts_of_others_keeps_its_resolution() {
     let mut control = RateControl::new(limits(), Some(0.005));
     for turn in 0..20_000 {
         // every second for a tenth of one

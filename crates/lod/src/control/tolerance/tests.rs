@@ -50,7 +50,7 @@ impl Plant {
 }
 
 #[test]
-fn it_settles_within_the_tolerance_from_both_sides_and_stays_there() {
+fn the_error_settles_within_the_tolerance_from_both_sides() {
     for order in [1.0, 2.0] {
         // at 4 ms of steps the error in time is half a millimetre, at ε of 2 cm the one in space
         let time = (5e-4 / 4e-3_f64.powf(order), order);
@@ -69,7 +69,7 @@ fn it_settles_within_the_tolerance_from_both_sides_and_stays_there() {
 }
 
 #[test]
-fn a_tolerance_out_of_reach_rests_on_the_finest_and_says_so() {
+fn an_unreachable_tolerance_rests_at_the_finest_and_is_reported() {
     let mut plant = Plant::new(1e-7, (4e-3, 1e-2), (0.1, 1.0));
     plant.run(30.0);
     assert_eq!((plant.control.rest(), plant.now.dt_s, plant.now.eps_m), (Some(Bound::Finest), DT_S.0, Some(EPS_M.0)));
@@ -78,14 +78,14 @@ fn a_tolerance_out_of_reach_rests_on_the_finest_and_says_so() {
 }
 
 #[test]
-fn a_tolerance_that_nothing_reaches_rests_on_the_coarsest() {
+fn a_tolerance_above_every_error_rests_at_the_coarsest() {
     let mut plant = Plant::new(10.0, (4e-3, 1e-2), (0.1, 1.0));
     plant.run(60.0);
     assert_eq!((plant.control.rest(), plant.now.dt_s, plant.now.eps_m), (Some(Bound::Coarsest), DT_S.1, Some(EPS_M.1)));
 }
 
 #[test]
-fn a_motion_that_comes_and_goes_does_not_make_it_swing() {
+fn an_intermittent_motion_causes_no_oscillation() {
     let mut plant = Plant::new(1e-3, (4e-3, 1e-2), (0.1, 1.0));
     let mut asked = [0, 0];
     for cycle in 0..60 {
@@ -98,7 +98,7 @@ fn a_motion_that_comes_and_goes_does_not_make_it_swing() {
 }
 
 #[test]
-fn numbers_that_are_none_teach_nothing() {
+fn invalid_numbers_are_ignored() {
     let mut plant = Plant::new(1e-3, (4e-3, 1e-2), (0.1, 1.0));
     for bad in [f64::NAN, f64::INFINITY, -1.0] {
         for turn in [(bad, 0.0, 4e-3), (0.0, bad, 4e-3), (0.0, 0.0, bad)] {

@@ -9,7 +9,7 @@ use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
 /// Message for data that is not in the file.
-const OUTSIDE: &str = "its data lies outside the file: it is cut short, or kept in another";
+const OUTSIDE: &str = "its data is outside the file: the file is truncated, or the data is in another file";
 /// Prefixes of extensions that change nothing of what is read here: material properties, lights.
 const UNREAD: [&str; 2] = ["KHR_materials_", "KHR_lights_"];
 
@@ -122,10 +122,10 @@ pub(super) struct Buffer {
 /// Splits a file into its tables and its data; refuses required extensions that are not understood.
 pub(super) fn read(bytes: &[u8]) -> Result<(Tables, &[u8]), String> {
     let (text, data) = parts(bytes)?;
-    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
+    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its JSON is invalid: {error}"))?;
     let needed = |name: &&String| !UNREAD.iter().any(|start| name.starts_with(start));
     if let Some(name) = tables.extensions_required.iter().find(needed) {
-        return Err(format!("it requires the extension `{name}`, which is not understood"));
+        return Err(format!("it requires the extension `{name}`, which is not supported"));
     }
     Ok((tables, data))
 }
@@ -133,10 +133,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<(Tables, &[u8]), String> {
 /// The text and the data of a file; the data is empty where there is none.
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
     let word = |at: usize| bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
-    let short = || "it is cut short".to_owned();
+    let short = || "the file is truncated".to_owned();
     let (version, length) = (word(4).ok_or_else(short)?, word(8).ok_or_else(short)? as usize);
     if version != 2 {
-        return Err(format!("it is of version {version}; expected 2"));
+        return Err(format!("its glTF version is {version}; expected 2"));
     }
     let whole = bytes.get(..length).ok_or_else(short)?;
     let (mut text, mut data, mut at): (Option<&[u8]>, &[u8], usize) = (None, &[], 12);
@@ -150,7 +150,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
         }
         at += 8 + size;
     }
-    Ok((text.ok_or("it has no text")?, data))
+    Ok((text.ok_or("it has no JSON chunk")?, data))
 }
 
 impl Tables {
@@ -161,9 +161,11 @@ impl Tables {
 
     /// The image of a texture.
     pub(super) fn source(&self, texture: usize) -> Result<usize, String> {
-        let entry =
-            self.textures.get(texture).ok_or_else(|| format!("it names texture {texture}, which is not there"))?;
-        entry.source.ok_or_else(|| format!("its texture {texture} has no image that is understood"))
+        let entry = self
+            .textures
+            .get(texture)
+            .ok_or_else(|| format!("it refers to texture {texture}, which does not exist"))?;
+        entry.source.ok_or_else(|| format!("its texture {texture} has no image of a supported format"))
     }
 
     /// The number of items that an accessor declares.
@@ -191,7 +193,7 @@ pub(super) fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<
         return Err("its positions are not three 32-bit floats".to_owned());
     }
     let number = |b: &[u8], at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
-    let items = items(tables, accessor, (data, 12))?;
+    let items = items(tables, accessor, data, 12)?;
     Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
 }
 
@@ -202,9 +204,9 @@ pub(super) fn uvs(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<Vec
         (5126, "VEC2") => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         (5121, "VEC2") => (1, |b| f32::from(b[0]) / 255.0),
         (5123, "VEC2") => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65_535.0),
-        _ => return Err("its places on a texture are not two numbers".to_owned()),
+        _ => return Err("its texture coordinates are not two numbers".to_owned()),
     };
-    let items = items(tables, accessor, (data, 2 * size))?;
+    let items = items(tables, accessor, data, 2 * size)?;
     Ok(items.map(|bytes| Vec2::new(number(bytes), number(&bytes[size..]))).collect())
 }
 
@@ -217,25 +219,26 @@ pub(super) fn indices(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec
         (5125, "SCALAR") => (4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         _ => return Err("its indices are not single whole numbers".to_owned()),
     };
-    Ok(items(tables, accessor, (data, size))?.map(number).collect())
+    Ok(items(tables, accessor, data, size)?.map(number).collect())
 }
 
 fn accessor(tables: &Tables, number: usize) -> Result<&Accessor, String> {
-    tables.accessors.get(number).ok_or_else(|| format!("it names accessor {number}, which is not there"))
+    tables.accessors.get(number).ok_or_else(|| format!("it refers to accessor {number}, which does not exist"))
 }
 
 /// The bytes of every item of an accessor, checked to lie inside the file.
 fn items<'d>(
     tables: &Tables,
     accessor: &Accessor,
-    (data, size): (&'d [u8], usize),
+    data: &'d [u8],
+    size: usize,
 ) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
     let view = accessor.buffer_view.filter(|_| accessor.sparse.is_none());
-    let view = view.ok_or("its data is sparse, which is not understood")?;
+    let view = view.ok_or("it has a sparse accessor, which is not supported")?;
     let bytes = tables.bytes(view, data)?;
     let (start, count) = (accessor.byte_offset, accessor.count);
     let stride = tables.buffer_views[view].byte_stride.unwrap_or(size).max(size);
-    let last = count.checked_sub(1).ok_or("it has an empty list")?;
+    let last = count.checked_sub(1).ok_or("it has an empty accessor")?;
     let reach = last.checked_mul(stride).and_then(|n| n.checked_add(start)?.checked_add(size));
     if reach.is_none_or(|reach| reach > bytes.len()) {
         return Err(OUTSIDE.to_owned());

@@ -17,7 +17,7 @@ fn took_s(control: &PictureControl, objects: &[ObjectView]) -> f64 {
 }
 
 #[test]
-fn what_was_chosen_ahead_is_drawn_in_the_frame_after() {
+fn a_choice_made_ahead_is_drawn_in_the_next_frame() {
     let mut control = PictureControl::new(Policy::Adaptive, Law::CORRECTED, 60.0);
     let objects = meshes(0);
     assert!(!control.take_up(&objects), "nothing was chosen yet");
@@ -33,7 +33,7 @@ fn what_was_chosen_ahead_is_drawn_in_the_frame_after() {
 }
 
 #[test]
-fn what_comes_into_view_is_drawn_coarsely_and_prices_are_learnt_from_what_was_chosen() {
+fn an_object_that_comes_into_view_is_drawn_coarsely_and_prices_are_learnt_from_the_choice() {
     let mut control = PictureControl::new(Policy::Adaptive, Law::CORRECTED, 60.0);
     let (all, late) = (meshes(0), meshes(2));
     control.plan(&late);

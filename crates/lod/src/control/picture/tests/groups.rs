@@ -56,7 +56,7 @@ fn levels_of(control: &PictureControl) -> Vec<u8> {
 }
 
 #[test]
-fn every_level_of_a_group_has_its_time_between_closed_and_open() {
+fn every_level_of_a_group_is_chosen_between_closed_and_open() {
     let views = woods();
     for policy in [Policy::Adaptive, Policy::Hierarchical, Policy::HierarchicalFlat] {
         let mut seen = [false; 4];
@@ -92,7 +92,7 @@ fn a_groups_level_rises_with_a_falling_price_and_skips_none() {
 }
 
 #[test]
-fn a_still_picture_of_closed_and_open_groups_is_not_touched() {
+fn a_still_picture_of_closed_and_open_groups_does_not_change() {
     let views = woods();
     // the machine trembles by two parts in a hundred, as a quiet one does
     let tremble = |k: u32| 1.0 + 0.02 * f64::from(k * 7919 % 101) / 100.0;
@@ -124,7 +124,7 @@ fn a_late_frame_draws_closed_groups_by_their_coarsest_impostor() {
 }
 
 #[test]
-fn the_detail_of_a_group_is_its_level_of_all_that_it_has() {
+fn the_detail_of_a_group_is_its_level_over_its_number_of_levels() {
     let views = woods();
     let group = &views[4 * MEMBERS];
     let of = |n| {

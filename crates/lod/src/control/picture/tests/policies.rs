@@ -1,6 +1,7 @@
-//! Policies that choose by cost, on a machine whose prices they are told, or are told wrongly.
+//! Policies that choose by cost, on a machine whose prices are given correctly or wrongly.
 
 use super::*;
+use crate::control::level::Span;
 use proptest::prelude::*;
 
 /// Prices of the plant of these tests: its pixels are the backdrop's.
@@ -83,7 +84,7 @@ pub(super) fn holes(plan: &Plan, views: &[ObjectView]) -> usize {
 }
 
 #[test]
-fn who_heeds_costs_promises_a_frame_within_its_time_and_keeps_it() {
+fn cost_based_policies_predict_a_frame_within_its_time_and_keep_it() {
     let views = hall();
     for policy in HEEDFUL {
         for target_hz in [30.0, 60.0] {
@@ -101,7 +102,7 @@ fn who_heeds_costs_promises_a_frame_within_its_time_and_keeps_it() {
 }
 
 #[test]
-fn where_there_is_time_for_all_everybody_draws_all() {
+fn with_time_for_everything_every_policy_draws_the_finest() {
     let views: Vec<_> = (0..6).map(|i| mesh(i, 1e5, 2000)).collect();
     for policy in HEEDFUL {
         let mut control = control(policy, 20.0);
@@ -116,7 +117,7 @@ fn where_there_is_time_for_all_everybody_draws_all() {
 }
 
 #[test]
-fn marginal_steps_are_worth_nearly_as_much_as_anything_can_be() {
+fn marginal_steps_are_near_the_optimum() {
     let views = hall();
     for policy in [Policy::MarginalStop, Policy::MarginalFill, Policy::Adaptive] {
         let mut control = control(policy, 60.0);
@@ -127,7 +128,7 @@ fn marginal_steps_are_worth_nearly_as_much_as_anything_can_be() {
 }
 
 #[test]
-fn a_hierarchy_draws_a_far_group_by_its_proxy_where_time_is_short_and_opens_it_where_it_is_not() {
+fn a_hierarchy_draws_a_far_group_by_its_impostor_when_time_is_short_and_opens_it_otherwise() {
     let views = hall();
     for policy in [Policy::Hierarchical, Policy::HierarchicalFlat, Policy::Adaptive] {
         let drawn_by_proxy = |target_hz: f64| {
@@ -148,7 +149,7 @@ fn a_hierarchy_draws_a_far_group_by_its_proxy_where_time_is_short_and_opens_it_w
 }
 
 #[test]
-fn a_frame_that_nothing_fits_is_said_to_be_infeasible_and_drawn_in_the_lowest_forms() {
+fn an_infeasible_frame_is_reported_and_drawn_in_the_lowest_forms() {
     let views = hall();
     for policy in HEEDFUL.into_iter().filter(|policy| *policy != Policy::RobinHood) {
         let mut control = control(policy, 500.0);
@@ -162,7 +163,7 @@ fn a_frame_that_nothing_fits_is_said_to_be_infeasible_and_drawn_in_the_lowest_fo
 }
 
 #[test]
-fn a_still_picture_is_not_touched() {
+fn a_still_picture_does_not_change() {
     let views = hall();
     for policy in HEEDFUL {
         let mut control = control(policy, 60.0);
@@ -179,7 +180,7 @@ fn a_still_picture_is_not_touched() {
 }
 
 #[test]
-fn the_default_settles_within_fifteen_frames_on_a_slower_machine_and_takes_its_time_on_a_faster_one() {
+fn the_default_settles_within_fifteen_frames_on_a_slower_machine_and_gradually_on_a_faster_one() {
     for (times, frames) in [(3.0, 15), (1.0 / 3.0, 45)] {
         let mut views = hall();
         views.iter_mut().for_each(|view| view.pixels *= 50.0);
@@ -224,7 +225,7 @@ fn the_default_misses_fewer_than_one_frame_in_a_hundred_on_a_machine_that_scatte
 }
 
 #[test]
-fn objects_that_come_and_go_are_drawn_at_once_and_leave_nothing_behind() {
+fn objects_that_come_and_go_are_drawn_at_once_and_leave_no_state() {
     for policy in HEEDFUL {
         let mut control = control(policy, 60.0);
         let all = hall();
@@ -245,7 +246,7 @@ fn objects_that_come_and_go_are_drawn_at_once_and_leave_nothing_behind() {
 }
 
 #[test]
-fn one_giant_object_does_not_take_from_the_others_what_they_need() {
+fn one_giant_object_does_not_starve_the_others() {
     let mut views: Vec<_> = (0..10).map(|i| mesh(i, 3000.0, 4000)).collect();
     views.push(mesh(10, 8e5, u32::MAX));
     for policy in HEEDFUL {
@@ -258,7 +259,7 @@ fn one_giant_object_does_not_take_from_the_others_what_they_need() {
 }
 
 #[test]
-fn a_clock_that_jumps_teaches_nothing_that_lasts() {
+fn a_clock_that_jumps_has_no_lasting_effect() {
     for policy in [Policy::Adaptive, Policy::Threshold, Policy::Greedy] {
         let views = hall();
         let mut control = control(policy, 30.0);
@@ -320,7 +321,7 @@ fn size_importance_focus_and_motion_count_as_their_sliders_say() {
 }
 
 #[test]
-fn the_cheaper_shading_is_taken_where_the_better_one_does_not_pay() {
+fn the_cheaper_shading_is_chosen_where_the_better_one_gains_too_little() {
     let mut machine = prices();
     // light at every pixel is dear, and nothing else is
     machine.shading[Shading::PerPixel as usize].pixel = 200e-9;
@@ -398,7 +399,7 @@ fn frame_near_by(control: &mut PictureControl, views: &[ObjectView], times: f64)
 }
 
 #[test]
-fn time_left_at_the_finest_of_everything_raises_quality_and_is_given_back_first() {
+fn spare_time_at_the_finest_raises_quality_and_is_the_first_to_go() {
     let (mut control, views) = near_by(15.0, true);
     let plain = near_by(15.0, false);
     let frames = |control: &mut PictureControl, count: usize, times: f64| -> Vec<_> {
