@@ -173,6 +173,12 @@ impl CurveState {
 }
 
 impl Body {
+    /// The state of a tool; `None` for any other body.
+    #[must_use]
+    pub const fn tool(&self) -> Option<&ToolState> {
+        if let Self::Tool(tool) = self { Some(tool) } else { None }
+    }
+
     /// Position and velocity of a material point; `None` where the body has no such point.
     #[must_use]
     pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {

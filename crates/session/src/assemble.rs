@@ -4,27 +4,21 @@
 //! Never here: time passing.
 
 use super::cpu_budget::AgentBudget;
+use super::drawn_form::{form, triangles};
 use super::error_control::ErrorStatus;
 use super::governor::{ErrorGovernor, RateGovernor};
 use glam::DVec3;
-use metachron_contact::Agent;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
-use metachron_geometry::ShapeKind;
-use metachron_geometry::{Primitive, Solid, ToolShape, patch};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices,
-    RateControl, RateDemand, RateLimits, Stages, Value,
+    ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, RateControl,
+    RateDemand, RateLimits, Stages, Value,
 };
-use metachron_models::soft::SoftBody;
-use metachron_models::soft::{SoftShape, SoftSpec};
-use metachron_render::{
-    Actor, Appearance, Camera, Form, Level, Material, ROPE_LEVEL, SceneView, StaticObject, Visibility,
-};
+use metachron_render::{Actor, Appearance, Camera, Form, Level, Material, SceneView, StaticObject, Visibility};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
 use metachron_world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
-use metachron_world::{Member, Scene, Scenery, Spec, machine};
+use metachron_world::{Member, Scene, Scenery, machine};
 use std::sync::Arc;
 
 /// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
@@ -68,7 +62,7 @@ const SHARE_MAX: f64 = 0.6;
 
 /// The governor of the agent's dt and ε; none where the scene fixes both.
 fn governor(member: &Member, share: f64, controlled: &mut ControlledAgents) -> Option<Box<dyn Governor>> {
-    let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
+    let meshed = member.spec.adapts_spacing();
     if let Some(tolerance_m) = member.tolerance_m {
         return error_governor(member, tolerance_m, meshed, controlled);
     }
@@ -134,28 +128,6 @@ pub fn scene_view(scene: &Scene) -> SceneView {
 /// All scenery in the order of its actors.
 fn scenery(scene: &Scene) -> impl Iterator<Item = &Scenery> {
     scene.scenery.iter().chain(scene.groups.iter().map(|group| &group.proxy))
-}
-
-fn form(spec: &Spec) -> Form {
-    match spec {
-        Spec::Tube(_) => Form::Tube,
-        Spec::Rigid(body) => Form::Solid(body.solid.clone()),
-        Spec::Soft(soft) => soft_form(soft),
-        Spec::Tool(_) => Form::Tool(ToolShape::default()),
-        Spec::Synthetic(_) => Form::Unseen,
-    }
-}
-
-/// A rope is drawn as a tube, any other soft body as its skin; nothing if it cannot be built, which is reported elsewhere.
-fn soft_form(spec: &SoftSpec) -> Form {
-    if let SoftShape::Rope { radius_m, .. } = spec.shape {
-        return Form::Rope { radius_m };
-    }
-    let form = SoftBody::new(spec.clone()).ok().and_then(|body| body.form());
-    match form.as_deref().map(|form| &form.kind) {
-        Some(ShapeKind::Surface(skin)) => Form::Skin(skin.clone()),
-        _ => Form::Unseen,
-    }
 }
 
 const fn appearance(wish: &metachron_world::Look) -> Appearance {
@@ -319,40 +291,6 @@ pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
     // a cast of floats saturates; the detail sets the colour of visible objects
     let detail = if view.visible { control::detail(view, demand) as f32 } else { 0.0 };
     Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
-}
-
-/// Triangles at every level, for an object that is one mesh per level.
-fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
-    let of_tool = |n: u8| ToolShape::default().parts(0.0).iter().map(|part| part.primitive.triangles(n)).sum();
-    std::array::from_fn(|n| {
-        let n = n as u8;
-        match spec {
-            Spec::Rigid(body) => solid_triangles(&body.solid, n),
-            Spec::Tool(_) => of_tool(n),
-            Spec::Soft(body) => soft_triangles(&body.shape),
-            Spec::Tube(_) | Spec::Synthetic(_) => 0,
-        }
-    })
-}
-
-/// Triangles drawn for a soft body: a sheet has two faces and a rim, a rope is drawn as a tube.
-fn soft_triangles(shape: &SoftShape) -> u32 {
-    match *shape {
-        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
-        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
-        SoftShape::Ball { segments: n, .. } => 12 * n * n,
-        SoftShape::Rope { segments, .. } => segments * patch::triangles(ROPE_LEVEL),
-    }
-}
-
-fn solid_triangles(solid: &Solid, n: u8) -> u32 {
-    match (Primitive::of(solid, n), solid) {
-        (Some((primitive, _)), _) => primitive.triangles(n),
-        (None, Solid::Mesh { triangles, .. }) => triangles.len() as u32,
-        // Euler: a closed triangle mesh of p corners has 2p - 4 faces
-        (None, Solid::Hull { points_m }) => (2 * points_m.len() as u32).saturating_sub(4),
-        (None, _) => 0,
-    }
 }
 
 /// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.

@@ -5,7 +5,7 @@
 //! the pairs know them.
 
 use glam::DVec3;
-use metachron_core::{AgentId, Body, Snapshot};
+use metachron_core::{AgentId, Snapshot};
 use metachron_core::{PairKind, PairState};
 use metachron_world::Scene;
 use std::collections::BTreeMap;
@@ -220,8 +220,7 @@ impl Couplings {
 
     /// Records the grasp of a tool.
     fn note_grasp(&mut self, holder: AgentId, snapshot: &Snapshot) {
-        let Body::Tool(tool) = &snapshot.body else { return };
-        let Some(grasp) = tool.grasp else { return };
+        let Some((tool, grasp)) = snapshot.body.tool().and_then(|tool| Some((tool, tool.grasp?))) else { return };
         let coupling = self.at(holder, grasp.target, PairKind::Grasp.name());
         coupling.contacts = 1;
         coupling.force_n = tool.force_n;
@@ -231,7 +230,7 @@ impl Couplings {
     fn note_pair(&mut self, owner: AgentId, state: &PairState, newest: &[Arc<Snapshot>]) {
         let other = state.with;
         let Some((mine, theirs)) = newest.get(owner.0 as usize).zip(newest.get(other.0 as usize)) else { return };
-        let held_by_tool = state.kind == PairKind::Grasp && matches!(theirs.body, Body::Tool(_));
+        let held_by_tool = state.kind == PairKind::Grasp && theirs.body.tool().is_some();
         let (a, b) = if held_by_tool { (other, owner) } else { (owner, other) };
         if let Some(back) = both_sides(state, theirs, owner) {
             // each side of a penalty force computes its own value: one coupling, and the difference of the two
@@ -298,6 +297,7 @@ fn difference_n_s(mine: &Snapshot, owner: AgentId, theirs: &Snapshot, other: Age
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metachron_core::Body;
     use metachron_core::{Ahead, Impulse, Ledger, Site};
     use metachron_core::{SimTime, ToolState};
     use metachron_scene::{Source, load};

@@ -8,20 +8,13 @@
 use super::error::SessionError;
 use super::session::Session;
 use crate::fit::{Path, Setting};
-use metachron_contact::Agent;
-use metachron_core::{AgentId, Body, ResolutionRange, SimSpan, Snapshot};
+use metachron_core::{AgentId, SimSpan};
 use metachron_models::rod::Integrator;
-use metachron_models::rod::Tube;
-use metachron_models::rod::TubeSpec;
-use metachron_models::soft::Side;
-use metachron_models::soft::SoftBody;
-use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use metachron_runtime::AgentState;
 use metachron_scene::format::MODELS;
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Member, Probe, Scene, Spec};
-use std::f64::consts::PI;
+use metachron_world::{Member, Probe, Scene};
 use std::time::Duration;
 
 /// A recorded point: its agent, and where on it.
@@ -59,11 +52,8 @@ const LOOK_S: f64 = 0.02;
 /// The present setting of an agent.
 #[must_use]
 pub fn setting_of(member: &Member) -> Setting {
-    let (pieces, method) = match &member.spec {
-        Spec::Tube(tube) => (pieces_of(tube, member), method_of(tube.integrator)),
-        Spec::Soft(soft) => (cells(&soft.shape).iter().copied().max().unwrap_or(0), 0),
-        Spec::Rigid(_) | Spec::Tool(_) | Spec::Synthetic(_) => (0, 0),
-    };
+    let division = member.division();
+    let (pieces, method) = (division.elements, division.integrator.map_or(0, method_of));
     Setting { dt_s: member.pace.dt.as_secs_f64(), pieces, method }
 }
 
@@ -79,95 +69,7 @@ pub fn apply(scene: &mut Scene, agent: AgentId, setting: &Setting) {
     let dt = SimSpan::from_secs_f64(setting.dt_s).unwrap_or(member.pace.dt);
     (member.pace.rate_hz, member.pace.dt, member.pace.dt_range) = (1.0 / dt.as_secs_f64(), dt, (dt, dt));
     member.tolerance_m = None;
-    match &mut member.spec {
-        Spec::Tube(tube) if setting.pieces > 0 => {
-            let eps_m = length_m(tube) / f64::from(setting.pieces);
-            let range = ResolutionRange { eps_m: (eps_m, eps_m), ..tube.range };
-            (tube.segments, tube.range) = (Some(setting.pieces as usize), range);
-            tube.resolution.eps_m = eps_m;
-            tube.integrator = Integrator::ALL[setting.method];
-            (member.simulation, member.start) = (range, tube.resolution);
-        }
-        Spec::Soft(soft) if setting.pieces > 0 => set_cells(&mut soft.shape, setting.pieces),
-        _ => {}
-    }
-}
-
-/// Replaces a tube by a rope where the tube has nothing that a rope lacks; `false` where it is attached or shaped as no rope can be.
-pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
-    let member = &mut scene.agents[agent.0 as usize];
-    let Spec::Tube(tube) = &member.spec else { return false };
-    let plain = tube.attachments.is_empty() && tube.peristalsis.is_none() && tube.pressure_pa == 0.0;
-    // a link attaches to a tube at its wall, but to a rope at a point
-    if !plain || !member.links.is_empty() {
-        return false;
-    }
-    let Some(path_m) = centre_line(tube) else { return false };
-    let radius_m = tube.section.radius_m;
-    let area_m2 = PI * radius_m * radius_m;
-    let held = [Side::Left, Side::Right].into_iter().zip([0, 1]);
-    let spec = SoftSpec {
-        shape: SoftShape::Rope { path_m, radius_m, segments: pieces_of(tube, member) },
-        matter: SoftMatter {
-            young_pa: tube.section.ea_n / area_m2,
-            poisson: 0.3,
-            density_kg_m3: tube.section.mass_per_length_kg_m / area_m2,
-            damping_per_s: tube.damping_per_s,
-        },
-        position: glam::DVec3::ZERO,
-        rotation: glam::DQuat::IDENTITY,
-        velocity: glam::DVec3::ZERO,
-        held: held.filter(|(_, end)| tube.clamp[*end] || tube.pin[*end]).map(|(side, _)| side).collect(),
-        friction: tube.friction,
-        gravity: tube.gravity,
-        obstacles: tube.obstacles.clone(),
-        sleep: tube.sleep,
-    };
-    if SoftBody::new(spec.clone()).is_err() {
-        return false;
-    }
-    member.spec = Spec::Soft(spec);
-    true
-}
-
-/// The points of a tube's smooth centre line at rest.
-fn centre_line(tube: &TubeSpec) -> Option<Vec<glam::DVec3>> {
-    let mut snapshot = Snapshot::default();
-    Tube::new(tube.clone()).ok()?.write_snapshot(&mut snapshot);
-    if let Body::Curve(curve) = snapshot.body { Some(curve.positions) } else { None }
-}
-
-fn length_m(tube: &TubeSpec) -> f64 {
-    tube.path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
-}
-
-fn pieces_of(tube: &TubeSpec, member: &Member) -> u32 {
-    tube.segments.map_or_else(|| (length_m(tube) / member.start.eps_m - 1e-9).ceil() as u32, |count| count as u32)
-}
-
-fn cells(shape: &SoftShape) -> Vec<u32> {
-    match shape {
-        SoftShape::Sheet { segments, .. } => segments.to_vec(),
-        SoftShape::Box { segments, .. } => segments.to_vec(),
-        SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
-    }
-}
-
-/// Divides a body into `most` cells along its most divided axis, and in proportion along the others.
-fn set_cells(shape: &mut SoftShape, most: u32) {
-    let greatest = cells(shape).into_iter().max().unwrap_or(1).max(1);
-    let scaled = |count: u32| (f64::from(count * most) / f64::from(greatest)).round().max(1.0) as u32;
-    match shape {
-        SoftShape::Sheet { segments, .. } => *segments = segments.map(scaled),
-        SoftShape::Box { segments, .. } => *segments = segments.map(scaled),
-        SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => *segments = scaled(*segments),
-    }
-}
-
-/// Division of a soft body after [`apply`], along each of its axes; empty for other bodies.
-#[must_use]
-pub fn cells_of(member: &Member) -> Vec<u32> {
-    if let Spec::Soft(soft) = &member.spec { cells(&soft.shape) } else { Vec::new() }
+    member.divide(setting.pieces, Integrator::ALL[setting.method]);
 }
 
 /// Plays `scene` for so many simulated seconds; `None` if `go_on` returned `false`.

@@ -10,7 +10,7 @@ use super::coupling_record::Coupling;
 use super::error::SessionError;
 use super::outcome::Outcome;
 use super::session::Session;
-use super::trace::{Trace, TracedState, mass_kg, momentum, points};
+use super::trace::{Trace, TracedState, points};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_scene::format::MODELS;
 use metachron_world::Scene;
@@ -156,7 +156,7 @@ fn compare(session: &Session, state: &TracedState, distances: &mut [Distance]) {
         distance.max_m = distance.max_m.max(apart);
     }
     let spec = &session.scene().agents[at].spec;
-    let there = momentum(spec, &snapshot.body) + snapshot.acceleration * (mass_kg(spec, &snapshot.body) * ahead_s);
+    let there = spec.momentum_n_s(&snapshot.body) + snapshot.acceleration * (spec.mass_in_kg(&snapshot.body) * ahead_s);
     distance.momentum_max_n_s = distance.momentum_max_n_s.max((there - state.momentum).length());
 }
 

@@ -19,7 +19,7 @@ use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::trace::Trace;
 use super::visible_resolution::VisibleResolution;
 use metachron_contact::AnchorSpring;
-use metachron_core::{AgentId, Body, SimTime};
+use metachron_core::{AgentId, SimTime};
 use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
@@ -272,7 +272,7 @@ impl Session {
     pub fn hand_force_n(&self, on: AgentId) -> f64 {
         let Some(state) = self.reader.newest().get(on.0 as usize) else { return 0.0 };
         // nothing resists the driving of a tool; the force shown is its grasp force
-        if let Body::Tool(tool) = &state.body {
+        if let Some(tool) = state.body.tool() {
             return tool.force_n;
         }
         state.grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()

@@ -4,8 +4,8 @@
 
 use super::coupling_record::Coupling;
 use glam::DVec3;
-use metachron_core::{AgentId, Body, CurveState, SimTime, Snapshot};
-use metachron_world::{Scene, Spec};
+use metachron_core::{AgentId, Body, SimTime, Snapshot};
+use metachron_world::Scene;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ impl Trace {
             }
             *last = Some(moment);
             let points_m = points(&snapshot.body).map(|(at, _)| at).collect();
-            let momentum = momentum(&member.spec, &snapshot.body);
+            let momentum = member.spec.momentum_n_s(&snapshot.body);
             self.states.push(TracedState { agent: member.id, moment, points_m, momentum });
         }
     }
@@ -77,32 +77,6 @@ pub(super) fn points(body: &Body) -> impl Iterator<Item = (DVec3, DVec3)> {
     (0..count).filter_map(move |k| body.probe(f64::from(k) / f64::from(TUBE_POINTS - 1)))
 }
 
-/// Linear momentum of an agent in the state `body`, N·s; zero for an agent without mass.
-pub(super) fn momentum(spec: &Spec, body: &Body) -> DVec3 {
-    match (spec, body) {
-        (Spec::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
-        (Spec::Tube(spec), Body::Curve(curve)) => velocity_integral(curve) * spec.section.mass_per_length_kg_m,
-        _ => DVec3::ZERO,
-    }
-}
-
-/// Mass of an agent in the state `body`, kilograms.
-pub(super) fn mass_kg(spec: &Spec, body: &Body) -> f64 {
-    match (spec, body) {
-        (Spec::Rigid(spec), _) => spec.mass_kg,
-        (Spec::Tube(spec), Body::Curve(curve)) => {
-            spec.section.mass_per_length_kg_m * curve.arc_m.last().copied().unwrap_or(0.0)
-        }
-        _ => 0.0,
-    }
-}
-
-/// Velocity summed along the rest length, m²/s: exact for a velocity that is linear between nodes.
-fn velocity_integral(curve: &CurveState) -> DVec3 {
-    let pairs = curve.arc_m.windows(2).zip(curve.velocities.windows(2));
-    pairs.map(|(arc, velocity)| 0.5 * (arc[1] - arc[0]) * (velocity[0] + velocity[1])).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,13 +101,5 @@ mod tests {
         }
         let moments: Vec<_> = trace.states.iter().map(|state| state.moment).collect();
         assert_eq!(moments, [1000, 1010, 1020, 1030].map(at));
-    }
-
-    #[test]
-    fn the_flow_of_a_turning_line_is_length_times_mean_velocity() {
-        let arc_m = vec![0.0, 0.1, 0.3, 1.0];
-        let velocities = arc_m.iter().map(|s| DVec3::Y * (2.0 * s)).collect();
-        let flow = velocity_integral(&CurveState { arc_m, velocities, ..CurveState::default() });
-        assert!((flow - DVec3::Y).length() < 1e-15, "{flow}"); // 1 m at a mean of 1 m/s
     }
 }

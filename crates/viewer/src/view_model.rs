@@ -3,7 +3,7 @@
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
 use crate::ui::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
-use metachron_core::{Body, SimTime, Snapshot};
+use metachron_core::{SimTime, Snapshot};
 use metachron_lod::control;
 use metachron_lod::control::Policy;
 use metachron_runtime::AgentStats;
@@ -13,11 +13,9 @@ use metachron_world::Spec;
 use metachron_world::kinds::PolicyKind;
 use std::time::Duration;
 
-/// Mass assumed for the user spring on an object without a mass of its own, kilograms.
-const HAND_MASS_KG: f64 = 0.1;
 /// Frames over which the budget bar is smoothed.
 const SHARES_FRAMES: usize = 30;
-/// The user spring moves a part of a tube, not all of it: at most this mass of it, kilograms.
+/// Mass that the user spring moves of a body that bends, at most, and of a body without a mass of its own, kilograms.
 const STRETCH_MASS_KG: f64 = 0.1;
 
 /// The panels of a session that has just begun.
@@ -164,10 +162,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.step_s = stats.work_s;
     row.dropped_s = stats.dropped.as_secs_f64();
     row.residual_m = stats.residual_m;
-    row.force_n = match &newest.body {
-        Body::Tool(tool) => Some(tool.force_n),
-        _ => None,
-    };
+    row.force_n = newest.body.tool().map(|tool| tool.force_n);
     row.state = match &stats.state {
         metachron_runtime::AgentState::Running => AgentState::Running,
         metachron_runtime::AgentState::Resting => AgentState::Resting,
@@ -175,17 +170,10 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     };
 }
 
-/// The mass for which the user spring is scaled, kilograms.
+/// The mass for which the user spring is scaled, kilograms: of a body that bends, the stretch near the pulled point follows, not all of it.
 pub(super) fn mass_kg(spec: &Spec) -> f64 {
-    match spec {
-        Spec::Tube(tube) => {
-            let length: f64 = tube.path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
-            (tube.section.mass_per_length_kg_m * length).min(STRETCH_MASS_KG)
-        }
-        Spec::Rigid(body) => body.mass_kg,
-        Spec::Soft(_) => STRETCH_MASS_KG,
-        Spec::Tool(_) | Spec::Synthetic(_) => HAND_MASS_KG,
-    }
+    let mass_kg = spec.mass_kg().unwrap_or(STRETCH_MASS_KG);
+    if spec.is_deformable() { mass_kg.min(STRETCH_MASS_KG) } else { mass_kg }
 }
 
 /// The viewer's type for a law.

@@ -28,6 +28,7 @@ mod initial_shape;
 pub mod kinds;
 mod overlap;
 mod scene;
+mod spec;
 mod world;
 
 pub use assemble::{Govern, machine};
@@ -38,4 +39,5 @@ pub use scene::{
     Camera, GROUP_LEVELS_MAX, Gains, Group, Look, Machine, Member, ObjectCost, PaceWish, Probe, Scene, Scenery, Spec,
     Target, View,
 };
+pub use spec::Division;
 pub use world::{Object, World, WorldError};

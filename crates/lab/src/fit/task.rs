@@ -11,9 +11,7 @@ use metachron_console::progress::Bar;
 use metachron_core::AgentId;
 use metachron_models::rod::Integrator;
 use metachron_session::fit::{Choice, Path, Setting, Trial, farthest_m};
-use metachron_session::{
-    Played, Point, SessionError, apply, method_of, play_points, setting_of, slacken, solve_prices,
-};
+use metachron_session::{Played, Point, SessionError, apply, method_of, play_points, setting_of, solve_prices};
 use metachron_world::{Member, Scene, Spec};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -160,7 +158,7 @@ impl<'a> Task<'a> {
     /// Turns a tube into a rope; `false` where that is impossible.
     pub(super) fn slacken(&mut self, object: usize) -> bool {
         let mut scene = self.scene.clone();
-        let can = self.objects[object].agents.iter().all(|agent| slacken(&mut scene, *agent));
+        let can = self.objects[object].agents.iter().all(|agent| scene.agents[agent.0 as usize].replace_tube_by_rope());
         if can {
             self.scene = scene;
         }

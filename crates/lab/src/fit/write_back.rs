@@ -9,7 +9,6 @@ use anyhow::Context;
 use metachron_console::output::BadInput;
 use metachron_models::rod::Integrator;
 use metachron_scene::{Source, load};
-use metachron_session::cells_of;
 use metachron_session::fit::Setting;
 use metachron_world::{Member, Spec};
 use std::path::Path;
@@ -81,7 +80,7 @@ fn put(table: &mut Table, member: &Member, now: &Setting, need: &Setting) -> usi
 fn segments(member: &Member) -> Value {
     match &member.spec {
         Spec::Tube(tube) => Value::from(tube.segments.unwrap_or(0) as i64),
-        _ => match cells_of(member).as_slice() {
+        _ => match member.cells().as_slice() {
             [one] => Value::from(i64::from(*one)),
             many => many.iter().map(|count| i64::from(*count)).collect::<Array>().into(),
         },
