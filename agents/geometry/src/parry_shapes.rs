@@ -2,8 +2,8 @@
 //!
 //! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: the pose or the mass of the solid.
 
-use super::Solid;
 use super::topology::is_closed;
+use super::{Aabb, Solid};
 use glam::{DVec3, Vec3};
 use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::shape::{SharedShape, TriMeshFlags};
@@ -140,7 +140,7 @@ pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     if points.len() < 4 {
         return Err(flat(points, "it takes four points"));
     }
-    let (low, high) = bounds(points);
+    let Aabb { low, high } = Aabb::of(points);
     let size = (high - low).max_element();
     let single: Vec<Vec3> = points.iter().map(|p| p.as_vec3()).collect();
     let (corners, triangles) = try_convex_hull(&single).map_err(|e| flat(points, e.to_string()))?;
@@ -171,11 +171,6 @@ pub fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<Triang
         return Err(ShapeError::EmptyMesh { triangles: triangles.len() });
     }
     Ok(Triangles { points: points.to_vec(), triangles: kept })
-}
-
-/// Lowest and highest coordinates.
-pub fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
-    points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
 }
 
 #[cfg(test)]

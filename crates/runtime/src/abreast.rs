@@ -5,6 +5,7 @@
 //! Never here: how late an agent is ([`crate::agent_clock`]), steps. Theory: docs/theory/coupling.md, section 3.
 
 use super::agent_runner::AgentRunner;
+use super::broad_phase::PlannedStep;
 use super::fellows::Fellows;
 use super::observation::newest;
 use metachron_contact::beside::{is_beside, leaves_behind};
@@ -131,11 +132,11 @@ impl AgentRunner {
         if !self.company.is_empty() {
             self.company.gather_fellows(self.id(), time);
         }
-        let Self { eyes, peers, writer, shared, company, .. } = self;
-        eyes.look(peers, writer, (shared.id, moment, dt), company.fellows().unwrap_or(&nobody));
+        let Self { eyes, peers, writer, company, .. } = self;
+        eyes.look(peers, writer, PlannedStep { start: moment, dt }, company.fellows().unwrap_or(&nobody));
         company.each_beside(|seat, fellows| {
             if seat.pace.time() == time {
-                seat.eyes.look(&seat.peers, &seat.writer, (seat.shared.id, moment, dt), fellows);
+                seat.eyes.look(&seat.peers, &seat.writer, PlannedStep { start: moment, dt }, fellows);
             }
         });
     }

@@ -10,6 +10,7 @@
 
 use super::agent_clock::Timeline;
 use super::agent_clock::{AgentClock, LAG_CAP, Start};
+use super::broad_phase::PlannedStep;
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -152,7 +153,8 @@ impl AgentRunner {
             return;
         }
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
-        self.eyes.look(&self.peers, &self.writer, (me, self.pace.scene_time(), dt), &Fellows::default());
+        let step = PlannedStep { start: self.pace.scene_time(), dt };
+        self.eyes.look(&self.peers, &self.writer, step, &Fellows::default());
         let neighbours = self.eyes.neighbours();
         let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
@@ -304,12 +306,8 @@ impl AgentRunner {
     /// Steps alone, by `wanted` or by the shorter step that the agent chooses.
     pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
         let time = self.pace.time();
-        self.eyes.look(
-            &self.peers,
-            &self.writer,
-            (self.shared.id, self.pace.scene_time(), wanted),
-            &Fellows::default(),
-        );
+        let step = PlannedStep { start: self.pace.scene_time(), dt: wanted };
+        self.eyes.look(&self.peers, &self.writer, step, &Fellows::default());
         let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
         let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let dt = self.agent.longest_step(wanted, &around).min(wanted);

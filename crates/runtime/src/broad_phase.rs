@@ -11,10 +11,19 @@ mod published_bounds;
 
 pub(super) use neighbour_list::NeighbourList;
 
-use metachron_core::{AgentId, Bounds, SimTime};
+use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 use published_bounds::{PublishedBounds, Reach, Seen};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
+
+/// The step that an agent is about to make.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlannedStep {
+    /// Its time at the start.
+    pub start: SimTime,
+    /// Its length.
+    pub dt: SimSpan,
+}
 
 /// Shared data by which the agents of a run find each other.
 #[derive(Debug)]

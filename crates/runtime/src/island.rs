@@ -18,6 +18,7 @@ pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_i
 use super::agent_clock::Start;
 use super::agent_clock::Timeline;
 use super::agent_runner::{AgentRunner, Made, PendingTurn, contained};
+use super::broad_phase::PlannedStep;
 use super::fellows::Fellows;
 use super::metrics::Entry;
 use metachron_contact::{Companion, StepContext};
@@ -99,7 +100,7 @@ impl AgentRunner {
         let (me, time) = (self.shared.id, self.pace.time());
         self.company.gather_fellows(me, time);
         let Self { agent, eyes, hands, links, company, peers, writer, pace, .. } = self;
-        eyes.look(peers, writer, (me, pace.scene_time(), dt), &company.fellows);
+        eyes.look(peers, writer, PlannedStep { start: pace.scene_time(), dt }, &company.fellows);
         let around = StepContext { me, time, neighbours: eyes.neighbours(), hands, links };
         let mut others = emptied(std::mem::take(&mut company.companions));
         for seat in company.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time) {
@@ -118,7 +119,7 @@ impl AgentRunner {
     /// This agent, as one who leads it wants it.
     fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> Companion<'_> {
         let id = self.shared.id;
-        self.eyes.look(&self.peers, &self.writer, (id, self.pace.scene_time(), dt), fellows);
+        self.eyes.look(&self.peers, &self.writer, PlannedStep { start: self.pace.scene_time(), dt }, fellows);
         let neighbours = self.eyes.neighbours();
         let around = StepContext { me: id, time, neighbours, hands: &self.hands, links: &self.links };
         Companion { id, agent: &mut *self.agent, around }

@@ -4,14 +4,13 @@
 //! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
 //! settle. Never here: when an agent looks.
 
-use super::broad_phase::BroadPhase;
-use super::broad_phase::NeighbourList;
+use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
 use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
 use metachron_contact::{Law, Standing, acknowledged, keep_step, owns};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -34,8 +33,10 @@ pub(super) struct Peer {
 }
 
 /// The list of peers that an agent sees.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Observer {
+    /// The agent whose view it is.
+    me: AgentId,
     neighbours: Vec<Neighbour>,
     /// One for each neighbour, in their order.
     looks: Vec<Look>,
@@ -108,8 +109,8 @@ impl Peers {
     /// The view of `me`, which is linked to `links`.
     pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Observer {
         let sight = self.crowd.is_some().then(|| Box::new(NeighbourList::new(me)));
-        let mut eyes = Observer { sight, ..Observer::default() };
-        links.iter().for_each(|id| eyes.list(self, me, *id));
+        let mut eyes = Observer { me, neighbours: Vec::new(), looks: Vec::new(), links: 0, sight, wanted: Vec::new() };
+        links.iter().for_each(|id| eyes.list(self, *id));
         eyes.links = eyes.neighbours.len();
         eyes
     }
@@ -141,27 +142,20 @@ impl Observer {
         }
     }
 
-    /// Updates the neighbours before the step of `dt` from `now` of `me`, whose states `writer` writes and which shares an island with
-    /// `fellows`.
-    pub fn look(
-        &mut self,
-        peers: &Peers,
-        me: &SlotWriter<Snapshot>,
-        (id, now, dt): (AgentId, SimTime, SimSpan),
-        fellows: &Fellows,
-    ) {
+    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which shares an island with `fellows`.
+    pub fn look(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, fellows: &Fellows) {
+        let me = self.me;
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
-            let mine = peers.get(id);
-            sight
-                .look(crowd, (now, dt), fellows, |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
-            self.want(crowd, me, id, fellows);
-            self.list_wanted(peers, id);
+            let mine = peers.get(me);
+            sight.look(crowd, step, fellows, |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
+            self.want(crowd, writer, fellows);
+            self.list_wanted(peers);
         }
         for (neighbour, look) in self.neighbours.iter_mut().zip(&mut self.looks) {
             let fellow = fellows.has(neighbour.id);
             if fellow != look.fellow {
                 look.fellow = fellow;
-                regard(neighbour, peers, id, fellow);
+                regard(neighbour, peers, me, fellow);
             }
             neighbour.snapshot = look.slot.latest();
         }
@@ -169,8 +163,9 @@ impl Observer {
 
     /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
     /// body to which this agent also gives.
-    fn want(&mut self, crowd: &BroadPhase, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
-        let Self { neighbours, links, sight, wanted, looks } = self;
+    fn want(&mut self, crowd: &BroadPhase, writer: &SlotWriter<Snapshot>, fellows: &Fellows) {
+        let Self { me, neighbours, links, sight, wanted, looks } = self;
+        let me = *me;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
@@ -182,17 +177,17 @@ impl Observer {
                 continue;
             }
             neighbour.snapshot = look.slot.latest();
-            if !newest(me, |mine| is_settled(id, mine, neighbour)) {
+            if !newest(writer, |mine| is_settled(me, mine, neighbour)) {
                 wanted.push(neighbour.id);
             }
         }
-        crowd.answer(id, |caller| {
+        crowd.answer(me, |caller| {
             if !is_linked(caller) {
                 wanted.push(caller);
             }
         });
         for neighbour in linked.iter().chain(&*near_once) {
-            let givers = others_who_give(id, &neighbour.snapshot);
+            let givers = others_who_give(me, &neighbour.snapshot);
             wanted.extend(givers.filter(|id| !is_linked(*id) && !fellows.has(*id)));
         }
         if wanted.len() > near {
@@ -201,19 +196,19 @@ impl Observer {
         }
     }
 
-    fn list_wanted(&mut self, peers: &Peers, me: AgentId) {
+    fn list_wanted(&mut self, peers: &Peers) {
         if self.neighbours[self.links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
             return;
         }
         self.neighbours.truncate(self.links);
         self.looks.truncate(self.links);
         for at in 0..self.wanted.len() {
-            self.list(peers, me, self.wanted[at]);
+            self.list(peers, self.wanted[at]);
         }
     }
 
-    fn list(&mut self, peers: &Peers, me: AgentId, id: AgentId) {
-        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.meet(me, id)) else { return };
+    fn list(&mut self, peers: &Peers, id: AgentId) {
+        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.meet(self.me, id)) else { return };
         self.neighbours.push(neighbour);
         self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
     }

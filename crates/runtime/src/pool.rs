@@ -44,7 +44,7 @@ impl Pool {
     /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.
     pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         let workers = thread::available_parallelism().map_or(1, NonZero::get);
-        Self::with_workers(spawns, clock, workers, (PATIENCE, priority))
+        Self::with_workers(spawns, clock, workers, PATIENCE, priority)
     }
 
     /// Starts `workers` workers, at least one, each given up after `patience` in one step.
@@ -52,7 +52,8 @@ impl Pool {
         spawns: Vec<AgentSpawn>,
         clock: Arc<dyn Clock>,
         workers: usize,
-        (patience, priority): (Duration, Priority),
+        patience: Duration,
+        priority: Priority,
     ) -> Result<Self, RunError> {
         let AssembledRun { actors, handles, board } = assemble(spawns)?;
         let workers = workers.clamp(1, handles.len().max(1));

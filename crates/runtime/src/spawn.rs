@@ -219,7 +219,7 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<SleepRegistry>) -> (Peers, Vec<S
     for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
         let writer = SlotWriter::new(Snapshot::default());
         let seated = led && rigid(&form);
-        let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
+        let shared = Arc::new(shared(id, spawn, board, &writer, seated));
         writers.push(writer);
         all.push(Peer { shared, form, laws: Vec::new() });
     }
@@ -263,7 +263,8 @@ fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
 fn shared(
     id: AgentId,
     spawn: &mut AgentSpawn,
-    (board, writer): (&Arc<SleepRegistry>, &SlotWriter<Snapshot>),
+    board: &Arc<SleepRegistry>,
+    writer: &SlotWriter<Snapshot>,
     seated: bool,
 ) -> Shared {
     Shared {

@@ -30,7 +30,7 @@ const LIVE: [(&str, Start); 4] = [
 ];
 
 fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
-    running(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, clock, workers, Duration::from_secs(60), Priority::Normal).unwrap())
 }
 
 /// Starts the time of a run.

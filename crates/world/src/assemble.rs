@@ -24,7 +24,7 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 /// [`WorldError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    scene.agents.iter().map(|member| spawn(scene, member, (executor, &mut *govern), &mut ties)).collect()
+    scene.agents.iter().map(|member| spawn(scene, member, executor, &mut *govern, &mut ties)).collect()
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.
@@ -47,7 +47,8 @@ pub(super) const fn priority(scene: &Scene) -> Priority {
 fn spawn(
     scene: &Scene,
     member: &Member,
-    (executor, govern): (ExecutorKind, Govern<'_>),
+    executor: ExecutorKind,
+    govern: Govern<'_>,
     ties: &mut Ties,
 ) -> Result<AgentSpawn, WorldError> {
     let agent = build(member, executor)

@@ -312,7 +312,7 @@ impl SceneBuilder {
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
-            ids.zip(parts).map(|(id, (name, part))| member((id, name), part, gravity, &obstacles)).collect();
+            ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity, &obstacles)).collect();
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -353,7 +353,8 @@ const LOOK: Look =
     Look { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::PerPixel };
 
 fn member(
-    (id, name): (AgentId, String),
+    id: AgentId,
+    name: String,
     part: Part,
     gravity: DVec3,
     obstacles: &Arc<[Obstacle]>,

@@ -3,7 +3,7 @@
 //! In: two strands. Out: the places where their spans face each other. A grid finds candidate pairs of spans in linear time.
 //! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
 
-use super::primitives::Strand;
+use super::primitives::{Strand, StrandPoint};
 use crate::Touch;
 use crate::capsule_chain::facing;
 use crate::signed_distance;
@@ -107,7 +107,7 @@ impl ChainScratch {
 
 /// The spans of `strand` that come near the bounds of `other`.
 fn spots_of(strand: &Strand<'_>, other: &Strand<'_>, reach_m: f64, second: bool) -> impl Iterator<Item = Spot> {
-    let ((low, high), widest_m) = (other.bounds, other.widest_m);
+    let (crate::Aabb { low, high }, widest_m) = (other.bounds, other.widest_m);
     let spot = move |span: usize| {
         let [a, b] = strand.ends(span);
         let ball_m = 0.5 * a.centre.distance(b.centre) + a.radius_m.max(b.radius_m);
@@ -148,12 +148,16 @@ impl Meeting<'_> {
         }
         let mut told = ReportedContact { least_m: f64::INFINITY, ..ReportedContact::default() };
         for (place, node) in own_nodes(a, i) {
-            if let Some(t) = b.foot(a.ball(node).centre, j).filter(|&t| speaks(a, node, b, (j, t))) {
+            if let Some(t) =
+                b.foot(a.ball(node).centre, j).filter(|&t| speaks(a, node, b, StrandPoint { span: j, share: t }))
+            {
                 self.tell(place, [(node - i) as f64, t], &mut told, into);
             }
         }
         for (place, node) in own_nodes(b, j) {
-            if let Some(s) = a.foot(b.ball(node).centre, i).filter(|&s| speaks(b, node, a, (i, s))) {
+            if let Some(s) =
+                a.foot(b.ball(node).centre, i).filter(|&s| speaks(b, node, a, StrandPoint { span: i, share: s }))
+            {
                 self.tell(place + 1, [s, (node - j) as f64], &mut told, into);
             }
         }
@@ -196,9 +200,9 @@ fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u64, usi
 
 /// Whether a node over a span is a place of its own: past an end of the other strand that end is the place, if its own foot
 /// is at this node.
-fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, (span, share): (usize, f64)) -> bool {
-    let end = match share {
-        0.0 if span == 0 => 0,
+fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, at: StrandPoint) -> bool {
+    let end = match at.share {
+        0.0 if at.span == 0 => 0,
         1.0 => other.count() - 1,
         _ => return true,
     };

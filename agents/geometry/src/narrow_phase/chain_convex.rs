@@ -3,7 +3,7 @@
 //! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the ends of the stretch where a span lies flat.
 //! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
 
-use super::primitives::{Block, Strand};
+use super::primitives::{Block, Strand, StrandPoint};
 use crate::Touch;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
@@ -73,11 +73,9 @@ impl Meeting<'_> {
             let deep = self.field.touches(ball.centre, 2.0 * self.block.around.radius_m).iter().next();
             deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
         }
-        let span = node.min(self.strand.spans() - 1);
-        let share = (node - span) as f64;
         for (place, touch) in (0..).zip(places.iter()) {
             let key = (node as u64) << 28 | place;
-            self.tell(key, (span, share), touch, into);
+            self.tell(key, self.strand.node(node), touch, into);
         }
         places.iter().next()
     }
@@ -99,7 +97,7 @@ impl Meeting<'_> {
         });
         let key = (span as u64) << 28 | LOWEST;
         if let Some((share, touch)) = lowest {
-            self.tell(key, (span, share), touch, into);
+            self.tell(key, StrandPoint { span, share }, touch, into);
         }
         let end_gap = |side: usize| near[side].map_or(f64::INFINITY, |near| near.distance_m - ends[side].radius_m);
         let (from, least_m) = match lowest {
@@ -108,15 +106,15 @@ impl Meeting<'_> {
             None => (1.0, end_gap(1)),
         };
         for (place, to) in [(1, 0.0), (2, 1.0)] {
-            if let Some((share, touch)) = self.edge(ends, (from, to), least_m) {
-                self.tell(key + place, (span, share), touch, into);
+            if let Some((share, touch)) = self.edge(ends, from, to, least_m) {
+                self.tell(key + place, StrandPoint { span, share }, touch, into);
             }
         }
     }
 
     /// The edge of a flat stretch: where a span that is flat on the block at the share `from` leaves it towards `to`, if that place is
     /// apart from both.
-    fn edge(&self, ends: [Ball; 2], (from, to): (f64, f64), least_m: f64) -> Option<(f64, signed_distance::Touch)> {
+    fn edge(&self, ends: [Ball; 2], from: f64, to: f64, least_m: f64) -> Option<(f64, signed_distance::Touch)> {
         let length_m = ends[0].centre.distance(ends[1].centre);
         let radius_m = ends[0].radius_m.max(ends[1].radius_m);
         let apart = APART_RADII * radius_m / length_m;
@@ -145,7 +143,8 @@ impl Meeting<'_> {
     }
 
     /// Adds a place, unless it is too far.
-    fn tell(&self, key: u64, (span, share): (usize, f64), touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+    fn tell(&self, key: u64, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+        let StrandPoint { span, share } = at;
         let [a, b] = self.strand.ends(span);
         let ball = if share == 1.0 { b } else { a.toward(b, share) };
         let gap_m = touch.distance_m - ball.radius_m;

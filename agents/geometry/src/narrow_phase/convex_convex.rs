@@ -111,6 +111,14 @@ fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<
     }
 }
 
+/// A point where the facing features of two parts meet.
+struct ClippedPoint {
+    key: u64,
+    gap_m: f64,
+    /// On the first part, relative to its origin, in world axes, metres.
+    place: DVec3,
+}
+
 /// Two parts that face each other.
 struct Facing<'a> {
     first: &'a Part<'a>,
@@ -130,18 +138,21 @@ impl Facing<'_> {
         let from = into.len();
         if !is_there {
             let key = self.key(PackedFeatureId::UNKNOWN, PackedFeatureId::UNKNOWN);
-            self.add((key, self.apart.gap_m), self.apart.on[0], from, into);
+            let nearest = ClippedPoint { key, gap_m: self.apart.gap_m, place: self.apart.on[0] };
+            self.add(nearest, from, into);
         }
         for point in &manifold.points {
             let gap_m = f64::from(point.dist) + if is_there { shift_m } else { 0.0 };
             let TrackedContact { fid1, fid2, local_p1, .. } = *point;
             let place = self.first.rotation * local_p1.as_dvec3();
-            self.add((self.key(fid1, fid2), gap_m.max(self.apart.gap_m)), place, from, into);
+            let key = self.key(fid1, fid2);
+            self.add(ClippedPoint { key, gap_m: gap_m.max(self.apart.gap_m), place }, from, into);
         }
     }
 
-    /// Adds a place of the first part, unless it is too far or already listed.
-    fn add(&self, (key, gap_m): (u64, f64), place: DVec3, from: usize, into: &mut Vec<Touch>) {
+    /// Adds a point, unless it is too far or already listed at or after `from`.
+    fn add(&self, point: ClippedPoint, from: usize, into: &mut Vec<Touch>) {
+        let ClippedPoint { key, gap_m, place } = point;
         let on_a = self.first.origin + place;
         let within_m = SAME_SHARE * self.size_m;
         let is_same = |told: Place| matches!(told, Place::Point(told) if told.distance(on_a) < within_m);

@@ -3,7 +3,7 @@
 //! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
 
 use crate::signed_distance::{Ball, Field};
-use crate::{CollisionShape, ShapeKind, SolidShape};
+use crate::{Aabb, CollisionShape, ShapeKind, SolidShape};
 use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
@@ -132,7 +132,7 @@ impl ToolSolid {
 fn around(solid: &Solid) -> Ball {
     match solid {
         Solid::Hull { points_m } => {
-            let (low, high) = crate::bounds(points_m);
+            let Aabb { low, high } = Aabb::of(points_m);
             let centre = (low + high) * 0.5;
             Ball { centre, radius_m: points_m.iter().map(|p| p.distance(centre)).fold(0.0, f64::max) }
         }

@@ -88,7 +88,7 @@ impl Builder {
             // positions two edges away may have changed since
             let mut of_u = std::mem::take(&mut self.neighbours);
             self.surface.neighbours(u, &mut of_u);
-            let sound = self.surface.verdict((u, &of_u), v, turn).is_some();
+            let sound = self.surface.verdict(u, &of_u, v, turn).is_some();
             self.neighbours = of_u;
             if sound {
                 self.collapse(u, v, turn);
@@ -114,7 +114,7 @@ impl Builder {
             self.prices.push((self.quadrics[p as usize].at(at) + slide, to));
         }
         self.prices.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict((p, &neighbours), to, turn)?));
+        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict(p, &neighbours, to, turn)?));
         let found = self.prices.iter().find_map(judged);
         self.neighbours = neighbours;
         let Some((price, to, verdict)) = found else { return };

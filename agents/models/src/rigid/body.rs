@@ -209,7 +209,7 @@ impl RigidBody {
         if let Some(pulled) = &pulled {
             self.hold.note(pulled, h);
             let after_s = self.company.after_s;
-            self.ties.give(&mut self.company, (after_s, h));
+            self.ties.give(&mut self.company, after_s, h);
             self.ties.go_on(h);
             self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
@@ -221,18 +221,18 @@ impl RigidBody {
     /// Books the additional impulses of the springs and pressing tools in the last part, of `h` seconds, that follow from the `change` of
     /// the velocities by the island within it.
     pub(super) fn give_way(&mut self, change: Twist, h: f64) {
-        linear_spring::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
+        linear_spring::give_way(&self.motion, &self.spread, &mut self.ties.all, change, h);
         for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
             grip.force_n += tie.impulse / h;
         }
         let after_s = self.company.after_s;
-        self.ties.give(&mut self.company, (after_s, h));
+        self.ties.give(&mut self.company, after_s, h);
         let pushed = leant::give(&self.leant, &mut self.company, change, (after_s, h));
         self.coupled += (self.ties.linked() + pushed) / self.spread.mass_kg;
     }
 
     /// Ends a step in which its island has moved it.
-    pub(super) fn led(&mut self, around: &StepContext<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
+    pub(super) fn led(&mut self, around: &StepContext<'_>, dt: f64, touching: bool, sunk_m: f64) {
         (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
         // the island moves it by parts at the speed of their ends
         self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
@@ -276,7 +276,7 @@ impl RigidBody {
 
     /// Estimates the error of a step of `dt` seconds in so many parts. Flight and impacts are exact; in lasting contact and
     /// under a spring a part's displacement is computed with the speed at its end.
-    fn doubt(&mut self, before: &Motion, touched: bool, (dt, parts): (f64, u32)) {
+    fn doubt(&mut self, before: &Motion, touched: bool, dt: f64, parts: u32) {
         let pulled = !self.ties.is_empty();
         let part_s = dt / f64::from(parts) / if pulled { 1.0 } else { PASSES as f64 };
         self.drift_m = if pulled || (touched && self.touching) {
@@ -323,7 +323,7 @@ impl Agent for RigidBody {
         }
         self.steps += 1;
         self.note_borne(around, dt);
-        self.doubt(&before, touching, (dt_s, parts));
+        self.doubt(&before, touching, dt_s, parts);
         let at_rest = self.rest(dt_s);
         self.tell(around, dt_s);
         self.settle(around, dt_s);

@@ -73,7 +73,7 @@ impl RigidBody {
             // impulses that the ground carries displace nothing, and impulses still to act lift nothing off it
             let carried = match self.stand {
                 Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
-                Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
+                Some(stand) => self.rise(&stand, left, carried, since_s.min(self.stood_s)),
                 None => self.hold(carried),
             };
             if self.within.is_some() {
@@ -94,7 +94,7 @@ impl RigidBody {
 
     /// Removes the weight that the ground carried from a body that was lifted off it `since_s` seconds ago by the remainder of an
     /// impulse, and the corresponding displacement (eq. 7f).
-    fn rise(&mut self, stand: &Stand, (left, carried): (Impulse, Impulse), since_s: f64) -> Impulse {
+    fn rise(&mut self, stand: &Stand, left: Impulse, carried: Impulse, since_s: f64) -> Impulse {
         let mass = self.spread.mass_kg;
         let all = [left.linear, carried.linear].map(|impulse| impulse / mass);
         let [change, way] = stand.lifted(all, if since_s.is_finite() { since_s } else { 0.0 });

@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 4c and 7b–7d.
 
 use super::RigidBody;
-use super::linear_spring::{Pulled, Under, lean};
+use super::linear_spring::{Pulled, Under, VelocityStep, lean};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::StepContext;
@@ -43,7 +43,8 @@ impl Hold {
     /// What acts over a part of `h` seconds beside gravity and springs.
     pub(super) fn under(&self, h: f64, gravity: DVec3) -> Under {
         let span_s = self.known.map_or(0.0, |(sprung, _)| sprung.span_s);
-        Under { h, gravity, lasting: self.lasting.map(|force| force * h), bent: (self.bent, span_s) }
+        let received = VelocityStep { change: self.bent, span_s };
+        Under { h, gravity, lasting: self.lasting.map(|force| force * h), received }
     }
 
     /// Notes what springs, gravity and what lasts added to the velocities in `h` seconds, and what the last of these did.

@@ -65,9 +65,17 @@ pub(super) struct Under {
     pub gravity: DVec3,
     /// The impulse of other loads that act evenly over the part, N·s and N·m·s.
     pub lasting: Twist,
-    /// Velocity changes by impulses received at the part's start, to which the springs reacted over so many seconds: this
-    /// reaction is counted in the impulses of the springs.
-    pub bent: (Twist, f64),
+    /// The change by impulses received at the part's start: the reaction of the springs to it is counted in their impulses.
+    pub received: VelocityStep,
+}
+
+/// A sudden change of the velocities, and for how long springs reacted to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VelocityStep {
+    /// The change of velocity and spin, m/s and rad/s.
+    pub change: Twist,
+    /// How long springs reacted to it, seconds.
+    pub span_s: f64,
 }
 
 /// Result of the springs in a part.
@@ -101,7 +109,7 @@ pub(super) fn pull(
         let forces = (pass > 0).then_some(change);
         system = System::free(motion, body, under);
         for tie in ties.iter() {
-            system.add(tie, (motion, body), h, forces);
+            system.add(tie, motion, body, forces);
         }
         change = system.matrix.solve(system.right);
     }
@@ -109,9 +117,10 @@ pub(super) fn pull(
     let spin = motion.spin(body);
     for tie in ties.iter_mut() {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
-        tie.impulse = spring.after(change, r) - spring.bent(tie, r, under.bent);
+        tie.impulse = spring.after(change, r) - spring.reaction(tie, r, &under.received);
         if let Some(turn) = &mut tie.turn {
-            turn.give((motion.rotation, spin), (change[1], h), under.bent);
+            let steady = turn.impulse_at(motion.rotation, spin, h);
+            turn.give(steady, change[1], h, &under.received);
         }
         grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
@@ -124,7 +133,7 @@ pub(super) fn pull(
 }
 
 /// Writes the change of each spring's impulse due to a further `change` of the velocities in a part of `h` seconds.
-pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [LinearSpring], (change, h): (Twist, f64)) {
+pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [LinearSpring], change: Twist, h: f64) {
     for tie in ties {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
         tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
@@ -203,15 +212,18 @@ impl Spring {
         self.impulse - self.resistance * (linear + angular.cross(r))
     }
 
-    /// The impulse by which a spring reacted over `span_s` seconds to a change of the body's velocities.
-    fn bent(&self, tie: &LinearSpring, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
+    /// The impulse by which a spring reacted to a sudden change of the body's velocities.
+    fn reaction(&self, tie: &LinearSpring, r: DVec3, step: &VelocityStep) -> DVec3 {
+        let VelocityStep { change: [linear, angular], span_s } = *step;
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
     }
 }
 
-/// A symmetric positive system for the change of (v, ω).
+/// A symmetric positive system for the change of (v, ω) over a part of a step.
 struct System {
+    /// Length of the part, seconds.
+    h: f64,
     matrix: Mat6,
     right: Twist,
 }
@@ -223,11 +235,12 @@ impl System {
         let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [linear, angular] = under.lasting;
         let right = [under.gravity * (under.h * body.mass_kg) + linear, angular];
-        Self { matrix: Mat6::mass(body.mass_kg, inertia), right }
+        Self { h: under.h, matrix: Mat6::mass(body.mass_kg, inertia), right }
     }
 
     /// Adds a spring; with the velocity change of a `first` pass also the stiffness of its force against rotation across its arm.
-    fn add(&mut self, tie: &LinearSpring, (motion, body): (&Motion, &MassDistribution), h: f64, first: Option<Twist>) {
+    fn add(&mut self, tie: &LinearSpring, motion: &Motion, body: &MassDistribution, first: Option<Twist>) {
+        let h = self.h;
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
         self.matrix.add_point(r, spring.resistance);
         self.right[0] += spring.impulse;

@@ -55,7 +55,7 @@ impl SpringSet {
                 continue; // a tool with a non-finite state holds nothing
             }
             let guest = by.flatten();
-            let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
+            let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, &pull, around));
             self.all.push(LinearSpring { turn, ..LinearSpring::led(pull) });
             self.ends.push(guest.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
         }
@@ -105,7 +105,7 @@ impl SpringSet {
     }
 
     /// Gives the other ends the reactions to the springs' impulses in `h` seconds from `after_s` seconds into the step on.
-    pub(super) fn give(&mut self, company: &mut Company, (after_s, h): (f64, f64)) {
+    pub(super) fn give(&mut self, company: &mut Company, after_s: f64, h: f64) {
         let Self { all, ends, room } = self;
         for (tie, end) in all.iter().zip(ends.iter()) {
             let Some(End { guest: i, anchor, kind }) = *end else { continue };
@@ -131,11 +131,11 @@ impl SpringSet {
 }
 
 /// The torsional spring by which a tool, brought to the body's own time, keeps the body that it pulls from turning.
-fn turn_of(tool: &Other, (pull, around): (&AnchorSpring, &StepContext<'_>)) -> Option<OrientationSpring> {
+fn turn_of(tool: &Other, pull: &AnchorSpring, around: &StepContext<'_>) -> Option<OrientationSpring> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
     let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
-    Some(OrientationSpring::of(state, &clasp, (pull, led_s(around.time, seen.time))))
+    Some(OrientationSpring::of(state, &clasp, pull, led_s(around.time, seen.time)))
 }
 
 /// A link as a spring; its target is set later.

@@ -74,7 +74,7 @@ impl World {
     /// Seconds of certainly free flight, at most `horizon`.
     pub(super) fn free_time(&self, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
         let all = self.fixed.iter().map(|(solid, _)| solid);
-        all.fold(horizon, |free, solid| free.min(solid.approach(&self.mover, motion, fall, free).0))
+        all.fold(horizon, |free, solid| free.min(solid.approach(&self.mover, motion, fall, free).free_s))
     }
 
     /// What of the fixed solids lies ahead of a flight of `horizon` seconds.

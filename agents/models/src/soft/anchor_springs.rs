@@ -44,29 +44,29 @@ impl Tie {
     /// The tie of a pull; `None` where it has no such vertex or is not finite.
     pub fn of_pull(pull: &AnchorSpring, count: usize) -> Option<Self> {
         let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
-        let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), count)?;
+        let tie = Self::at(pull.anchor, pull.stiffness_n_m, pull.damping_n_s_m, count)?;
         let (target, target_velocity) = (pull.target, pull.target_velocity);
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
     /// The tie of a link, whose far end is set later ([`Tie::aim`]).
     pub fn of_link(link: &Link, count: usize) -> Option<Self> {
-        let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), count)?;
+        let tie = Self::at(link.here, link.stiffness_n_m, link.damping_n_s_m, count)?;
         Some(Self { by: Some(link.other), link: Some(*link), ..tie })
     }
 
-    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), count: usize) -> Option<Self> {
+    fn at(anchor: Anchor, stiffness_n_m: f64, damping_n_s_m: f64, count: usize) -> Option<Self> {
         let Anchor::Vertex(vertex) = anchor else { return None };
         let fair = |c: f64| c.is_finite() && c >= 0.0;
-        let known = (vertex as usize) < count && fair(stiffness) && fair(damping);
+        let known = (vertex as usize) < count && fair(stiffness_n_m) && fair(damping_n_s_m);
         known.then(|| Self {
             by: None,
             vertex: vertex as usize,
             link: None,
             target: DVec3::ZERO,
             target_velocity: DVec3::ZERO,
-            stiffness: round(stiffness),
-            damping: round(damping),
+            stiffness: round(stiffness_n_m),
+            damping: round(damping_n_s_m),
             ease: DMat3::IDENTITY,
             still: DVec3::ZERO,
             eased: DMat3::ZERO,
@@ -80,7 +80,7 @@ impl Tie {
 
     /// Sets the state of a link's far end for a substep of `h` seconds that begins with this end at `point`; `shared`
     /// links in all pull at that agent.
-    pub fn aim(&mut self, far: &Far, point: DVec3, (h, shared): (f64, usize)) {
+    pub fn aim(&mut self, far: &Far, point: DVec3, h: f64, shared: usize) {
         let Some(link) = self.link else { return };
         let spring = far.spring(&link, point);
         (self.stiffness, self.damping) = (spring.stiffness, spring.damping);

@@ -21,7 +21,7 @@ use metachron_contact::crowd::Lately;
 use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_contact::{Knock, Law, Link};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, height_j_kg};
+use metachron_geometry::{Aabb, CollisionShape, PlacedShape, ShapeKind, ShapePose, height_j_kg};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
@@ -129,7 +129,7 @@ impl SoftBody {
 
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
-        let (low, high) = metachron_geometry::bounds(&self.positions);
+        let Aabb { low, high } = Aabb::of(&self.positions);
         let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let radius_m = match &self.contacts.form.kind {
             ShapeKind::Surface(surface) => surface.radius_m,

@@ -96,7 +96,7 @@ impl Company {
             let Some(link) = ties[i].link else { continue };
             let shared = ties.iter().filter(|tie| tie.link.is_some_and(|l| l.other == link.other)).count();
             let Some(far) = self.mates.far(&link, h) else { continue };
-            ties[i].aim(&far, positions[ties[i].vertex], (h, shared));
+            ties[i].aim(&far, positions[ties[i].vertex], h, shared);
         }
     }
 

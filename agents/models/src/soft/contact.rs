@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::{Contact, Owner, Problem, Search, Settings, Solver};
 use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
-use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
+use metachron_geometry::{CollisionShape, ContactSide, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
 use std::sync::Arc;
 
 /// Solver settings: 10 µm/s, a tenth of the limit for rest.
@@ -39,6 +39,13 @@ pub(super) struct Contacts {
     pub mobilities: Vec<f64>,
     room: NarrowPhaseScratch,
     slack_m: f64,
+}
+
+/// A substep: where the vertices are at its start, metres, and its length.
+#[derive(Clone, Copy)]
+pub(super) struct Substep<'a> {
+    pub positions: &'a [DVec3],
+    pub h_s: f64,
 }
 
 /// A static solid at its place.
@@ -76,21 +83,22 @@ impl Contacts {
         })
     }
 
-    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; their number stays one for each vertex.
+    /// Corrects the free `velocities` of a substep; their number stays one for each vertex.
     pub fn act(
         &mut self,
-        positions: &[DVec3],
+        substep: Substep<'_>,
         velocities: &mut Vec<DVec3>,
-        (system, company): (&mut System, &mut Company),
-        h: f64,
+        system: &mut System,
+        company: &mut Company,
     ) {
+        let h = substep.h_s;
         let own = velocities.len();
         self.list.clear();
         if (self.walls.is_empty() && company.mates().is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
             return;
         }
         company.mates_mut().extend(velocities, h);
-        let settings = self.find(positions, velocities, company, h);
+        let settings = self.find(substep, velocities, company);
         if self.list.is_empty() {
             self.solver.forget();
             velocities.truncate(own);
@@ -108,7 +116,8 @@ impl Contacts {
     }
 
     /// Finds the contacts that may close within the substep; returns the settings for their solve.
-    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
+    fn find(&mut self, substep: Substep<'_>, velocities: &[DVec3], company: &mut Company) -> Settings {
+        let Substep { positions, h_s: h } = substep;
         let deep_m = DEEP_SHARE * self.edge_m();
         let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
         let (mut stands, held) = (false, mobilities.contains(&0.0));
@@ -122,7 +131,7 @@ impl Contacts {
             let friction = (form.friction * wall.form.friction).sqrt();
             for place in places.iter().filter(|place| !wall.bores.pass(place)) {
                 let mut slots = ContactJacobian::default();
-                place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
+                place.on_a.join(&mut slots, 0, DVec3::ZERO, ContactSide::first(place.normal));
                 let closing = slots.velocity(velocities).dot(place.normal);
                 if place.gap_m + closing * h > *slack_m {
                     continue;

@@ -66,13 +66,12 @@ impl FeMesh {
             let flat = DVec2::new(place[0] as f64, place[1] as f64) * step;
             self.rest[grid.at(place) as usize] = flat.extend(0.0);
         }
-        let elastic = (matter.young_pa, matter.poisson);
         for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
             let [a, b, c, d] = [[i, j, 0], [i + 1, j, 0], [i + 1, j + 1, 0], [i, j + 1, 0]].map(|place| grid.at(place));
             // alternating diagonals favour no direction
             let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             for corners in halves {
-                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, elastic);
+                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, matter);
                 let third = membrane.volume_m3() * matter.density_kg_m3 / 3.0;
                 corners.iter().for_each(|vertex| self.mass_kg[*vertex as usize] += third);
                 self.membranes.push(membrane);
@@ -80,7 +79,7 @@ impl FeMesh {
             }
         }
         let rigidity = matter.young_pa * thickness_m.powi(3) / (12.0 * (1.0 - matter.poisson * matter.poisson));
-        self.bend(grid, step, (rigidity, matter.poisson));
+        self.bend(grid, step, rigidity, matter.poisson);
         self.list_edges();
         self.radius_m = 0.5 * thickness_m;
     }
@@ -90,7 +89,7 @@ impl FeMesh {
     }
 
     /// Lists the bending elements of a flat grid of cells of `step` metres: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
-    fn bend(&mut self, grid: &Grid, step: DVec2, (rigidity_n_m, poisson): (f64, f64)) {
+    fn bend(&mut self, grid: &Grid, step: DVec2, rigidity_n_m: f64, poisson: f64) {
         let cell = step.x * step.y;
         let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
         for [i, j, _] in grid.places() {
@@ -135,11 +134,10 @@ impl FeMesh {
             let share = DVec3::new(place[0] as f64, place[1] as f64, place[2] as f64) / cells;
             self.rest[grid.at(place) as usize] = place_of(share);
         }
-        let elastic = (matter.young_pa, matter.poisson);
         for [i, j, k] in grid.places().filter(|place| (0..3).all(|axis| place[axis] < grid.cells[axis])) {
             let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
             let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
-            let kind = self.kind_of(corners, elastic);
+            let kind = self.kind_of(corners, matter);
             for (vertex, volume) in vertices.iter().zip(self.kinds[kind].volumes_m3) {
                 self.mass_kg[*vertex as usize] += volume * matter.density_kg_m3;
             }
@@ -150,8 +148,8 @@ impl FeMesh {
     }
 
     /// The kind of a cell with these corners: one for all of equal shape.
-    fn kind_of(&mut self, corners: [DVec3; 8], elastic: (f64, f64)) -> usize {
-        let kind = BrickKind::new(corners, elastic);
+    fn kind_of(&mut self, corners: [DVec3; 8], matter: &SoftMatter) -> usize {
+        let kind = BrickKind::new(corners, matter);
         let known = self.kinds.iter().position(|known| known.is_like(&kind));
         known.unwrap_or_else(|| {
             self.kinds.push(kind);

@@ -3,6 +3,7 @@
 //! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the incompatible modes of (TBW76)
 //! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
+use super::spec::SoftMatter;
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::skyline_cholesky::SkylineCholesky;
@@ -59,7 +60,8 @@ fn slopes(at: DVec3) -> [DVec3; 8] {
 
 impl BrickKind {
     /// The kind of a cell with these corners at rest, metres.
-    pub fn new(corners: [DVec3; 8], (young_pa, poisson): (f64, f64)) -> Self {
+    pub fn new(corners: [DVec3; 8], matter: &SoftMatter) -> Self {
+        let SoftMatter { young_pa, poisson, .. } = *matter;
         let mu = 0.5 * young_pa / (1.0 + poisson);
         let lambda = young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
         let jacobian = |at: DVec3| slopes(at).iter().zip(&corners).fold(DMat3::ZERO, |j, (s, x)| j + outer(*x, *s));

@@ -3,6 +3,7 @@
 //! In: a state and its surroundings. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
+use super::contact::Substep;
 use glam::{DMat3, DVec3};
 use metachron_contact::StepContext;
 use metachron_core::StepError;
@@ -78,7 +79,7 @@ impl SoftBody {
     /// Applies contact to the predicted velocities.
     pub(super) fn touch(&mut self, h: f64) {
         let Self { system, positions, free, company, contacts, .. } = self;
-        contacts.act(positions, free, (system, company), h);
+        contacts.act(Substep { positions, h_s: h }, free, system, company);
     }
 
     /// Moves with the predicted velocities, and gives the peers their impulses.

@@ -6,7 +6,7 @@
 //! like a critically damped spring, solved exactly, so that being taken, released or put off by lost time never makes it jump.
 //! Contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
 
-use super::drive::{Drive, Led};
+use super::drive::{Drive, PointMotion};
 use super::force_sensor::Felt;
 use super::gripper::{Jaws, let_in, nearest};
 use super::spec::REACH_MAX_M;
@@ -31,7 +31,7 @@ pub struct Tool {
     script: Script,
     tool: ToolState,
     /// The commanded point and its velocity: the tip is there if no contact pushes it.
-    led: Led,
+    led: PointMotion,
     drive: Drive,
     /// Distance of the tip from the target of the script or the user spring, metres.
     lag_m: f64,
@@ -86,7 +86,7 @@ impl Tool {
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
         let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
-        let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
+        let (led, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
         Ok(Self {
             spec,
             script,
@@ -104,29 +104,28 @@ impl Tool {
         })
     }
 
-    /// Target of the user spring for the tip, and its velocity.
-    fn hand_target(&self, hand: &AnchorSpring) -> (DVec3, DVec3) {
+    /// Target of the user spring for the tip.
+    fn hand_target(&self, hand: &AnchorSpring) -> PointMotion {
         let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
-        (hand.target - self.tool.rotation * local, hand.target_velocity)
+        PointMotion { position: hand.target - self.tool.rotation * local, velocity: hand.target_velocity }
     }
 
     /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
     fn follow_hand(&self, hand: &AnchorSpring, dt: f64, around: &StepContext<'_>) -> ToolState {
-        let (target, target_velocity) = self.hand_target(hand);
-        let now = (self.led.0 - target, self.led.1 - target_velocity);
-        let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
-        let tip = target + target_velocity * dt + off;
+        let target = self.hand_target(hand);
+        let off = die_out(self.led.relative_to(target), HAND_RATE_PER_S, dt);
+        let tip = target.position + target.velocity * dt + off.position;
         let near =
             nearest(&self.spec, self.tool.tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
         let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
-        ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
+        ToolState { tip, velocity: target.velocity + off.velocity, jaw, ..self.tool }
     }
 
     /// Follows the script; the offset from it decays.
     fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
-        let now = (self.led.0 - from.tip, self.led.1 - from.velocity);
-        let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
+        let start = PointMotion { position: from.tip, velocity: from.velocity };
+        let off = die_out(self.led.relative_to(start), RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
         let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         let turned_off = self.tool.rotation * from.rotation.conjugate();
@@ -137,8 +136,8 @@ impl Tool {
             (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
         };
         ToolState {
-            tip: to.tip + off,
-            velocity: to.velocity + off_velocity,
+            tip: to.tip + off.position,
+            velocity: to.velocity + off.velocity,
             rotation,
             jaw: jaw.clamp(0.0, 1.0),
             ..self.tool
@@ -156,16 +155,17 @@ impl Tool {
         let mut felt = std::mem::take(&mut self.felt);
         let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
         self.felt = felt;
-        let (tip, velocity);
-        [self.led, (tip, velocity)] = self.drive.go_on([self.led, (led.tip, led.velocity)], &given, dt_s);
-        ToolState { tip, velocity, ..led }
+        let to = PointMotion { position: led.tip, velocity: led.velocity };
+        let [commanded, tip] = self.drive.go_on([self.led, to], &given, dt_s);
+        self.led = commanded;
+        ToolState { tip: tip.position, velocity: tip.velocity, ..led }
     }
 
     /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
     fn let_in(&self, around: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let open = self.tool.jaw > GRASP_BELOW;
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
-        if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
+        if open { let_in(&self.spec, self.tool.tip, around, reach_m) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.
@@ -178,7 +178,7 @@ impl Tool {
 
     /// Whether the commanded point has reached the end of the script: an obstacle that saturates the drive holds it back.
     fn has_led_to(&self, end: &Pose) -> bool {
-        (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED
+        (self.led.position - end.tip).length() < ARRIVED && self.led.velocity.length() < ARRIVED
     }
 
     /// Whether the tool has come to the end of its script and waits there, empty.
@@ -187,7 +187,7 @@ impl Tool {
         let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
         let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
-            self.led = (end.tip, DVec3::ZERO);
+            self.led = PointMotion { position: end.tip, velocity: DVec3::ZERO };
             self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
             self.tool.velocity = DVec3::ZERO;
         }
@@ -228,11 +228,14 @@ fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
     if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
 }
 
-/// A deviation and its rate after `t` seconds of critical damping: exact for any step.
-fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
-    let left = libm::exp(-damping_s * t);
-    let push = rate + off * damping_s;
-    ((off + push * t) * left, (rate - push * (damping_s * t)) * left)
+/// A deviation after `t` seconds of critical damping: exact for any step.
+fn die_out(off: PointMotion, damping_per_s: f64, t: f64) -> PointMotion {
+    let left = libm::exp(-damping_per_s * t);
+    let push = off.velocity + off.position * damping_per_s;
+    PointMotion {
+        position: (off.position + push * t) * left,
+        velocity: (off.velocity - push * (damping_per_s * t)) * left,
+    }
 }
 
 impl Agent for Tool {
@@ -258,13 +261,14 @@ impl Agent for Tool {
             return Err(StepError::Diverged { model: "tool", dt_s, what });
         }
         let was = self.tool.jaw;
-        let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).0);
+        let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).position);
         let led = self.drive_on(led, around, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
         let is_left = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
         self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
-        self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
+        self.jaws.hold_on(dt_s);
+        self.jaws.move_to(&self.spec, was, &self.tool, around);
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.tool.lets_in = self.let_in(around, dt_s);
         self.wake_others(around, dt_s);
@@ -314,7 +318,7 @@ impl Agent for Tool {
             .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
         into.at_rest = self.at_rest;
         into.inertia = self.drive.inertia();
-        into.sprung.set(Some(self.drive.sprung(self.led.1)));
+        into.sprung.set(Some(self.drive.sprung(self.led.velocity)));
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));
         self.felt.write(into);
     }

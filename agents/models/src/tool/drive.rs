@@ -9,8 +9,21 @@ use glam::{DMat3, DVec3};
 use metachron_core::Inertia;
 use metachron_core::{Mat6, Sprung};
 
-/// A point and its velocity, metres and m/s.
-pub(super) type Led = (DVec3, DVec3);
+/// A moving point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PointMotion {
+    /// Metres.
+    pub position: DVec3,
+    /// Metres per second.
+    pub velocity: DVec3,
+}
+
+impl PointMotion {
+    /// How it moves as seen from `other`.
+    pub(super) fn relative_to(self, other: Self) -> Self {
+        Self { position: self.position - other.position, velocity: self.velocity - other.velocity }
+    }
+}
 
 /// The impulses that the tip received in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -88,7 +101,7 @@ impl Drive {
     ///
     /// The tip moves like a body on springs (eq. 7d). Where the spring force would exceed the limit, it equals the limit and the
     /// commanded point stays that far from the tip (eq. 9f).
-    pub(super) fn go_on(&mut self, [from, to]: [Led; 2], given: &Given, dt: f64) -> [Led; 2] {
+    pub(super) fn go_on(&mut self, [from, to]: [PointMotion; 2], given: &Given, dt: f64) -> [PointMotion; 2] {
         let [k, c] = self.spring();
         let known = (self.mass_kg() + self.span_s * (c + self.span_s * k)).recip();
         self.off += given.carried * known;
@@ -99,13 +112,18 @@ impl Drive {
             (self.off, self.rate, self.past, self.slips) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, None);
             return [to, to];
         }
-        let led = self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.slip(from, (force, given.lasting), dt));
-        [led, (led.0 + self.off, led.1 + self.rate)]
+        let led = self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.slip(from, force, given.lasting, dt));
+        [led, self.tip(led)]
+    }
+
+    /// The tip, for this commanded point.
+    fn tip(&self, commanded: PointMotion) -> PointMotion {
+        PointMotion { position: commanded.position + self.off, velocity: commanded.velocity + self.rate }
     }
 
     /// Moves the tip by the spring while the commanded point follows the path; the mean force needed, clamped to the limit, as an error
     /// where it is too much.
-    fn pull(&mut self, to: Led, lasting: DVec3, dt: f64) -> Result<Led, DVec3> {
+    fn pull(&mut self, to: PointMotion, lasting: DVec3, dt: f64) -> Result<PointMotion, DVec3> {
         let (m, k, c) = (self.mass_kg(), self.stiffness_n_m(), self.damping_n_s_m());
         let yields = (m + dt * (c + dt * k)).recip();
         let pull = -(self.off + self.rate * dt) * k - self.rate * c;
@@ -121,14 +139,14 @@ impl Drive {
     }
 
     /// The drive gives its full `force`; the commanded point is at the distance from the tip that this force stretches the spring to.
-    fn slip(&mut self, from: Led, (force, lasting): (DVec3, DVec3), dt: f64) -> Led {
+    fn slip(&mut self, from: PointMotion, force: DVec3, lasting: DVec3, dt: f64) -> PointMotion {
         let yields = (self.mass_kg() + dt * self.damping_n_s_m()).recip();
         let change = (force * dt + lasting) * yields;
-        let (place, velocity) = (from.0 + self.off, from.1 + self.rate);
-        let tip = place + velocity * dt + change * (0.5 * dt);
+        let PointMotion { position, velocity } = self.tip(from);
+        let tip = position + velocity * dt + change * (0.5 * dt);
         (self.off, self.rate) = (-force / self.stiffness_n_m(), DVec3::ZERO);
         (self.past, self.slips) = (force * yields, Some(force));
-        (tip - self.off, velocity + change)
+        PointMotion { position: tip - self.off, velocity: velocity + change }
     }
 
     /// The tip's response to impulses apart from its spring.

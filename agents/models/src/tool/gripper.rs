@@ -8,7 +8,9 @@
 use super::ToolSpec;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Neighbour, StepContext};
-use metachron_core::{AgentId, Anchor, Body, CurveState, GRASP_BELOW, Grasp, GraspOrientation, RigidState, SoftState};
+use metachron_core::{
+    AgentId, Anchor, Body, CurveState, GRASP_BELOW, Grasp, GraspOrientation, RigidState, SoftState, ToolState,
+};
 use metachron_geometry::{ShapeKind, SolidShape};
 
 /// Jaws that open past this opening release.
@@ -57,21 +59,20 @@ impl Jaws {
         self.held.is_some()
     }
 
-    /// Opens and closes over a step of `dt` seconds: from opening `was` to `now`, the tip at `tip`, the tool turned by `rotation`.
-    pub(super) fn move_to(
-        &mut self,
-        spec: &ToolSpec,
-        (was, now): (f64, f64),
-        (tip, rotation): (DVec3, DQuat),
-        seen: (&StepContext<'_>, f64),
-    ) {
-        let (around, dt) = seen;
+    /// Lets `dt` seconds pass for a grasp that lasts.
+    pub(super) fn hold_on(&mut self, dt: f64) {
+        if let Some(held) = &mut self.held {
+            held.for_s += dt;
+        }
+    }
+
+    /// Opens or closes from the opening `was` to that of `tool`, the tool as it is now: grasps and releases.
+    pub(super) fn move_to(&mut self, spec: &ToolSpec, was: f64, tool: &ToolState, around: &StepContext<'_>) {
+        let ToolState { tip, rotation, jaw: now, .. } = *tool;
         if now > RELEASE_ABOVE {
             *self = Self::new();
         }
-        if let Some(held) = &mut self.held {
-            held.for_s += dt;
-        } else if now < GRASP_BELOW && self.armed {
+        if self.held.is_none() && now < GRASP_BELOW && self.armed {
             self.held = nearest(spec, tip, around).map(|Near { target, anchor, rotation: body, .. }| {
                 let rotation = body.map(|body| (rotation.conjugate() * body).normalize());
                 Held { target, anchor, rotation, for_s: 0.0 }
@@ -98,20 +99,21 @@ impl Jaws {
 
 /// The nearest graspable point within reach.
 pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &StepContext<'_>) -> Option<Near> {
-    nearest_of(spec, tip, (around, spec.reach_m), |_| true)
+    nearest_of(spec, tip, around, spec.reach_m, |_| true)
 }
 
 /// The rigid body that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
-pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&StepContext<'_>, f64)) -> Option<AgentId> {
+pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, around: &StepContext<'_>, reach_m: f64) -> Option<AgentId> {
     let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
-    nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
+    nearest_of(spec, tip, around, reach_m, rigid).map(|near| near.target)
 }
 
 /// The nearest point within `reach_m` on graspable agents that are `wanted`.
 fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
-    (around, reach_m): (&StepContext<'_>, f64),
+    around: &StepContext<'_>,
+    reach_m: f64,
     wanted: impl Fn(&Neighbour) -> bool,
 ) -> Option<Near> {
     let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));

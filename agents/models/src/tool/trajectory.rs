@@ -97,7 +97,8 @@ fn close(knots: &mut Vec<Knot>) {
 /// The harmonic mean of both neighbouring slopes where they agree in sign, else zero (FB84); zero at open ends.
 fn set_slopes(knots: &mut [Knot], closed: bool) {
     let last = knots.len() - 1;
-    let secant = |a: &Knot, b: &Knot| (b.at_s - a.at_s, (b.value - a.value) / (b.at_s - a.at_s));
+    let secant =
+        |a: &Knot, b: &Knot| Secant { span_s: b.at_s - a.at_s, slope: (b.value - a.value) / (b.at_s - a.at_s) };
     for i in 1..last {
         knots[i].slope = mean_slope(secant(&knots[i - 1], &knots[i]), secant(&knots[i], &knots[i + 1]));
     }
@@ -107,7 +108,15 @@ fn set_slopes(knots: &mut [Knot], closed: bool) {
     }
 }
 
-fn mean_slope((h0, s0): (f64, DVec4), (h1, s1): (f64, DVec4)) -> DVec4 {
+/// The straight line between two keyframes: its duration, seconds, and its slope per second.
+#[derive(Clone, Copy)]
+struct Secant {
+    span_s: f64,
+    slope: DVec4,
+}
+
+fn mean_slope(before: Secant, after: Secant) -> DVec4 {
+    let (Secant { span_s: h0, slope: s0 }, Secant { span_s: h1, slope: s1 }) = (before, after);
     let (w0, w1) = (h0 + 2.0 * h1, 2.0 * h0 + h1);
     let mean = |a: f64, b: f64| if a * b > 0.0 { (w0 + w1) / (w0 / a + w1 / b) } else { 0.0 };
     DVec4::new(mean(s0.x, s1.x), mean(s0.y, s1.y), mean(s0.z, s1.z), mean(s0.w, s1.w))

@@ -7,7 +7,7 @@
 
 use super::super::fellows::{Fellows, World};
 use super::published_bounds::{Reach, Seen};
-use super::{BroadPhase, SPEED_LEAST_M_S};
+use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 
 /// Knowledge of one agent about the boxes of the others.
@@ -97,15 +97,16 @@ impl NeighbourList {
         }
     }
 
-    /// Checks the peers whose appointment is due, before a step of `dt` from `now`; returns how many were checked. Only peers that it
-    /// `may_touch` are near; members of its own island (`fellows`) are skipped.
+    /// Checks the peers whose appointment is due, before a `step`; returns how many were checked. Only peers that it `may_touch` are near;
+    /// members of its own island (`fellows`) are skipped.
     pub fn look(
         &mut self,
         crowd: &BroadPhase,
-        (now, dt): (SimTime, SimSpan),
+        step: PlannedStep,
         fellows: &Fellows,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
+        let PlannedStep { start: now, dt } = step;
         if self.world != fellows.world() {
             (self.world, self.everybody) = (fellows.world(), SimTime::ZERO);
         }
@@ -120,7 +121,7 @@ impl NeighbourList {
         let Some(mine) = self.mine else { return 0 };
         let looks = if self.everybody <= now {
             self.dt = dt;
-            self.survey(crowd, &mine, now, (fellows, may_touch))
+            self.survey(crowd, now, fellows, may_touch)
         } else {
             self.listed.retain(|other| !fellows.has(other.id));
             self.keep_appointments(crowd, &mine, now, may_touch)
@@ -139,12 +140,13 @@ impl NeighbourList {
         now: SimTime,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
-        let (mut looks, dt, everybody) = (0, self.dt, self.everybody);
+        let (mut looks, everybody) = (0, self.everybody);
+        let step = PlannedStep { start: now, dt: self.dt };
         self.listed.retain_mut(|other| {
             let is_new = other.at == SimTime::ZERO;
             if other.at <= now {
                 looks += 1;
-                (other.at, other.near) = appointment(mine, crowd.seen(other.id), other.near, (now, dt));
+                (other.at, other.near) = appointment(mine, crowd.seen(other.id), other.near, step);
             }
             (other.near || other.at < everybody) && (!is_new || may_touch(other.id))
         });
@@ -155,10 +157,12 @@ impl NeighbourList {
     fn survey(
         &mut self,
         crowd: &BroadPhase,
-        mine: &Reach,
         now: SimTime,
-        (fellows, may_touch): (&Fellows, impl Fn(AgentId) -> bool),
+        fellows: &Fellows,
+        may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
+        let Some(mine) = self.mine else { return 0 };
+        let step = PlannedStep { start: now, dt: self.dt };
         let (mut room, mut looks) = (2 * LISTED, 0);
         self.everybody = NEVER;
         self.listed.clear();
@@ -166,11 +170,11 @@ impl NeighbourList {
         for (id, berth) in (0..).map(AgentId).zip(&crowd.berths).filter(|(id, _)| *id != me && !fellows.has(*id)) {
             let seen = berth.read();
             looks += 1;
-            if is_far(mine, &seen, self.everybody, (now, self.dt)) {
+            if is_far(&mine, &seen, self.everybody, step) {
                 continue;
             }
             let was_near = self.near.binary_search(&id).is_ok();
-            let (at, near) = appointment(mine, seen, was_near, (now, self.dt));
+            let (at, near) = appointment(&mine, seen, was_near, step);
             if (!near && at >= self.everybody) || !may_touch(id) {
                 continue;
             }
@@ -221,7 +225,8 @@ impl NeighbourList {
 
 /// Whether a peer that is `seen` is certainly not near and its appointment not before `everybody`: without a square root or a division, as
 /// most peers in a crowd are distant. If in doubt it returns `false`.
-fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, (now, dt): (SimTime, SimSpan)) -> bool {
+fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, step: PlannedStep) -> bool {
+    let PlannedStep { start: now, dt } = step;
     let Seen::There(theirs) = seen else { return false };
     if everybody == NEVER {
         return false;
@@ -234,8 +239,9 @@ fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, (now, dt): (SimTime, Si
     mine.gap_vector(theirs).length_squared() > least_m * least_m
 }
 
-/// When a peer that is `seen` is checked again, and whether it is near now, before a step of `dt` from `now`.
-fn appointment(mine: &Reach, seen: Seen, was_near: bool, (now, dt): (SimTime, SimSpan)) -> (SimTime, bool) {
+/// When a peer that is `seen` is checked again, and whether it is near now, before a `step`.
+fn appointment(mine: &Reach, seen: Seen, was_near: bool, step: PlannedStep) -> (SimTime, bool) {
+    let PlannedStep { start: now, dt } = step;
     let next_turn = now + SimSpan::from_nanos(1);
     let theirs = match seen {
         // a log entry announces its first box

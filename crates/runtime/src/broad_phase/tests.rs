@@ -3,7 +3,6 @@
 use super::super::fellows::Fellows;
 use super::*;
 use glam::DVec3;
-use metachron_core::SimSpan;
 use proptest::prelude::*;
 
 /// A ball that flies straight through each of its steps.
@@ -49,7 +48,12 @@ fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flye
     }
     let mut turn = 0;
     while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
-        sights[who].look(&crowd, (flyers[who].time, flyers[who].dt), &Fellows::default(), |_| true);
+        sights[who].look(
+            &crowd,
+            PlannedStep { start: flyers[who].time, dt: flyers[who].dt },
+            &Fellows::default(),
+            |_| true,
+        );
         check(who, flyers, &sights[who]);
         let flyer = &mut flyers[who];
         flyer.at = flyer.position_at(flyer.time + flyer.dt);
@@ -127,7 +131,7 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
                     sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
                 }
                 for sight in &mut sights {
-                    sight.look(&crowd, (now, dt), &Fellows::default(), |_| true);
+                    sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
                 }
             }
         });
@@ -146,11 +150,10 @@ fn a_longer_step_is_looked_ahead_for_at_once() {
     sight.stand(&crowd, Some(&ball(0.0)), SimTime::ZERO);
     crowd.stand(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
-    sight.look(&crowd, (SimTime::ZERO, SimSpan::from_nanos(4_000_000)), &Fellows::default(), |_| true);
+    let step = |start_ns, dt_ns| PlannedStep { start: SimTime::from_nanos(start_ns), dt: SimSpan::from_nanos(dt_ns) };
+    sight.look(&crowd, step(0, 4_000_000), &Fellows::default(), |_| true);
     assert!(sight.near().is_empty());
-    sight.look(&crowd, (SimTime::from_nanos(4_000_000), SimSpan::from_nanos(250_000_000)), &Fellows::default(), |_| {
-        true
-    });
+    sight.look(&crowd, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
     assert_eq!(sight.near(), [AgentId(1)]);
 }
 
@@ -167,7 +170,10 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
         sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
     let looks = |sights: &mut [NeighbourList], now: SimTime| -> usize {
-        sights.iter_mut().map(|sight| sight.look(&crowd, (now, dt), &Fellows::default(), |_| true)).sum()
+        sights
+            .iter_mut()
+            .map(|sight| sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
+            .sum()
     };
     assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
     // 8 m at 2 · 0.0625 m/s is a minute
@@ -206,7 +212,7 @@ fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
             let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
             let speed_m_s = 2.0 * libm::cos(phase).abs();
             sight.stand(&crowd, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
-            looks += sight.look(&crowd, (now, dt), &Fellows::default(), |_| true);
+            looks += sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
         }
     }
     // everybody once in 33 turns
@@ -222,14 +228,14 @@ fn a_log_that_has_run_over_means_everybody() {
     let dt = SimSpan::from_nanos(1_000_000);
     sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
     crowd.stand(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    sight.look(&crowd, (SimTime::ZERO, dt), &Fellows::default(), |_| true);
+    sight.look(&crowd, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
     assert!(sight.near().is_empty());
     crowd.stand(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
         crowd.stand(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    sight.look(&crowd, (SimTime::ZERO, dt), &Fellows::default(), |_| true);
+    sight.look(&crowd, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
     assert_eq!(sight.near(), [AgentId(1)]);
 }
 

@@ -7,7 +7,7 @@ use metachron_core::{AgentId, SimTime};
 use std::collections::BTreeSet;
 
 fn pool(spawns: Vec<AgentSpawn>, workers: usize, patience: Duration) -> Box<Pool> {
-    running(Pool::with_workers(spawns, system(), workers, (patience, Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, system(), workers, patience, Priority::Normal).unwrap())
 }
 
 const LONG: Duration = Duration::from_secs(60);

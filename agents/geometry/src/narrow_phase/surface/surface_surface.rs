@@ -4,8 +4,8 @@
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
 use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
-use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
-use crate::Touch;
+use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, SkinPoint, Spot, Triangle, shares};
+use crate::{Aabb, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use std::ops::RangeInclusive;
@@ -62,7 +62,7 @@ impl<'a> Skins<'a> {
     fn vertices_here(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         for (vertex, at) in here.surface.vertices_in(here.region) {
-            let Some(Met { spot, normal, distance_m }) = self.vertex(here, there, (vertex, at)) else { continue };
+            let Some(Met { spot, normal, distance_m }) = self.vertex(here, there, vertex, at) else { continue };
             let (on_a, on_b) = (Spot::vertex(vertex).place(), spot.place());
             into.push(Touch { key: KINDS[0] | u64::from(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
         }
@@ -71,7 +71,7 @@ impl<'a> Skins<'a> {
     fn vertices_there(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         for (vertex, at) in there.surface.vertices_in(there.region) {
-            let Some(Met { spot, normal, distance_m }) = self.vertex(there, here, (vertex, at)) else { continue };
+            let Some(Met { spot, normal, distance_m }) = self.vertex(there, here, vertex, at) else { continue };
             let (on_a, on_b, gap_m) = (spot.place(), Spot::vertex(vertex).place(), distance_m - thick_m);
             into.push(Touch { key: KINDS[3] | u64::from(vertex), normal: -normal, gap_m, on_a, on_b });
         }
@@ -80,19 +80,18 @@ impl<'a> Skins<'a> {
     fn edges(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
-        for (number, edge, ends) in here.surface.edges_in(here.region) {
-            let around = (ends[0].min(ends[1]) - self.within_m(), ends[0].max(ends[1]) + self.within_m());
-            for (other, edge_b, ends_b) in there.surface.edges_in(around) {
-                let (s, t) = near_segments(ends, ends_b);
+        for edge in here.surface.edges_in(here.region) {
+            let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
+            for other in there.surface.edges_in(around.grown(self.within_m())) {
+                let (s, t) = near_segments(edge.ends, other.ends);
                 if !(inner.contains(&s) && inner.contains(&t)) {
                     continue;
                 }
-                let (a, b) = (Spot::edge(edge, s), Spot::edge(edge_b, t));
-                let ridges = [Ridge::Edge(number, ends), Ridge::Edge(other, ends_b)];
-                let points = [ends[0].lerp(ends[1], s), ends_b[0].lerp(ends_b[1], t)];
-                if let Some((normal, distance_m)) = self.crossing([a, b], points, ridges) {
-                    let key = KINDS[1] | number << PART_SHIFT | other;
-                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a: a.place(), on_b: b.place() });
+                let (a, b) = (edge.at(s), other.at(t));
+                if let Some((normal, distance_m)) = self.crossing([a, b], [edge.ridge(), other.ridge()]) {
+                    let key = KINDS[1] | edge.number << PART_SHIFT | other.number;
+                    let (on_a, on_b) = (a.spot.place(), b.spot.place());
+                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a, on_b });
                 }
             }
         }
@@ -105,7 +104,7 @@ impl<'a> Skins<'a> {
     }
 
     /// Where a vertex of the skin `a` touches the skin `b`.
-    fn vertex(&self, a: &Meeting<'_>, b: &Meeting<'_>, (vertex, at): (u32, DVec3)) -> Option<Met> {
+    fn vertex(&self, a: &Meeting<'_>, b: &Meeting<'_>, vertex: u32, at: DVec3) -> Option<Met> {
         let out = Spot::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
         let near = b.nearest(at, self.within_m(), None)?;
         if b.is_behind(near, at) {
@@ -147,9 +146,10 @@ impl<'a> Skins<'a> {
 
     /// The normal where two edges cross, towards the first, and their distance; `None` where a neighbouring part is nearer, and for
     /// parallel edges, whose ends report the same contact.
-    fn crossing(&self, spots: [Spot; 2], [a, b]: [DVec3; 2], ridges: [Ridge; 2]) -> Option<(DVec3, f64)> {
+    fn crossing(&self, points: [SkinPoint; 2], ridges: [Ridge; 2]) -> Option<(DVec3, f64)> {
+        let [a, b] = points.map(|point| point.position);
         let [here, there] = [self.here, self.there];
-        let out = [spots[0].out(here.normals), spots[1].out(there.normals)];
+        let out = [points[0].spot.out(here.normals), points[1].spot.out(there.normals)];
         let across = along(ridges[0]).cross(along(ridges[1]));
         if across.length() < PARALLEL {
             return None;
@@ -183,20 +183,22 @@ fn along(ridge: Ridge) -> DVec3 {
 impl Meeting<'_> {
     /// The place of the skin that is nearest to a point within `within_m`; only of faces opposed to the normal `facing`, if one is given.
     fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<Near> {
-        let region = (point - within_m, point + within_m);
-        let faces = self.surface.triangles_in(region).filter_map(|(_, triangle, corners)| {
+        let region = Aabb::about(point, within_m);
+        let faces = self.surface.triangles_in(region).filter_map(|Triangle { vertices, corners, .. }| {
             let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
             if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
                 return None;
             }
             let at = near_triangle(point, corners);
-            Some(Near { spot: Spot { vertices: triangle, shares: shares(at, corners)? }, at, face: Some(face) })
+            Some(Near { spot: Spot { vertices, shares: shares(at, corners)? }, at, face: Some(face) })
         });
         let is_rope = self.surface.form.triangles.is_empty();
-        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|(_, edge, ends)| {
-            let along = ends[1] - ends[0];
-            let share = ((point - ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            Near { spot: Spot::edge(edge, share), at: ends[0].lerp(ends[1], share), face: None }
+        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|edge| {
+            let along = edge.ends[1] - edge.ends[0];
+            let share =
+                ((point - edge.ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let SkinPoint { spot, position } = edge.at(share);
+            Near { spot, at: position, face: None }
         });
         let distance2 = |near: &Near| near.at.distance_squared(point);
         faces

@@ -166,12 +166,12 @@ fn a_lying_cylinder_touches_a_box_along_its_side_and_a_standing_one_at_its_rim()
     let side = all(&at(&round, DVec3::Z * 0.15, lying), &floor, 1e-3);
     let span = |found: &[Touch]| {
         let points = found.iter().map(|touch| axis(touch.on_a, &[]).0);
-        crate::bounds(&points.collect::<Vec<_>>())
+        crate::Aabb::of(&points.collect::<Vec<_>>())
     };
-    assert!(side.len() >= 2 && (span(&side).1.y - 0.1).abs() < 1e-5 && (span(&side).0.y + 0.1).abs() < 1e-5);
+    assert!(side.len() >= 2 && (span(&side).high.y - 0.1).abs() < 1e-5 && (span(&side).low.y + 0.1).abs() < 1e-5);
     let standing = all(&at(&round, DVec3::Z * 0.2, DQuat::IDENTITY), &floor, 1e-3);
     assert!(standing.len() >= 4 && standing.iter().all(|touch| touch.gap_m.abs() < 1e-6), "{standing:?}");
-    assert!((span(&standing).1 - span(&standing).0).length() > 0.09);
+    assert!((span(&standing).high - span(&standing).low).length() > 0.09);
 }
 
 #[test]

@@ -414,7 +414,7 @@ impl Island {
             }
             let (body, around) = crew.body(member.seat);
             (body.motion, body.at_rest, body.within) = (member.motion, at_rest, member.answer);
-            body.led(around, dt_s, (member.touching, member.depth_m));
+            body.led(around, dt_s, member.touching, member.depth_m);
         }
     }
 }

@@ -18,7 +18,7 @@ const STRAIGHT: f64 = 0.98;
 fn skin(shape: SoftShape, (middle, turn): (DVec3, f64)) -> (Arc<CollisionShape>, Vec<DVec3>) {
     let body = SoftBody::new(spec(shape)).unwrap();
     let rest = state(&body).positions;
-    let (low, high) = metachron_geometry::bounds(&rest);
+    let metachron_geometry::Aabb { low, high } = metachron_geometry::Aabb::of(&rest);
     let turn = DQuat::from_rotation_z(turn);
     (body.form().unwrap(), rest.iter().map(|x| middle + turn * (*x - 0.5 * (low + high))).collect())
 }
