@@ -22,6 +22,7 @@
 pub mod conformance;
 #[cfg(test)]
 mod harness;
+mod limits;
 pub mod rigid;
 pub mod rod;
 pub mod soft;

@@ -12,14 +12,13 @@ mod surface_surface;
 
 use super::primitives::{Piece, Strand, StrandPoint, Surface};
 use super::voronoi_regions::{LEAN_SHARE, Ridge};
+use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
 use crate::{Aabb, Place, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use surface_surface::Skins;
 
-/// Axes closer than this cross, metres: the vector from one to the other has no direction.
-const CROSSING_M: f64 = 1e-9;
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 /// Kinds of places in keys: a vertex of the surface, an edge, a triangle, a vertex of another surface.

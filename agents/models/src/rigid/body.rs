@@ -18,6 +18,7 @@ use super::spring_set::SpringSet;
 use super::static_shapes::StaticShapes;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, linear_spring};
+use crate::limits::PART_MAX_S;
 use glam::DVec3;
 use metachron_contact::beside;
 use metachron_contact::beside::{bends, is_driven};
@@ -104,8 +105,6 @@ pub struct RigidBody {
     drift_m: f64,
 }
 
-/// The longest part of a step in contact or under a spring, seconds.
-const PART_MAX_S: f64 = 1.0 / 240.0;
 /// A body in contact that moves slower than this everywhere is calm, m/s: above the solver's own jitter
 /// (measured: below 1e-4 m/s for a box of 1 m at rest), below the visible.
 const CALM_M_S: f64 = 2e-3;

@@ -13,6 +13,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::step::HASTE_MAX;
 use super::step_doubling::Doubling;
 use super::system::System;
+use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 use metachron_contact::beside;
 use metachron_contact::beside::has_a_say;
@@ -55,13 +56,6 @@ pub struct SoftBody {
     /// Its recent contact history.
     pub(super) lately: Lately,
 }
-
-/// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is invisible on any screen.
-const SPEED_MAX_M_S: f64 = 1e-4;
-/// A vertex is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
-const ACCELERATION_MAX_M_S2: f64 = 1e-2;
-/// All vertices must have been quiet for this long, seconds of the body's own time.
-const QUIET_S: f64 = 0.5;
 
 impl SoftBody {
     /// Builds the body of `spec` in its rest shape.
@@ -152,7 +146,7 @@ impl SoftBody {
     fn watch_rest(&mut self, dt: f64) -> bool {
         let Self { velocities, before, .. } = self;
         let pairs = velocities.iter().zip(before.iter());
-        let limit = (SPEED_MAX_M_S, ACCELERATION_MAX_M_S2 * dt);
+        let limit = (QUIET_SPEED_M_S, QUIET_ACCELERATION_M_S2 * dt);
         let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
         let calm = self.spec.sleep && self.ties.is_empty() && self.company.is_calm();
         let quiet = calm && still.all(|still| still);

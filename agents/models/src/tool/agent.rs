@@ -12,6 +12,7 @@ use super::gripper::{Jaws, let_in, nearest};
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
+use crate::limits::PART_MAX_S;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Knock, beside};
@@ -66,8 +67,6 @@ const CATCH_SHARE: f64 = 0.5;
 const ARRIVED: f64 = 1e-7;
 /// A tool on which sleeping bodies rest keeps still below this speed, m/s.
 const LAIN_M_S: f64 = 2e-3;
-/// With agents near, steps are no longer than a rigid body's in that case, seconds.
-const PART_MAX_S: f64 = 1.0 / 240.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 

@@ -4,7 +4,8 @@
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
 use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
-use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, SkinPoint, Spot, Triangle, shares};
+use super::{DEEP_SHARE, KINDS, Meeting, PART_SHIFT, SkinPoint, Spot, Triangle, shares};
+use crate::capsule_chain::CROSSING_M;
 use crate::{Aabb, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
