@@ -5,7 +5,7 @@
 //!
 //! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`]
 //! gives each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time
-//! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`),
+//! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`broad_phase`),
 //! and agents in lasting contact share the turns of one of them (`island`).
 //!
 //! ```

@@ -24,15 +24,15 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
-use supervisor::{Note, Supervisor};
+use supervisor::{Message, Supervisor};
 
 /// A step that takes longer is given up: its agent is parked, its worker replaced.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Agents that share workers.
 pub struct Pool {
-    hall: Arc<PoolState>,
-    notes: Sender<Note>,
+    state: Arc<PoolState>,
+    messages: Sender<Message>,
     watch: Option<JoinHandle<()>>,
 }
 
@@ -55,25 +55,26 @@ impl Pool {
         patience: Duration,
         priority: Priority,
     ) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
         let workers = workers.clamp(1, handles.len().max(1));
-        board.hire(workers);
-        let hall = Arc::new(PoolState::new(clock, board, handles, actors, workers));
-        hall.timeline.drive(Duration::ZERO, Drive::Pause);
+        sleep.set_workers(workers);
+        let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
+        state.timeline.drive(Duration::ZERO, Drive::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
-        let staff = Supervisor::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
-        let notes = staff.notes();
-        let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
-            hall.board.stop();
-            no_thread(source)
-        })?;
-        Ok(Self { hall, notes, watch: Some(watch) })
+        let supervisor = Supervisor::start(Arc::clone(&state), workers, patience, priority).map_err(no_thread)?;
+        let messages = supervisor.sender();
+        let watch =
+            thread::Builder::new().name("pool:watch".to_owned()).spawn(|| supervisor.watch()).map_err(|source| {
+                state.sleep.stop();
+                no_thread(source)
+            })?;
+        Ok(Self { state, messages, watch: Some(watch) })
     }
 
     fn end(&mut self) {
-        self.hall.board.stop();
+        self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
-        let _ = self.notes.send(Note::Stop);
+        let _ = self.messages.send(Message::Stop);
         drop(self.watch.take().map(JoinHandle::join));
     }
 }
@@ -86,31 +87,31 @@ impl Drop for Pool {
 
 impl Run for Pool {
     fn now(&self) -> Duration {
-        self.hall.clock.now()
+        self.state.clock.now()
     }
 
     fn wait_until(&mut self, until: Duration) {
-        super::clock::wait_until(&*self.hall.clock, until);
+        super::clock::wait_until(&*self.state.clock, until);
     }
 
     fn spend(&mut self, _work: Duration) {}
 
     fn timeline(&self) -> Timeline {
-        self.hall.timeline.read()
+        self.state.timeline.read()
     }
 
     fn drive(&mut self, drive: Drive) {
-        self.hall.timeline.drive(self.hall.clock.now(), drive);
-        self.hall.board.unpark_all();
+        self.state.timeline.drive(self.state.clock.now(), drive);
+        self.state.sleep.unpark_all();
     }
 
     fn agents(&self) -> &[AgentHandle] {
-        &self.hall.handles
+        &self.state.handles
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
-        self.hall.handles.iter().map(AgentHandle::stats).collect()
+        self.state.handles.iter().map(AgentHandle::stats).collect()
     }
 }
 

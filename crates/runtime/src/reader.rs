@@ -17,7 +17,7 @@ const FRAMES_KEPT: usize = 256;
 #[derive(Debug)]
 pub struct Reader {
     newest: Vec<Arc<Snapshot>>,
-    looks: Vec<Look>,
+    readings: Vec<LastReading>,
     /// The times of the last frames.
     frames: VecDeque<SimTime>,
     /// Frames read so far.
@@ -26,7 +26,7 @@ pub struct Reader {
 
 /// An agent at its last reading.
 #[derive(Debug, Clone, Copy)]
-struct Look {
+struct LastReading {
     /// Number of frames up to which its ages are counted.
     counted: u64,
     time: SimTime,
@@ -38,8 +38,9 @@ impl Reader {
     #[must_use]
     pub fn new(agents: &[AgentHandle]) -> Self {
         let newest: Vec<_> = agents.iter().map(AgentHandle::latest).collect();
-        let looks = newest.iter().map(|state| Look { counted: 0, time: state.moment(), rests: false }).collect();
-        Self { newest, looks, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
+        let readings =
+            newest.iter().map(|state| LastReading { counted: 0, time: state.moment(), rests: false }).collect();
+        Self { newest, readings, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
     }
 
     /// The states of the last reading, in the order of the agents.
@@ -57,13 +58,13 @@ impl Reader {
         mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool),
     ) {
         if let Some(first) = agents.first() {
-            first.shared.board.news.take(|id| {
+            first.shared.sleep.changed.take(|id| {
                 let at = id.0 as usize;
-                let (Some(agent), true) = (agents.get(at), at < self.looks.len()) else { return };
+                let (Some(agent), true) = (agents.get(at), at < self.readings.len()) else { return };
                 self.count(at, agent);
                 let state = agent.state();
                 self.newest[at] = agent.latest();
-                let look = &mut self.looks[at];
+                let look = &mut self.readings[at];
                 (look.time, look.rests) = (self.newest[at].moment(), state == AgentState::Resting);
                 visit(agent, &self.newest[at], state == AgentState::Running);
             });
@@ -75,14 +76,14 @@ impl Reader {
 
     /// Counts all ages that are not counted yet, at the end of a run.
     pub fn finish(&mut self, agents: &[AgentHandle]) {
-        for (at, agent) in agents.iter().enumerate().take(self.looks.len()) {
+        for (at, agent) in agents.iter().enumerate().take(self.readings.len()) {
             self.count(at, agent);
         }
     }
 
     /// Counts the ages of agent `at` in the frames since its last count.
     fn count(&mut self, at: usize, agent: &AgentHandle) {
-        let look = &mut self.looks[at];
+        let look = &mut self.readings[at];
         let frames = (self.read - look.counted) as usize;
         let first = self.frames.len().saturating_sub(frames);
         if look.rests {
@@ -97,7 +98,7 @@ impl Reader {
     fn catch_up(&mut self, agents: &[AgentHandle]) {
         let share = agents.len().div_ceil(FRAMES_KEPT);
         let from = (self.read as usize % FRAMES_KEPT) * share;
-        for (at, agent) in agents.iter().enumerate().take(self.looks.len()).skip(from).take(share) {
+        for (at, agent) in agents.iter().enumerate().take(self.readings.len()).skip(from).take(share) {
             self.count(at, agent);
         }
         if self.frames.len() == 2 * FRAMES_KEPT {

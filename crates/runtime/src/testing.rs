@@ -80,7 +80,7 @@ pub(super) type Bond = fn(u32, u32, SimTime) -> bool;
 
 /// One step that was made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Made {
+pub(super) struct RecordedStep {
     pub id: AgentId,
     pub from: SimTime,
     pub to: SimTime,
@@ -90,7 +90,7 @@ pub(super) struct Made {
 }
 
 /// All steps made by any agent.
-pub(super) type Log = Arc<Mutex<Vec<Made>>>;
+pub(super) type Log = Arc<Mutex<Vec<RecordedStep>>>;
 
 /// The test agent. Its snapshot reports the impulse taken as energy and the impulse given as residual.
 #[derive(Debug, Clone)]
@@ -113,7 +113,7 @@ pub(super) struct Dummy {
     /// The agents to which it is bonded.
     pub bond: Option<Bond>,
     /// It gives one newton second to every peer whose pair it owns, at each of its first so many steps.
-    pub gifts: u64,
+    pub impulses: u64,
     /// Impulses along x taken, newton seconds.
     pub taken: f64,
     /// Impulses along x given.
@@ -140,7 +140,7 @@ impl Dummy {
             x: 0.0,
             ball: None,
             bond: None,
-            gifts: 0,
+            impulses: 0,
             taken: 0.0,
             given: 0.0,
             exchange: Exchange::wary(),
@@ -152,7 +152,7 @@ impl Dummy {
     }
 
     /// An agent that is bonded to others as `bond` says, and whose steps are recorded in `log`.
-    pub fn mate(work: f64, bond: Bond, log: &Log) -> Self {
+    pub fn bonded(work: f64, bond: Bond, log: &Log) -> Self {
         Self { ball: Some((0.1, 0.0)), bond: Some(bond), log: Some(Arc::clone(log)), ..Self::new(work) }
     }
 
@@ -166,14 +166,14 @@ impl Dummy {
         let Some(log) = &self.log else { return };
         let thread = thread::current().name().unwrap_or_default().to_owned();
         let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
-        log.lock().unwrap().push(Made { id: around.me, from: around.time, to, thread, saw });
+        log.lock().unwrap().push(RecordedStep { id: around.me, from: around.time, to, thread, saw });
     }
 
-    fn trade(&mut self, around: &StepContext<'_>, dt_s: f64) {
+    fn exchange_impulses(&mut self, around: &StepContext<'_>, dt_s: f64) {
         let taken = &mut self.taken;
         self.exchange.open(around);
         self.exchange.take(around, around.time, |_, _, impulse, _| *taken += impulse.linear.x);
-        if self.steps <= self.gifts {
+        if self.steps <= self.impulses {
             for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
                 self.exchange.give(other.id, Site::Whole, 0.0, push);
@@ -224,7 +224,7 @@ impl Agent for Dummy {
         let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
         let pulled = around.pulls().map(|p| p.target.x);
         self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
-        self.trade(around, dt_s);
+        self.exchange_impulses(around, dt_s);
         (self.me, self.time) = (around.me, around.time + dt);
         self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
         self.write_down(self.time, around);

@@ -40,16 +40,16 @@ impl Flyer {
 
 /// Everybody's turns in the order of their times; `check` is told who has just looked, before each step.
 fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &NeighbourList)) {
-    let crowd = BroadPhase::new(flyers.len());
+    let broad_phase = BroadPhase::new(flyers.len());
     let ids = || (0..flyers.len() as u32).map(AgentId);
     let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
     for (flyer, sight) in flyers.iter().zip(&mut sights) {
-        sight.stand(&crowd, Some(&flyer.bounds()), flyer.time);
+        sight.publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
     }
     let mut turn = 0;
     while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
-        sights[who].look(
-            &crowd,
+        sights[who].update(
+            &broad_phase,
             PlannedStep { start: flyers[who].time, dt: flyers[who].dt },
             &Fellows::default(),
             |_| true,
@@ -61,7 +61,7 @@ fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flye
         flyer.came_with = flyer.velocity;
         let news = flyer.plan[turn % flyer.plan.len()];
         flyer.velocity = news.map_or(flyer.velocity, DVec3::from_array);
-        sights[who].stand(&crowd, Some(&flyer.bounds()), flyer.time);
+        sights[who].publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
         turn += 1;
     }
 }
@@ -119,7 +119,7 @@ proptest! {
 fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
     let dt = SimSpan::from_nanos(4_000_000);
     let held = |count: u32| {
-        let crowd = BroadPhase::new(count as usize);
+        let broad_phase = BroadPhase::new(count as usize);
         let mut sights: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
         let measured = allocation_counter::measure(|| {
             for turn in 0..3_u64 {
@@ -128,10 +128,10 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
                     // a square of balls that fly at different speeds, six of them near each
                     let at = DVec3::new((k % 40) as f64, (k / 40) as f64, 0.0);
                     let speed_m_s = 1.0 + (k % 7) as f64;
-                    sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
+                    sight.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
                 }
                 for sight in &mut sights {
-                    sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+                    sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
                 }
             }
         });
@@ -144,16 +144,16 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
 
 #[test]
 fn a_longer_step_is_looked_ahead_for_at_once() {
-    let crowd = BroadPhase::new(2);
+    let broad_phase = BroadPhase::new(2);
     let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
     let mut sight = NeighbourList::new(AgentId(0));
-    sight.stand(&crowd, Some(&ball(0.0)), SimTime::ZERO);
-    crowd.stand(AgentId(1), &ball(2.0), SimTime::ZERO);
+    sight.publish(&broad_phase, Some(&ball(0.0)), SimTime::ZERO);
+    broad_phase.publish(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
     let step = |start_ns, dt_ns| PlannedStep { start: SimTime::from_nanos(start_ns), dt: SimSpan::from_nanos(dt_ns) };
-    sight.look(&crowd, step(0, 4_000_000), &Fellows::default(), |_| true);
+    sight.update(&broad_phase, step(0, 4_000_000), &Fellows::default(), |_| true);
     assert!(sight.near().is_empty());
-    sight.look(&crowd, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
+    sight.update(&broad_phase, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
     assert_eq!(sight.near(), [AgentId(1)]);
 }
 
@@ -161,18 +161,18 @@ fn a_longer_step_is_looked_ahead_for_at_once() {
 fn who_is_far_is_never_looked_at_and_who_comes_is() {
     let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
     let count = 1000;
-    let crowd = BroadPhase::new(count);
+    let broad_phase = BroadPhase::new(count);
     let ids = || (0..count as u32).map(AgentId);
     let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
     let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
     let dt = SimSpan::from_nanos(4_000_000);
     for (k, sight) in sights.iter_mut().enumerate() {
-        sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
+        sight.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
     let looks = |sights: &mut [NeighbourList], now: SimTime| -> usize {
         sights
             .iter_mut()
-            .map(|sight| sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
+            .map(|sight| sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
             .sum()
     };
     assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
@@ -180,12 +180,12 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
     for turn in 1..=250_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
         for (k, sight) in sights.iter_mut().enumerate() {
-            sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), now);
+            sight.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), now);
         }
         assert_eq!(looks(&mut sights, now), 0, "turn {turn}");
     }
     let now = SimTime::from_nanos(1_004_000_000);
-    sights[0].stand(&crowd, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
+    sights[0].publish(&broad_phase, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
     // everybody looks at the one who has become fast, and he at everybody
     assert_eq!(looks(&mut sights, now), 2 * (count - 1));
     assert_eq!((sights[1].near(), sights[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
@@ -194,14 +194,14 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
 #[test]
 fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
     let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
-    let crowd = BroadPhase::new(count);
+    let broad_phase = BroadPhase::new(count);
     let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
     let half = DVec3::splat(0.25);
     // a floor of them, half a metre apart, a metre below those that swing
     for (k, sight) in sights.iter_mut().enumerate().skip(10) {
         let at = DVec3::new(0.5 * (k % 40) as f64, 0.5 * (k / 40) as f64, -1.5) - half;
-        sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
-        crowd.stay(AgentId(k as u32));
+        sight.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
+        broad_phase.publish_rest(AgentId(k as u32));
     }
     let mut looks = 0;
     for turn in 0..2000_u64 {
@@ -211,8 +211,8 @@ fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
             let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
             let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
             let speed_m_s = 2.0 * libm::cos(phase).abs();
-            sight.stand(&crowd, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
-            looks += sight.look(&crowd, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+            sight.publish(&broad_phase, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
+            looks += sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
         }
     }
     // everybody once in 33 turns
@@ -222,30 +222,30 @@ fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
 
 #[test]
 fn a_log_that_has_run_over_means_everybody() {
-    let crowd = BroadPhase::new(3);
+    let broad_phase = BroadPhase::new(3);
     let mut sight = NeighbourList::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
     let dt = SimSpan::from_nanos(1_000_000);
-    sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
-    crowd.stand(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    sight.look(&crowd, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    sight.publish(&broad_phase, Some(&at(0.0, 0.0)), SimTime::ZERO);
+    broad_phase.publish(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
+    sight.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
     assert!(sight.near().is_empty());
-    crowd.stand(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
+    broad_phase.publish(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
-        crowd.stand(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
+        broad_phase.publish(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    sight.look(&crowd, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    sight.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
     assert_eq!(sight.near(), [AgentId(1)]);
 }
 
 #[test]
 fn a_call_is_heard_once_by_the_one_it_is_for() {
-    let crowd = BroadPhase::new(200);
-    [130, 3, 64, 3].into_iter().for_each(|from| crowd.call(AgentId(7), AgentId(from)));
+    let broad_phase = BroadPhase::new(200);
+    [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.report_impulse(AgentId(7), AgentId(from)));
     let heard = |id| {
         let mut heard = Vec::new();
-        crowd.answer(AgentId(id), |caller| heard.push(caller.0));
+        broad_phase.take_givers(AgentId(id), |caller| heard.push(caller.0));
         heard
     };
     assert!(heard(8).is_empty());
@@ -255,14 +255,14 @@ fn a_call_is_heard_once_by_the_one_it_is_for() {
 
 #[test]
 fn what_is_said_of_a_speed_is_never_too_little_and_seldom_changes() {
-    let (mut said, mut changes) = (0.0, 0);
+    let (mut published, mut changes) = (0.0, 0);
     // up to 20 m/s and back in small steps
     for k in 0..4000_u32 {
         let speed = f64::from(k.min(4000 - k)) * 0.01;
-        let now = promise(speed, said);
+        let now = published_speed(speed, published);
         assert!(now >= speed && now <= 10.0 * speed.max(SPEED_LEAST_M_S), "{now} for {speed}");
-        changes += u32::from(now != said);
-        said = now;
+        changes += u32::from(now != published);
+        published = now;
     }
     assert!(changes <= 20, "{changes}");
 }

@@ -3,11 +3,11 @@
 use super::super::faults::Faults;
 use super::super::lockstep::Lockstep;
 use super::super::spawn::{AgentSpawn, assemble};
-use super::super::testing::{Dummy, Log, Made, eventually, on_every_executor, system};
+use super::super::testing::{Dummy, Log, RecordedStep, eventually, on_every_executor, system};
 use super::super::{AgentState, Machine, Run};
 use super::*;
 use metachron_contact::Link;
-use metachron_core::Anchor;
+use metachron_core::{Anchor, SimSpan, SimTime};
 use std::time::Duration;
 
 const fn ms(n: u64) -> Duration {
@@ -23,13 +23,13 @@ fn ball(z: f64, speed_m_s: f64, log: &Log) -> Dummy {
     Dummy { ball: Some((0.1, speed_m_s)), z, log: Some(Arc::clone(log)), ..Dummy::new(20.0) }
 }
 
-fn steps_of(log: &Log, id: u32) -> Vec<Made> {
+fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
     log.lock().unwrap().iter().filter(|made| made.id == AgentId(id)).cloned().collect()
 }
 
 fn crowded(spawns: Vec<AgentSpawn>) -> bool {
     let company = assemble(spawns).unwrap();
-    company.actors[0].as_ref().unwrap().peers.crowd.is_some()
+    company.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn who_flies_past_is_seen_by_both_while_it_is_near_and_the_faster_owns() {
     for (me, other, owned) in [(0, AgentId(1), false), (1, AgentId(0), true)] {
         let steps = steps_of(&log, me);
         // the flyer is 5 m/s · t − 5 m high; the skins are 0.2 m nearer
-        let gap_m = |made: &Made| (5.0 * made.from.as_secs_f64() - 5.0).abs() - 0.2;
+        let gap_m = |made: &RecordedStep| (5.0 * made.from.as_secs_f64() - 5.0).abs() - 0.2;
         for made in &steps {
             assert!(made.saw.is_empty() || made.saw == [(other, owned)], "{made:?}");
             let seen = !made.saw.is_empty();
@@ -68,7 +68,7 @@ fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
     for faults in [Faults::default(), Faults { jitter: 0.2, loss: 0.5, seed: 4 }] {
         let log = Log::default();
         // 20 m/s are 2 m in one step of the slow one; it gives until it has passed, 0.2 m beyond
-        let bullet = Dummy { gifts: 460, ..ball(-9.0, 20.0, &log) };
+        let bullet = Dummy { impulses: 460, ..ball(-9.0, 20.0, &log) };
         let mut spawns = vec![ball(0.0, 0.0, &log).at(10.0), bullet.at(1000.0)];
         spawns.iter_mut().for_each(|spawn| spawn.faults = faults);
         let mut run = lockstep(spawns);
@@ -85,7 +85,7 @@ fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
 fn a_gift_wakes_the_one_it_is_for() {
     let log = Log::default();
     let sleepy = Dummy { rest_from: Some(5), ..ball(0.0, 0.0, &log) };
-    let giver = Dummy { gifts: 260, ..ball(-2.5, 5.0, &log) };
+    let giver = Dummy { impulses: 260, ..ball(-2.5, 5.0, &log) };
     let mut run = lockstep(vec![sleepy.at(240.0), giver.at(500.0)]);
     run.wait_until(ms(300));
     assert_eq!(run.agents()[0].state(), AgentState::Resting);
@@ -116,7 +116,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
     let mut seen = |id: usize| {
         let actor = company.actors[id].as_mut().unwrap();
         actor.step(SimSpan::from_nanos(4_000_000)).unwrap();
-        let met = actor.eyes.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
+        let met = actor.observer.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
         (met.collect::<Vec<_>>(), actor.links.clone())
     };
     let ledger = Law::Ledger;
@@ -190,7 +190,7 @@ fn nothing_is_allocated_by_those_who_touch_and_those_who_are_led() {
         a < 4 && b < 4
     }
     let log = Log::default();
-    let quiet = |dummy: Dummy| Dummy { log: None, bond: Some(first_four), gifts: u64::MAX, ..dummy };
+    let quiet = |dummy: Dummy| Dummy { log: None, bond: Some(first_four), impulses: u64::MAX, ..dummy };
     let mut spawns: Vec<_> = (0..4).map(|k| quiet(ball(0.3 * f64::from(k), 0.0, &log)).at(240.0)).collect();
     spawns.extend([1000.0, 37.0].map(|hz| quiet(ball(1.3, 0.0, &log)).at(hz)));
     let mut run = lockstep(spawns);

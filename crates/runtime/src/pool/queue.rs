@@ -61,7 +61,7 @@ struct Waiter {
 
 impl Queue {
     /// Switches to `timeline`, if it is newer than the present one.
-    pub fn keep_time(&mut self, timeline: &Timeline, now: Duration) {
+    pub fn set_timeline(&mut self, timeline: &Timeline, now: Duration) {
         if timeline.piece() <= self.timeline.piece() {
             return;
         }
@@ -102,12 +102,12 @@ impl Queue {
         Some(actor)
     }
 
-    /// Moves a ready agent to another worker's queue, `thief`, with its claim to service unchanged.
-    pub fn give(&mut self, thief: &mut Self, now: Duration) -> bool {
+    /// Moves a ready agent to another worker's queue, `other`, with its claim to service unchanged.
+    pub fn give_ready(&mut self, other: &mut Self, now: Duration) -> bool {
         let Some(Place { rank, of: mut given }) = self.ready.pop() else { return false };
         // service that it lacks relative to the new queue is owed to it there
-        given.actor.owed = thief.served.since(given.served);
-        thief.make_ready(rank, given, now);
+        given.actor.owed = other.served.since(given.served);
+        other.make_ready(rank, given, now);
         true
     }
 
@@ -280,11 +280,11 @@ mod tests {
     fn a_stopped_timeline_releases_nobody_and_a_running_one_all() {
         let mut queue = queue(vec![Dummy::new(1.0).at(100.0), Dummy::new(1.0).at(10.0)]);
         let paused = Timeline::new().after(Duration::ZERO, Drive::Pause);
-        queue.keep_time(&paused, Duration::ZERO);
+        queue.set_timeline(&paused, Duration::ZERO);
         assert!(queue.take(Duration::from_secs(9)).is_none());
         assert_eq!((queue.due(), queue.frontier()), (NEVER, NEVER));
         let running = paused.after(Duration::from_secs(9), Drive::Run);
-        queue.keep_time(&running, Duration::from_secs(9));
+        queue.set_timeline(&running, Duration::from_secs(9));
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 0, "the earlier deadline");
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 1);
     }
@@ -294,7 +294,7 @@ mod tests {
         let mut mine = queue([1000.0; 4].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut theirs = Queue::default();
         let taken = take(&mut mine, Duration::ZERO).unwrap();
-        assert!(mine.give(&mut theirs, COST));
+        assert!(mine.give_ready(&mut theirs, COST));
         assert_eq!(theirs.due(), 1_000_000);
         assert_eq!((theirs.frontier(), mine.frontier()), (0, 0));
         assert_eq!(taken.served, SimTime::from_nanos(1_000_000));
@@ -309,7 +309,7 @@ mod tests {
         let late = Duration::from_secs(1);
         work(&mut theirs, Duration::ZERO, Duration::from_millis(200), |_| ());
         work(&mut mine, Duration::ZERO, Duration::from_millis(210), |_| ());
-        assert!(mine.give(&mut theirs, late));
+        assert!(mine.give_ready(&mut theirs, late));
         let mut turns = 0;
         loop {
             let actor = take(&mut theirs, late).unwrap();

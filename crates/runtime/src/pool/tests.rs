@@ -41,9 +41,9 @@ fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
 #[test]
 fn those_who_are_led_by_one_that_hangs_are_parked_with_it() {
     let log = Log::default();
-    let mate =
-        |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::mate(1.0, |_, _, _| true, &log) };
-    let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
+    let bonded =
+        |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::bonded(1.0, |_, _, _| true, &log) };
+    let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
     let run = pool(spawns, 2, SHORT);
     eventually("they are one", || run.agents()[1..3].iter().all(|a| a.led_by() == Some(AgentId(0))));
