@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn triangle_counts_are_what_they_promise() {
+    fn triangle_counts_are_as_documented() {
         for primitive in [Primitive::Ball, Primitive::Box, Primitive::Capsule, Primitive::Cylinder, Primitive::Jaw] {
             for n in 0..=metachron_core::N_MAX {
                 let mesh = primitive.mesh(n);

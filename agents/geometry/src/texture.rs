@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_are_too_few_or_none_are_no_texture() {
+    fn a_texture_with_missing_pixels_is_refused() {
         assert!(Texture::new(2, 2, vec![[0; 4]; 3], Wrap::Corners).is_none());
         assert!(Texture::new(0, 9, Vec::new(), Wrap::Corners).is_none());
     }

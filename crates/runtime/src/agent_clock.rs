@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_heard_of_is_waited_for_and_who_is_not_for_a_second() {
+    fn a_peer_with_news_is_waited_for_and_one_without_for_a_second() {
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
         for heard in 0..1000 {
             assert!(pace.wait(wall, heard / 100), "at {wall:?}");
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_near_others_is_put_off_and_lives_through_all_of_its_time() {
+    fn an_agent_near_others_is_offset_and_steps_through_all_of_its_time() {
         // a step of 4 ms that takes 10 ms: peers never see time missing, and it is never late by more than the cap
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
         for step in 0..1000 {
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn another_name_for_its_time_changes_nothing_of_when_it_is_due() {
+    fn a_change_of_clock_offset_leaves_the_due_time() {
         let (line, mut pace) = (Timeline::new(), pace(4));
         pace.begin(&line, ms(3500), true);
         let (due, dropped) = (pace.due(&line), pace.dropped());
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pace_that_is_kept_is_due_every_dt_and_drops_nothing() {
+    fn an_agent_on_time_is_due_every_dt_and_drops_nothing() {
         let line = Timeline::new();
         let mut pace = pace(4);
         for k in 0..1000 {
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn overload_is_no_death_spiral() {
+    fn overload_does_not_accumulate_lag() {
         // a step of 4 ms that takes 40 ms: own time + dropped time is always the wall's, and the lag stays capped
         let line = Timeline::new();
         let mut pace = pace(4);
@@ -432,7 +432,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn whatever_turns_cost_the_lag_stays_capped_and_every_nanosecond_is_stepped_or_dropped(
+        fn the_lag_stays_capped_and_every_nanosecond_is_stepped_or_dropped_at_any_cost(
             dt_us in 500_u64..200_000,
             costs_us in proptest::collection::vec(0_u64..500_000, 1..200),
         ) {

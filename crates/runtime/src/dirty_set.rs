@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn news_are_heard_once() {
+    fn each_mark_is_visited_once() {
         let set = DirtySet::new(130);
         let heard = || {
             let mut heard = Vec::new();
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_published_before_the_telling_is_seen_with_it() {
+    fn a_value_stored_before_a_mark_is_visible_with_it() {
         let (set, value) = (DirtySet::new(1), AtomicU64::new(0));
         let last = 100_000;
         std::thread::scope(|scope| {

@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_agent_is_left_alone() {
+    fn an_agent_without_faults_is_unchanged() {
         let none = Faults::default();
         assert_eq!(none.span(DT, AgentId(0), 7), DT);
         assert!((0..1000).all(|k| !none.loses(AgentId(0), k)));
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_that_are_none_are_not_sound() {
+    fn shares_outside_their_range_are_invalid() {
         assert!(Faults::default().is_sound());
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(!Faults { jitter: bad, ..Faults::default() }.is_sound());

@@ -56,7 +56,7 @@ fn an_agent_at_rest_wakes_for_a_command_and_for_a_touch() {
 }
 
 #[test]
-fn on_a_clock_that_stands_still_nobody_runs_ahead() {
+fn no_agent_runs_ahead_of_a_clock_that_stands_still() {
     on_every_executor(|start| {
         let clock = Arc::new(ManualClock::new());
         let spawns = vec![Dummy::new(1.0).at(250.0), Dummy::new(1.0).at(100.0)];

@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn prices_that_are_no_price_cost_nothing() {
+    fn invalid_prices_cost_nothing() {
         let machine = Machine { spikes: f64::NAN, ..Machine::default() };
         assert_eq!(machine.frame_time(f64::NAN, 0, Duration::ZERO), Duration::ZERO);
         assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn letting_go_is_a_command_too() {
+    fn a_release_is_a_command_too() {
         let mail = Mailbox::default();
         mail.send(Command::Hand(Some(pull(DVec3::X)))).unwrap();
         mail.send(Command::Hand(None)).unwrap();
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn who_finds_somebody_writing_finds_it_the_next_time() {
+    fn a_reader_that_meets_a_writer_reads_the_command_the_next_time() {
         let mail = Mailbox::default();
         mail.send(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
         let writing = mail.pending.get().unwrap().lock().unwrap();
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pull_that_is_not_finite_is_refused_at_the_door() {
+    fn a_spring_that_is_not_finite_is_refused_when_sent() {
         let mail = Mailbox::default();
         let bad = Command::Hand(Some(pull(DVec3::NAN)));
         assert!(matches!(mail.send(bad), Err(SendError::BadNumber(_))));

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_what_changed_gives_what_reading_all_gives() {
+    fn reading_changed_agents_gives_the_same_as_reading_all() {
         let (mut ours, mut plain) = (run(), run());
         let mut reader = Reader::new(ours.agents());
         let (mut visits, mut last) = (0, vec![true; 6]);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_news_allocates_nothing_and_visits_nobody() {
+    fn a_frame_without_changes_allocates_nothing_and_visits_no_agent() {
         let mut run = run();
         run.wait_until(Duration::from_millis(100));
         let mut reader = Reader::new(run.agents());

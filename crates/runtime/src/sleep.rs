@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_led_wakes_its_leader_and_the_leaders_leader() {
+    fn a_led_agent_wakes_its_leader_and_the_leaders_leader() {
         let sleep = SleepRegistry::new(3);
         sleep.follow(AgentId(2), Some(AgentId(1)));
         sleep.follow(AgentId(1), Some(ME));
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_far_behind_is_forgotten_after_a_while() {
+    fn being_far_behind_is_forgotten_after_a_while() {
         let (sleep, at) = (SleepRegistry::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
         assert!(!sleep.is_any_far_behind(SimTime::ZERO));
         sleep.note_far_behind(SimTime::ZERO);
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn strangers_are_nobody() {
+    fn unknown_agents_are_ignored() {
         let sleep = SleepRegistry::new(1);
         sleep.wake(AgentId(7));
         sleep.touch(AgentId(7), SimTime::ZERO);

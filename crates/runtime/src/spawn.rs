@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_scene_does_not_need_is_not_set_up() {
+    fn unneeded_parts_of_a_run_are_not_set_up() {
         assert_eq!(set_up(vec![ball()]), (false, 0));
         assert_eq!(set_up(vec![tube()]), (false, 0));
         assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 0));

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_summoned_is_found_once() {
+    fn a_notified_agent_is_visited_once() {
         let wakeup = WorkerWakeup::new(200, 1);
         assert!(answered(&wakeup).is_empty());
         [199, 3, 64, 3, 0].iter().for_each(|id| wakeup.notify(AgentId(*id)));
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_sleeps_through_a_summons() {
+    fn no_worker_sleeps_through_a_notification() {
         let wakeup = WorkerWakeup::new(1, 1);
         let (rings, done) = (20_000, AtomicBool::new(false));
         let answered = AtomicU64::new(0);

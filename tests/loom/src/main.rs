@@ -58,7 +58,7 @@ fn main() {
     check("a reader sees whole states that only rise, and the newest that was published before", slot_is_read_whole);
     check("a state that a reader keeps is never written to", slot_keeps_what_is_held);
     check("who takes the news of a state sees it, and no news is lost", news_come_after_the_state);
-    check("nobody sleeps through a summons", nobody_sleeps_through_a_summons);
+    check("nobody sleeps through a summons", no_worker_sleeps_through_a_notification);
     check("words are read whole or not at all, and newer ones after those that were seen", words_are_read_whole);
     check("who goes to rest is summoned by whoever wakes it meanwhile", a_wake_meets_a_rest);
     check("who goes to rest is summoned by whoever touches it meanwhile", a_touch_meets_a_rest);
@@ -138,7 +138,7 @@ fn news_come_after_the_state() {
     assert_eq!(seen, 2);
 }
 
-fn nobody_sleeps_through_a_summons() {
+fn no_worker_sleeps_through_a_notification() {
     let wakeup = Arc::new(WorkerWakeup::new(1, 1));
     let worker = {
         let wakeup = Arc::clone(&wakeup);

@@ -81,7 +81,7 @@ fn shaken(shape: SoftShape) -> SoftBody {
 }
 
 #[test]
-fn what_was_never_touched_stays_as_it_was() {
+fn a_body_at_rest_without_loads_stays_as_it_was() {
     for shape in all() {
         let mut body = SoftBody::new(SoftSpec { rotation: DQuat::from_rotation_y(0.4), ..spec(shape) }).unwrap();
         let before = state(&body);
@@ -160,7 +160,7 @@ fn forces_are_minus_the_slope_of_the_energy() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_limit() {
+fn an_invalid_spec_is_refused_with_its_limit() {
     let fails = |spec: SoftSpec| SoftBody::new(spec).err().expect("must be refused").to_string();
     let rubber = SoftMatter { poisson: 0.5, ..MATTER };
     assert!(fails(SoftSpec { matter: rubber, ..spec(solid()) }).contains("0.49"));

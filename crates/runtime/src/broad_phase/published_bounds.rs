@@ -124,7 +124,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
-    fn what_is_read_holds_what_was_written() {
+    fn a_box_read_contains_the_box_written() {
         let published = PublishedBounds::default();
         assert_eq!(published.read(), ReadBounds::Unpublished);
         let third = DVec3::new(1.0 / 3.0, -1.0 / 3.0, 1e-9);

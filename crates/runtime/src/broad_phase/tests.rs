@@ -85,7 +85,7 @@ fn flyer() -> impl Strategy<Value = Flyer> {
 }
 
 /// Lets `flyers` fly for a while, each looking at the others as one does, and looks at all pairs beside it.
-fn nobody_is_missed(mut flyers: Vec<Flyer>) {
+fn no_near_agent_is_missed(mut flyers: Vec<Flyer>) {
     let mut seen = 0;
     fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
         let me = &all[who];
@@ -102,21 +102,21 @@ fn nobody_is_missed(mut flyers: Vec<Flyer>) {
 
 proptest! {
     #[test]
-    fn nobody_who_could_be_touched_within_a_step_is_missed(flyers in prop::collection::vec(flyer(), 2..9)) {
-        nobody_is_missed(flyers);
+    fn every_agent_that_could_touch_within_a_step_is_listed(flyers in prop::collection::vec(flyer(), 2..9)) {
+        no_near_agent_is_missed(flyers);
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
     #[test]
-    fn nobody_is_missed_among_more_than_one_remembers(flyers in prop::collection::vec(flyer(), 50..70)) {
-        nobody_is_missed(flyers);
+    fn every_near_agent_is_listed_among_more_than_the_list_holds(flyers in prop::collection::vec(flyer(), 50..70)) {
+        no_near_agent_is_missed(flyers);
     }
 }
 
 #[test]
-fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
+fn memory_per_agent_does_not_grow_with_the_number_of_agents() {
     let dt = SimSpan::from_nanos(4_000_000);
     let held = |count: u32| {
         let broad_phase = BroadPhase::new(count as usize);
@@ -143,7 +143,7 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
 }
 
 #[test]
-fn a_longer_step_is_looked_ahead_for_at_once() {
+fn a_longer_step_is_checked_ahead_at_once() {
     let broad_phase = BroadPhase::new(2);
     let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
     let mut sight = NeighbourList::new(AgentId(0));
@@ -158,7 +158,7 @@ fn a_longer_step_is_looked_ahead_for_at_once() {
 }
 
 #[test]
-fn who_is_far_is_never_looked_at_and_who_comes_is() {
+fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
     let count = 1000;
     let broad_phase = BroadPhase::new(count);
@@ -192,7 +192,7 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
 }
 
 #[test]
-fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
+fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
     let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
     let broad_phase = BroadPhase::new(count);
     let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
@@ -221,7 +221,7 @@ fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
 }
 
 #[test]
-fn a_log_that_has_run_over_means_everybody() {
+fn an_overrun_log_makes_all_agents_be_checked() {
     let broad_phase = BroadPhase::new(3);
     let mut sight = NeighbourList::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
@@ -240,7 +240,7 @@ fn a_log_that_has_run_over_means_everybody() {
 }
 
 #[test]
-fn a_call_is_heard_once_by_the_one_it_is_for() {
+fn a_reported_impulse_is_delivered_once() {
     let broad_phase = BroadPhase::new(200);
     [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.report_impulse(AgentId(7), AgentId(from)));
     let heard = |id| {
@@ -254,7 +254,7 @@ fn a_call_is_heard_once_by_the_one_it_is_for() {
 }
 
 #[test]
-fn what_is_said_of_a_speed_is_never_too_little_and_seldom_changes() {
+fn a_published_speed_is_never_too_small_and_seldom_changes() {
     let (mut published, mut changes) = (0.0, 0);
     // up to 20 m/s and back in small steps
     for k in 0..4000_u32 {

@@ -184,7 +184,7 @@ fn a_touched_agent_wakes_and_stays_awake_while_it_is_touched() {
 }
 
 #[test]
-fn a_hand_pulls_until_it_lets_go_and_keeps_the_agent_awake() {
+fn a_user_spring_pulls_until_its_release_and_keeps_the_agent_awake() {
     let sleepy = Dummy { rest_from: Some(1), ..Dummy::new(100.0) };
     let mut run = lockstep(vec![sleepy.at(250.0)]);
     run.wait_until(ms(100));
@@ -208,7 +208,7 @@ fn a_hand_pulls_until_it_lets_go_and_keeps_the_agent_awake() {
 }
 
 #[test]
-fn a_command_to_nobody_is_an_error() {
+fn a_command_to_an_unknown_agent_is_an_error() {
     let run = lockstep(vec![Dummy::new(1.0).at(60.0)]);
     assert_eq!(run.send(AgentId(9), Command::Wake), Err(SendError::NoAgent(AgentId(9))));
 }
@@ -288,7 +288,7 @@ fn a_governors_demand_is_obeyed_within_the_range() {
 }
 
 #[test]
-fn an_agent_may_step_shorter_than_is_wanted_and_says_so() {
+fn an_agent_may_step_shorter_than_requested_and_reports_it() {
     let dummy = Dummy { short: Some((40, SimSpan::from_nanos(2_000_000))), ..Dummy::new(100.0) };
     let mut run = lockstep(vec![dummy.at(100.0)]);
     run.wait_until(ms(70));
@@ -325,7 +325,7 @@ fn a_governor_cannot_lengthen_the_steps_of_an_agent_that_wants_short_ones() {
 }
 
 #[test]
-fn what_cannot_run_is_refused_with_its_name() {
+fn an_invalid_agent_is_refused_with_its_name() {
     let refuse = |change: fn(&mut AgentSpawn)| {
         let mut spawn = Dummy::new(1.0).at(60.0);
         change(&mut spawn);

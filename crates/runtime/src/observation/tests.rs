@@ -33,7 +33,7 @@ fn crowded(spawns: Vec<AgentSpawn>) -> bool {
 }
 
 #[test]
-fn a_run_in_which_nobody_could_touch_has_no_crowd() {
+fn a_run_without_possible_contact_has_no_broad_phase() {
     let log = Log::default();
     let two = || vec![ball(0.0, 0.0, &log).at(240.0), ball(0.0, 0.0, &log).at(240.0)];
     assert!(crowded(two()));
@@ -44,7 +44,7 @@ fn a_run_in_which_nobody_could_touch_has_no_crowd() {
 }
 
 #[test]
-fn who_flies_past_is_seen_by_both_while_it_is_near_and_the_faster_owns() {
+fn passing_agents_see_each_other_while_near_and_the_faster_owns() {
     let log = Log::default();
     let mut run = lockstep(vec![ball(0.0, 0.0, &log).at(240.0), ball(-5.0, 5.0, &log).at(1000.0)]);
     run.wait_until(ms(2000));
@@ -64,7 +64,7 @@ fn who_flies_past_is_seen_by_both_while_it_is_near_and_the_faster_owns() {
 }
 
 #[test]
-fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
+fn an_impulse_of_a_bullet_reaches_a_slow_agent_it_has_long_passed() {
     for faults in [Faults::default(), Faults { jitter: 0.2, loss: 0.5, seed: 4 }] {
         let log = Log::default();
         // 20 m/s are 2 m in one step of the slow one; it gives until it has passed, 0.2 m beyond
@@ -82,7 +82,7 @@ fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
 }
 
 #[test]
-fn a_gift_wakes_the_one_it_is_for() {
+fn an_impulse_wakes_its_receiver() {
     let log = Log::default();
     let sleepy = Dummy { rest_from: Some(5), ..ball(0.0, 0.0, &log) };
     let giver = Dummy { impulses: 260, ..ball(-2.5, 5.0, &log) };
@@ -133,7 +133,7 @@ fn spans(log: &Log) -> Vec<u64> {
 }
 
 #[test]
-fn jitter_spreads_the_steps_of_every_executor_alike() {
+fn jitter_spreads_the_steps_equally_on_every_executor() {
     let faults = Faults { jitter: 0.2, loss: 0.3, seed: 11 };
     let disturbed = |log: &Log| AgentSpawn { faults, ..ball(0.0, 0.0, log).at(250.0) };
     let virtually = Log::default();
@@ -154,7 +154,7 @@ fn jitter_spreads_the_steps_of_every_executor_alike() {
 }
 
 #[test]
-fn a_lost_state_is_never_seen_and_the_last_one_always() {
+fn a_lost_state_is_never_visible_and_the_last_one_always() {
     let log = Log::default();
     let mut spawn = ball(0.0, 0.0, &log).at(250.0);
     spawn.faults = Faults { jitter: 0.0, loss: 0.5, seed: 2 };
@@ -172,7 +172,7 @@ fn a_lost_state_is_never_seen_and_the_last_one_always() {
 }
 
 #[test]
-fn faults_that_are_none_and_others_that_do_not_exist_are_refused() {
+fn invalid_faults_and_unknown_peers_are_refused() {
     let refuse = |change: fn(&mut AgentSpawn)| {
         let mut spawn = Dummy::new(1.0).at(60.0);
         change(&mut spawn);
@@ -185,7 +185,7 @@ fn faults_that_are_none_and_others_that_do_not_exist_are_refused() {
 }
 
 #[test]
-fn nothing_is_allocated_by_those_who_touch_and_those_who_are_led() {
+fn touching_and_led_agents_allocate_nothing() {
     fn first_four(a: u32, b: u32, _: SimTime) -> bool {
         a < 4 && b < 4
     }

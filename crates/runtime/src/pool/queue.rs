@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn with_room_for_all_everybody_keeps_its_rate_and_short_deadlines_go_first() {
+    fn without_overload_every_agent_keeps_its_rate_and_short_deadlines_go_first() {
         // 100 + 50 + 4 · 10 turns of 1 ms a second: a load of 0.19
         let rates = [100.0, 50.0, 10.0, 10.0, 10.0, 10.0];
         let mut queue = queue(rates.map(|hz| Dummy::new(1.0).at(hz)).into());
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_away_saves_nothing_up() {
+    fn an_absent_agent_accumulates_no_claim() {
         let mut queue = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
         let away = take(&mut queue, Duration::ZERO).unwrap();
         let (came_back, end) = (Duration::from_secs(4), Duration::from_secs(6));
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stopped_timeline_releases_nobody_and_a_running_one_all() {
+    fn a_stopped_timeline_releases_no_agent_and_a_running_one_all() {
         let mut queue = queue(vec![Dummy::new(1.0).at(100.0), Dummy::new(1.0).at(10.0)]);
         let paused = Timeline::new().after(Duration::ZERO, Drive::Pause);
         queue.set_timeline(&paused, Duration::ZERO);
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_served_worse_makes_it_up_where_it_is_taken_to() {
+    fn an_agent_served_worse_is_compensated_by_its_new_worker() {
         // two agents with steps of 1 ms in a queue served up to 100 ms, and one from a queue served up to 70 ms
         let mut theirs = queue([1000.0; 2].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut mine = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());

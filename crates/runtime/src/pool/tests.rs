@@ -18,7 +18,7 @@ fn parked(agent: &AgentHandle) -> bool {
 }
 
 #[test]
-fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
+fn a_step_that_never_returns_parks_its_agent_only() {
     for workers in [1, 3] {
         let hung = |step| Dummy { fault: Some((step, Fault::Hang)), ..Dummy::new(1.0) };
         let mut spawns: Vec<_> = (0..20).map(|_| Dummy::new(1.0).at(200.0)).collect();
@@ -39,7 +39,7 @@ fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
 }
 
 #[test]
-fn those_who_are_led_by_one_that_hangs_are_parked_with_it() {
+fn agents_led_by_a_hung_agent_are_parked_with_it() {
     let log = Log::default();
     let bonded =
         |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::bonded(1.0, |_, _, _| true, &log) };

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_of_sleepers_has_nothing_to_wake_for() {
+    fn a_worker_with_only_sleeping_agents_sleeps_without_a_timeout() {
         let clock = Arc::new(ManualClock::new());
         let sleepy = |_| Dummy { rest_from: Some(1), ..Dummy::new(1.0) }.at(100.0);
         let mut worker = worker((0..1000).map(sleepy).collect(), &clock);

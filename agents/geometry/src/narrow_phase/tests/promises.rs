@@ -63,7 +63,7 @@ proptest! {
     }
 
     #[test]
-    fn names_outlast_a_trembling(p in vector(0.03), r in turn(), s in turn(), shift in vector(1e-7)) {
+    fn contact_keys_survive_small_motions(p in vector(0.03), r in turn(), s in turn(), shift in vector(1e-7)) {
         let (u, v, w) = (curved((p, r)), curved((DVec3::ZERO, s)), curved((p + shift, r)));
         let cast = cast();
         for first in &cast {
@@ -111,7 +111,7 @@ fn gaps_and_normals_change_smoothly_along_a_motion() {
 }
 
 #[test]
-fn coincident_forms_still_have_normals() {
+fn coincident_shapes_still_have_normals() {
     let cast = cast();
     let v = curved((DVec3::ZERO, DQuat::IDENTITY));
     let stuck = [DVec3::ZERO; 8];

@@ -26,7 +26,7 @@ fn said_and_true(
 }
 
 #[test]
-fn the_error_of_sliding_is_told_to_a_tenth() {
+fn the_error_of_sliding_is_estimated_to_a_tenth() {
     for dt in [1e-3, 2e-3, 4e-3, 1e-2, 2e-2] {
         let sliding = RigidSpec { velocity: DVec3::X * 4.0, obstacles: [floor(0.5)].into(), ..cube(0.1, UP * 0.1) };
         let mut body = RigidBody::new(sliding).unwrap();
@@ -41,7 +41,7 @@ fn the_error_of_sliding_is_told_to_a_tenth() {
 }
 
 #[test]
-fn the_error_of_a_spring_is_told_to_a_fifth() {
+fn the_error_of_a_spring_is_estimated_to_a_fifth() {
     for (dt, stiffness) in [(1e-3, 5.0), (4e-3, 5.0), (2e-2, 5.0), (1e-3, 50.0), (4e-3, 50.0)] {
         let free = RigidSpec { gravity: DVec3::ZERO, ..ball(1.0, 0.0) };
         let mut body = RigidBody::new(RigidSpec { obstacles: [].into(), ..free }).unwrap();

@@ -31,7 +31,7 @@ fn the_error_of_falling_is_that_of_the_closed_form() {
 }
 
 #[test]
-fn the_error_of_a_swing_is_told_within_a_factor_of_three_or_too_small_where_it_turns_round_at_once() {
+fn the_error_of_a_swing_is_estimated_within_a_factor_of_three_but_for_immediate_reversals() {
     // a solid turns round within the tenth of a second: what two steps say of that is too little
     let ends = vec![Side::Left, Side::Right];
     let cases = [
@@ -61,7 +61,7 @@ fn the_error_of_a_swing_is_told_within_a_factor_of_three_or_too_small_where_it_t
 }
 
 #[test]
-fn of_many_steps_a_twenty_fourth_is_made_again() {
+fn one_step_in_twenty_four_is_repeated_for_its_error() {
     for shape in all() {
         let mut body = shaken(shape);
         let (mut work, mut plain) = (0.0, 0.0);
@@ -75,7 +75,7 @@ fn of_many_steps_a_twenty_fourth_is_made_again() {
 }
 
 #[test]
-fn the_error_in_space_of_a_hanging_rope_is_told_within_a_factor_of_three() {
+fn the_spatial_error_of_a_hanging_rope_is_estimated_within_a_factor_of_three() {
     for (span, segments) in [(0.5, 10), (0.5, 20), (0.5, 40), (0.8, 10), (0.8, 20), (0.8, 40)] {
         let low = DVec3::new(0.5 * span, 0.0, -0.5 * libm::sqrt(1.0 - span * span));
         let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, low, DVec3::X * span], radius_m: 0.005, segments };

@@ -67,7 +67,7 @@ proptest! {
     }
 
     #[test]
-    fn what_stands_beside_is_pushed_aside_alone(y in -0.05_f64..0.05, z in -0.05_f64..0.05, gap_m in -3e-4_f64..3e-4) {
+    fn a_body_beside_another_is_pushed_sideways_only(y in -0.05_f64..0.05, z in -0.05_f64..0.05, gap_m in -3e-4_f64..3e-4) {
         let shape = |x: f64, y: f64, z: f64| slab(DVec3::splat(0.1), [3, 3, 3], (DVec3::new(x, y, z), 0.0));
         agree(&met(&shape(0.1 + gap_m, y, z), &shape(0.0, 0.0, 0.0)), DVec3::X, gap_m)?;
     }
