@@ -74,7 +74,7 @@ impl Generator {
 /// Equal arguments give bit-identical results.
 #[must_use]
 pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
-    let mut sheet = Sheet::default();
+    let mut sheet = MeshBuilder::default();
     match kind {
         Generator::Sphere => sheet.ball(side(triangles, 12), |way| way),
         Generator::Blob => sheet.ball(side(triangles, 12), |way| way * (1.0 + 0.2 * layers(seed, way * 1.5, 2))),
@@ -97,12 +97,12 @@ fn side(triangles: u32, per: u32) -> u32 {
 }
 
 #[derive(Default)]
-struct Sheet {
+struct MeshBuilder {
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Sheet {
+impl MeshBuilder {
     /// A grid of `columns` × `rows` cells, whose corners `place` gives for (0 … columns, 0 … rows).
     fn grid(&mut self, columns: u32, rows: u32, place: impl Fn(u32, u32) -> DVec3) {
         let first = self.points.len() as u32;

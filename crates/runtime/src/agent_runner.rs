@@ -156,10 +156,10 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
         self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
         let neighbours = self.observer.neighbours();
-        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
         let looked = contained(|| {
-            agent.look(dt, &around);
+            agent.look(dt, &context);
             Ok(())
         });
         match looked {
@@ -309,9 +309,9 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt: wanted };
         self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
         let (me, neighbours) = (self.shared.id, self.observer.neighbours());
-        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
-        let dt = self.agent.longest_step(wanted, &around).min(wanted);
-        let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
+        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let dt = self.agent.longest_step(wanted, &context).min(wanted);
+        let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
         Ok(StepOutcome { report, dt })
     }
 

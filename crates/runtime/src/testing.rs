@@ -162,25 +162,25 @@ impl Dummy {
         AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
     }
 
-    fn write_down(&self, to: SimTime, around: &StepContext<'_>) {
+    fn write_down(&self, to: SimTime, context: &StepContext<'_>) {
         let Some(log) = &self.log else { return };
         let thread = thread::current().name().unwrap_or_default().to_owned();
-        let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
-        log.lock().unwrap().push(RecordedStep { id: around.me, from: around.time, to, thread, saw });
+        let saw = context.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
+        log.lock().unwrap().push(RecordedStep { id: context.me, from: context.time, to, thread, saw });
     }
 
-    fn exchange_impulses(&mut self, around: &StepContext<'_>, dt_s: f64) {
+    fn exchange_impulses(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let taken = &mut self.taken;
-        self.exchange.open(around);
-        self.exchange.take(around, around.time, |_, _, impulse, _| *taken += impulse.linear.x);
+        self.exchange.open(context);
+        self.exchange.take(context, context.time, |_, _, impulse, _| *taken += impulse.linear.x);
         if self.steps <= self.impulses {
-            for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
+            for other in context.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
                 self.exchange.give(other.id, Site::Whole, 0.0, push);
                 self.given += 1.0;
             }
         }
-        self.exchange.close(around, dt_s);
+        self.exchange.close(context, dt_s);
     }
 }
 
@@ -204,7 +204,7 @@ impl Agent for Dummy {
         "synthetic"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = dt.as_secs_f64();
         match self.fault.filter(|(step, _)| *step == self.steps + 1) {
             Some((_, Fault::NotFinite)) => self.x = f64::NAN,
@@ -213,7 +213,7 @@ impl Agent for Dummy {
             }
             Some((_, Fault::Panic)) => panic!("on demand"),
             Some((_, Fault::Hang)) => {
-                self.write_down(around.time, around);
+                self.write_down(context.time, context);
                 loop {
                     thread::park();
                 }
@@ -221,18 +221,18 @@ impl Agent for Dummy {
             None => {}
         }
         self.steps += 1;
-        let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
-        let pulled = around.pulls().map(|p| p.target.x);
+        let met = context.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
+        let pulled = context.pulls().map(|p| p.target.x);
         self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
-        self.exchange_impulses(around, dt_s);
-        (self.me, self.time) = (around.me, around.time + dt);
+        self.exchange_impulses(context, dt_s);
+        (self.me, self.time) = (context.me, context.time + dt);
         self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
-        self.write_down(self.time, around);
+        self.write_down(self.time, context);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
     }
 
-    fn longest_step(&self, dt: SimSpan, _around: &StepContext<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, _context: &StepContext<'_>) -> SimSpan {
         let shorter = self.short.filter(|(until, _)| self.steps < *until);
         shorter.map_or(dt, |(_, span)| dt.min(span))
     }
@@ -284,19 +284,19 @@ impl Agent for Dummy {
     fn lead(
         &mut self,
         dt: SimSpan,
-        around: &StepContext<'_>,
+        context: &StepContext<'_>,
         others: &mut [Companion<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
-        let mut report = self.step(dt, around)?;
+        let mut report = self.step(dt, context)?;
         for other in others.iter_mut() {
             let one = other.agent.step(dt, &other.around)?;
             report.work += one.work;
             report.at_rest &= one.at_rest;
         }
-        let ids = |k: usize| if k == 0 { around.me } else { others[k - 1].id };
-        groups(bond, ids, others.len() + 1, around.time + dt, apart);
+        let ids = |k: usize| if k == 0 { context.me } else { others[k - 1].id };
+        groups(bond, ids, others.len() + 1, context.time + dt, apart);
         Ok(report)
     }
 }

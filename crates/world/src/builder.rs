@@ -332,7 +332,7 @@ impl SceneBuilder {
             camera: None,
             machine: Machine::default(),
             agents: agents?,
-            obstacle_looks: obstacles.iter().map(|_| LOOK).collect(),
+            obstacle_looks: obstacles.iter().map(|_| DEFAULT_LOOK).collect(),
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
@@ -349,7 +349,7 @@ impl SceneBuilder {
 }
 
 /// How parts look that do not say it.
-const LOOK: Look =
+const DEFAULT_LOOK: Look =
     Look { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::PerPixel };
 
 fn member(
@@ -387,7 +387,7 @@ fn member(
         start,
         picture,
         links: Vec::new(),
-        look: LOOK,
+        look: DEFAULT_LOOK,
         faults: Faults::default(),
     })
 }

@@ -75,7 +75,7 @@ enum State {
 }
 
 /// How often a real-time world looks whether all agents have arrived.
-const LOOK_EVERY: Duration = Duration::from_micros(500);
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -156,8 +156,8 @@ impl World {
         self.drive(Drive::Run);
         while !self.has_stopped() {
             let now = self.now();
-            self.wait_until(now + LOOK_EVERY);
-            if self.time() >= end && self.shared.agents.iter().all(|agent| has_lived_to(agent, end)) {
+            self.wait_until(now + POLL_INTERVAL);
+            if self.time() >= end && self.shared.agents.iter().all(|agent| has_reached(agent, end)) {
                 return self.drive(Drive::Pause);
             }
         }
@@ -250,7 +250,7 @@ impl World {
 }
 
 /// Whether nothing more is to be waited for: the agent has reached `end`, rests, or has failed.
-fn has_lived_to(agent: &AgentHandle, end: SimTime) -> bool {
+fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
     let newest = agent.latest();
     newest.at_rest || !matches!(agent.state(), AgentState::Running) || newest.moment() >= end
 }

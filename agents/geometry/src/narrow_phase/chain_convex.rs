@@ -21,18 +21,18 @@ const LOWEST: u64 = 8;
 /// Every place within `reach_m`, with normals from the block towards the strand.
 pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
     let Some(field) = block.field else { return };
-    let meeting = Meeting { strand, block, field, reach_m };
+    let pair = StrandOnBlock { strand, block, field, reach_m };
     let mut last = None;
     for span in 0..strand.spans() {
         if block.misses(strand.ends(span), reach_m) {
             continue;
         }
-        let left = last.filter(|&(node, _)| node == span).map_or_else(|| meeting.node(span, into), |(_, near)| near);
+        let left = last.filter(|&(node, _)| node == span).map_or_else(|| pair.node(span, into), |(_, near)| near);
         if strand.count() > 1 {
-            let right = meeting.node(span + 1, into);
+            let right = pair.node(span + 1, into);
             last = Some((span + 1, right));
             if field.feels_spans() {
-                meeting.span(span, [left, right], into);
+                pair.span(span, [left, right], into);
             }
         }
     }
@@ -56,14 +56,14 @@ pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Optio
 }
 
 /// A strand and a block that may touch.
-struct Meeting<'a> {
+struct StrandOnBlock<'a> {
     strand: &'a Strand<'a>,
     block: &'a Block<'a>,
     field: &'a Field,
     reach_m: f64,
 }
 
-impl Meeting<'_> {
+impl StrandOnBlock<'_> {
     /// Adds the places of a node; returns the nearest.
     fn node(&self, node: usize, into: &mut Vec<Touch>) -> Option<signed_distance::Touch> {
         let ball = self.block.inward(self.strand.ball(node));
@@ -75,7 +75,7 @@ impl Meeting<'_> {
         }
         for (place, touch) in (0..).zip(places.iter()) {
             let key = (node as u64) << 28 | place;
-            self.tell(key, self.strand.node(node), touch, into);
+            self.report(key, self.strand.node(node), touch, into);
         }
         places.iter().next()
     }
@@ -97,7 +97,7 @@ impl Meeting<'_> {
         });
         let key = (span as u64) << 28 | LOWEST;
         if let Some((share, touch)) = lowest {
-            self.tell(key, StrandPoint { span, share }, touch, into);
+            self.report(key, StrandPoint { span, share }, touch, into);
         }
         let end_gap = |side: usize| near[side].map_or(f64::INFINITY, |near| near.distance_m - ends[side].radius_m);
         let (from, least_m) = match lowest {
@@ -107,7 +107,7 @@ impl Meeting<'_> {
         };
         for (place, to) in [(1, 0.0), (2, 1.0)] {
             if let Some((share, touch)) = self.edge(ends, from, to, least_m) {
-                self.tell(key + place, StrandPoint { span, share }, touch, into);
+                self.report(key + place, StrandPoint { span, share }, touch, into);
             }
         }
     }
@@ -143,7 +143,7 @@ impl Meeting<'_> {
     }
 
     /// Adds a place, unless it is too far.
-    fn tell(&self, key: u64, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+    fn report(&self, key: u64, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
         let StrandPoint { span, share } = at;
         let [a, b] = self.strand.ends(span);
         let ball = if share == 1.0 { b } else { a.toward(b, share) };

@@ -2,7 +2,7 @@
 //!
 //! In: a form and its place. Out: at most [`PARTS`] pieces with bounds. Never here: contacts.
 
-use super::shape_cache::{Known, PARTS};
+use super::shape_cache::{PARTS, ShapeCache};
 use super::skin;
 use crate::Solid;
 use crate::capsule_chain::foot;
@@ -73,7 +73,7 @@ pub(super) struct Block<'a> {
 
 impl<'a> Pieces<'a> {
     /// Decomposes a form.
-    pub fn of(placed: &PlacedShape<'a>, known: &'a Known) -> Self {
+    pub fn of(placed: &PlacedShape<'a>, known: &'a ShapeCache) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
             (ShapeKind::Chain { .. }, ShapePose::Chain { positions, radii_m }) => {

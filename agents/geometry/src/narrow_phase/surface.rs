@@ -11,13 +11,13 @@ mod surface_convex;
 mod surface_surface;
 
 use super::primitives::{Piece, Strand, StrandPoint, Surface};
-use super::voronoi_regions::{LEAN_SHARE, Ridge};
+use super::voronoi_regions::{Feature, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
 use crate::{Aabb, Place, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
-use surface_surface::Skins;
+use surface_surface::SkinPair;
 
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
@@ -36,12 +36,12 @@ pub(super) struct SurfaceScratch {
 
 /// A point of a surface: three vertices with shares.
 #[derive(Clone, Copy)]
-struct Spot {
+struct BarycentricPoint {
     vertices: [u32; 3],
     shares: [f64; 3],
 }
 
-impl Spot {
+impl BarycentricPoint {
     fn vertex(vertex: u32) -> Self {
         Self { vertices: [vertex; 3], shares: [1.0, 0.0, 0.0] }
     }
@@ -65,13 +65,13 @@ impl Spot {
 /// A spot and its position, metres.
 #[derive(Clone, Copy)]
 struct SkinPoint {
-    spot: Spot,
+    spot: BarycentricPoint,
     position: DVec3,
 }
 
 impl SkinPoint {
     fn vertex(vertex: u32, position: DVec3) -> Self {
-        Self { spot: Spot::vertex(vertex), position }
+        Self { spot: BarycentricPoint::vertex(vertex), position }
     }
 }
 
@@ -86,11 +86,14 @@ struct Edge {
 impl Edge {
     /// The point at this share of the way from the first end to the second.
     fn at(&self, share: f64) -> SkinPoint {
-        SkinPoint { spot: Spot::edge(self.vertices, share), position: self.ends[0].lerp(self.ends[1], share) }
+        SkinPoint {
+            spot: BarycentricPoint::edge(self.vertices, share),
+            position: self.ends[0].lerp(self.ends[1], share),
+        }
     }
 
-    fn ridge(&self) -> Ridge {
-        Ridge::Edge(self.number, self.ends)
+    fn feature(&self) -> Feature {
+        Feature::Edge(self.number, self.ends)
     }
 }
 
@@ -108,7 +111,7 @@ impl Triangle {
         let position = near_triangle(point, self.corners);
         let shares = shares(position, self.corners)?;
         let deep = shares.into_iter().all(|share| share > LEAN_SHARE);
-        deep.then_some(SkinPoint { spot: Spot { vertices: self.vertices, shares }, position })
+        deep.then_some(SkinPoint { spot: BarycentricPoint { vertices: self.vertices, shares }, position })
     }
 }
 
@@ -164,27 +167,27 @@ impl SurfaceScratch {
     pub(super) fn touches(&mut self, surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64, into: &mut Vec<Touch>) {
         let within_m = reach_m + surface.form.radius_m;
         let region = other.bounds().grown(within_m);
-        learn_normals(surface, &mut self.normals);
-        let meeting = Meeting { surface, reach_m, region, normals: &self.normals };
+        compute_normals(surface, &mut self.normals);
+        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals };
         match other {
-            Piece::Strand(strand) => meeting.strand(strand, into),
+            Piece::Strand(strand) => query.strand(strand, into),
             Piece::Block(block) => {
                 if let Some(field) = block.field {
-                    meeting.block(block, field, into);
+                    query.block(block, field, into);
                 }
             }
             Piece::Surface(there) => {
-                learn_normals(there, &mut self.others);
+                compute_normals(there, &mut self.others);
                 let region = surface.bounds.grown(within_m + there.form.radius_m);
-                let back = Meeting { surface: there, reach_m, region, normals: &self.others };
-                Skins::new(&meeting, &back).touches(into);
+                let back = SurfaceQuery { surface: there, reach_m, region, normals: &self.others };
+                SkinPair::new(&query, &back).touches(into);
             }
         }
     }
 }
 
 /// Computes the normals of the vertices of a closed surface; none for an open one.
-fn learn_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
+fn compute_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
     into.clear();
     if !surface.form.closed {
         return;
@@ -207,7 +210,7 @@ pub(super) fn gap(surface: &Surface<'_>, other: &Piece<'_>) -> (DVec3, f64) {
 }
 
 /// A surface and another piece that may touch.
-struct Meeting<'a> {
+struct SurfaceQuery<'a> {
     surface: &'a Surface<'a>,
     reach_m: f64,
     /// Nothing outside this box is near.
@@ -215,16 +218,16 @@ struct Meeting<'a> {
     normals: &'a [DVec3],
 }
 
-impl Meeting<'_> {
+impl SurfaceQuery<'_> {
     fn strand(&self, strand: &Strand<'_>, into: &mut Vec<Touch>) {
         for (vertex, at) in self.surface.vertices_in(self.region) {
             let nearest = nearest_on(strand, at);
             let core = ball_at(strand, nearest).centre;
             // a point behind the skin of a closed body is pushed out by its triangles
             let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
-            if outside && Ridge::Vertex(vertex).is_nearest(self.surface, core - at) {
+            if outside && Feature::Vertex(vertex).is_nearest(self.surface, core - at) {
                 let point = SkinPoint::vertex(vertex, at);
-                into.extend(self.tell(KINDS[0] | u64::from(vertex), point, strand, nearest));
+                into.extend(self.strand_contact(KINDS[0] | u64::from(vertex), point, strand, nearest));
             }
         }
         for edge in self.surface.edges_in(self.region) {
@@ -240,9 +243,9 @@ impl Meeting<'_> {
                     .vertices
                     .iter()
                     .all(|vertex| self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0));
-                if outside && edge.ridge().is_nearest(self.surface, way) {
+                if outside && edge.feature().is_nearest(self.surface, way) {
                     let key = KINDS[1] | edge.number << PART_SHIFT | span as u64;
-                    into.extend(self.tell(key, point, strand, here));
+                    into.extend(self.strand_contact(key, point, strand, here));
                 }
             }
         }
@@ -250,13 +253,13 @@ impl Meeting<'_> {
             for node in 0..strand.count() {
                 let Some(point) = triangle.inside(strand.ball(node).centre) else { continue };
                 let key = KINDS[2] | triangle.number << PART_SHIFT | node as u64;
-                into.extend(self.tell(key, point, strand, strand.node(node)));
+                into.extend(self.strand_contact(key, point, strand, strand.node(node)));
             }
         }
     }
 
     /// The contact between a point of the skin and one of a strand, unless they are too far.
-    fn tell(&self, key: u64, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
+    fn strand_contact(&self, key: u64, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
         let SkinPoint { spot, position: point } = here;
         let ball = ball_at(strand, there);
         let way = point - ball.centre;
@@ -291,7 +294,7 @@ impl Meeting<'_> {
     }
 
     /// The normal of the triangle of a spot; `None` for a vertex or an edge.
-    fn out_of(&self, spot: Spot) -> Option<DVec3> {
+    fn out_of(&self, spot: BarycentricPoint) -> Option<DVec3> {
         let [a, b, c] = self.surface.corners(spot.vertices);
         (b - a).cross(c - a).try_normalize()
     }

@@ -20,7 +20,7 @@ const LENGTH_SHARE: f64 = 1e-4;
 
 /// A queued collapse: the bits of its cost (non-negative, so they sort like it), the position removed, the one it moves to, the evaluation
 /// count.
-type Waiting = Reverse<(u64, u32, u32, u32)>;
+type QueuedCollapse = Reverse<(u64, u32, u32, u32)>;
 
 struct Builder {
     surface: Surface,
@@ -37,7 +37,7 @@ struct Builder {
     gone: Vec<u32>,
     /// Positions in the order of removal.
     order: Vec<u32>,
-    heap: BinaryHeap<Waiting>,
+    heap: BinaryHeap<QueuedCollapse>,
     /// Evaluations of each position: a queued collapse of an earlier evaluation is void.
     looks: Vec<u32>,
     neighbours: Vec<(u32, u8)>,
@@ -80,7 +80,7 @@ impl Builder {
 
     /// Collapses until no valid collapse is left.
     fn collapse_all(&mut self, turn: f64) {
-        (0..self.looks.len() as u32).for_each(|p| self.look(p, turn));
+        (0..self.looks.len() as u32).for_each(|p| self.queue_cheapest(p, turn));
         while let Some(Reverse((_, u, v, look))) = self.heap.pop() {
             if self.looks[u as usize] != look {
                 continue;
@@ -93,13 +93,13 @@ impl Builder {
             if sound {
                 self.collapse(u, v, turn);
             } else {
-                self.look(u, turn);
+                self.queue_cheapest(u, turn);
             }
         }
     }
 
     /// Finds the cheapest valid collapse of `p` and queues it.
-    fn look(&mut self, p: u32, turn: f64) {
+    fn queue_cheapest(&mut self, p: u32, turn: f64) {
         self.looks[p as usize] += 1;
         if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) {
             return;
@@ -156,7 +156,7 @@ impl Builder {
             match self.surface.around[p as usize].is_empty() {
                 true if p == v => {}
                 true => self.strand(p, v),
-                false => self.look(p, turn),
+                false => self.queue_cheapest(p, turn),
             }
         }
         if self.surface.around[v as usize].is_empty() {

@@ -4,7 +4,7 @@
 //! advancement, MIR96, in the frame of the other); who touched whom for how long. Never here: what happens at a touch
 //! ([`super::meeting`]), fixed solids ([`crate::rigid::conservative_advancement`]).
 
-use super::conservative_advancement::{Ahead, Approach, Fall, MovingShape, first_root};
+use super::conservative_advancement::{Approach, Fall, ImpactTimes, MovingShape, first_root};
 use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
@@ -280,9 +280,9 @@ impl Company {
     /// Who lies ahead of a flight of `horizon` seconds.
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.
-    pub(super) fn ahead(&mut self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
+    pub(super) fn ahead(&mut self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> ImpactTimes {
         let Self { guests, count, room, form, span, .. } = self;
-        let (me, mut ahead) = (placed(form, motion), Ahead::clear(horizon));
+        let (me, mut ahead) = (placed(form, motion), ImpactTimes::clear(horizon));
         for guest in guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain) {
             let approach = guest.approach(&me, (mover, motion, fall), horizon, room);
             ahead.add(approach, guest.restitution_at(approach.closing_m_s, span));

@@ -40,7 +40,7 @@ pub(super) struct MovingShape {
 
 /// Contacts ahead of a flight: seconds of it that are certainly free.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ahead {
+pub(super) struct ImpactTimes {
     /// Time until contact with a solid that does not bounce, or that hardly approaches.
     pub near_s: f64,
     /// Time until contact with an approaching solid that bounces.
@@ -66,7 +66,7 @@ impl Approach {
 /// Contacts that approach more slowly than this do not bounce, m/s: off the ground the body would be back within 4 ms.
 const BOUNCE_M_S: f64 = 0.02;
 
-impl Ahead {
+impl ImpactTimes {
     /// No contact for `horizon` seconds.
     pub(super) const fn clear(horizon: f64) -> Self {
         Self { near_s: horizon, coming_s: horizon }

@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 4c and 7b–7d.
 
 use super::RigidBody;
-use super::linear_spring::{Pulled, Under, VelocityStep, lean};
+use super::linear_spring::{PartLoads, SpringResult, VelocityStep, spring_state};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::StepContext;
@@ -41,14 +41,14 @@ impl Hold {
     }
 
     /// What acts over a part of `h` seconds beside gravity and springs.
-    pub(super) fn under(&self, h: f64, gravity: DVec3) -> Under {
+    pub(super) fn under(&self, h: f64, gravity: DVec3) -> PartLoads {
         let span_s = self.known.map_or(0.0, |(sprung, _)| sprung.span_s);
         let received = VelocityStep { change: self.bent, span_s };
-        Under { h, gravity, lasting: self.lasting.map(|force| force * h), received }
+        PartLoads { h, gravity, lasting: self.lasting.map(|force| force * h), received }
     }
 
     /// Notes what springs, gravity and what lasts added to the velocities in `h` seconds, and what the last of these did.
-    pub(super) fn note(&mut self, Pulled { change, lasting, .. }: &Pulled, h: f64) {
+    pub(super) fn note(&mut self, SpringResult { change, lasting, .. }: &SpringResult, h: f64) {
         self.past = [0, 1].map(|i| (change[i] - lasting[i]) / h);
     }
 }
@@ -101,8 +101,8 @@ impl RigidBody {
         if !seen || self.touching || self.ties.is_empty() || self.ties.all.iter().any(|tie| tie.yields != DMat3::ZERO) {
             return self.hold.forget();
         }
-        self.ties.aim(&self.company);
-        let sprung = lean(&self.motion, &self.spread, &self.ties.all, self.gravity);
+        self.ties.update_targets(&self.company);
+        let sprung = spring_state(&self.motion, &self.spread, &self.ties.all, self.gravity);
         let sprung = Sprung { past: self.hold.past, span_s: dt, ..sprung };
         let answer = sprung.answer(self.motion.inverse_inertia(&self.spread), dt);
         self.hold.known = Some((sprung, answer));

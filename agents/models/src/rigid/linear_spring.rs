@@ -33,7 +33,7 @@ pub(super) struct LinearSpring {
 
 impl LinearSpring {
     /// A spring whose other end is driven.
-    pub(super) const fn led(pull: AnchorSpring) -> Self {
+    pub(super) const fn driven(pull: AnchorSpring) -> Self {
         Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
     }
 
@@ -58,7 +58,7 @@ impl LinearSpring {
 
 /// A part of a step under springs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Under {
+pub(super) struct PartLoads {
     /// Its length, seconds.
     pub h: f64,
     /// Gravity, m/s².
@@ -79,7 +79,7 @@ pub(super) struct VelocityStep {
 }
 
 /// Result of the springs in a part.
-pub(super) struct Pulled {
+pub(super) struct SpringResult {
     /// The change of velocity and spin.
     pub change: Twist,
     /// The part of it that is due to the lasting loads.
@@ -96,9 +96,9 @@ pub(super) fn pull(
     motion: &mut Motion,
     body: &MassDistribution,
     ties: &mut [LinearSpring],
-    under: &Under,
+    under: &PartLoads,
     grips: &mut Vec<Grip>,
-) -> Option<Pulled> {
+) -> Option<SpringResult> {
     if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
         return None;
     }
@@ -120,7 +120,7 @@ pub(super) fn pull(
         tie.impulse = spring.after(change, r) - spring.reaction(tie, r, &under.received);
         if let Some(turn) = &mut tie.turn {
             let steady = turn.impulse_at(motion.rotation, spin, h);
-            turn.give(steady, change[1], h, &under.received);
+            turn.store_impulse(steady, change[1], h, &under.received);
         }
         grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
@@ -129,11 +129,17 @@ pub(super) fn pull(
     let lasting = system.matrix.solve(under.lasting);
     let mut resistance = system.matrix;
     resistance.add(&System::free(motion, body, under).matrix, -1.0);
-    Some(Pulled { change, lasting, resistance })
+    Some(SpringResult { change, lasting, resistance })
 }
 
 /// Writes the change of each spring's impulse due to a further `change` of the velocities in a part of `h` seconds.
-pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [LinearSpring], change: Twist, h: f64) {
+pub(super) fn react_to_change(
+    motion: &Motion,
+    body: &MassDistribution,
+    ties: &mut [LinearSpring],
+    change: Twist,
+    h: f64,
+) {
     for tie in ties {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
         tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
@@ -145,7 +151,7 @@ pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [Lin
 
 /// The force on the body in this state of springs whose far ends are driven, and its derivatives as the body moves
 /// (docs/theory/coupling.md, eq. 7b).
-pub(super) fn lean(motion: &Motion, body: &MassDistribution, ties: &[LinearSpring], gravity: DVec3) -> Sprung {
+pub(super) fn spring_state(motion: &Motion, body: &MassDistribution, ties: &[LinearSpring], gravity: DVec3) -> Sprung {
     let mut all = Sprung {
         force: [gravity * body.mass_kg, DVec3::ZERO],
         rising: [DVec3::ZERO; 2],
@@ -171,7 +177,7 @@ pub(super) fn lean(motion: &Motion, body: &MassDistribution, ties: &[LinearSprin
         all.stiffness.add_turning(r, r.dot(force).max(0.0));
         all.damping.add_point(r, pass * tie.pull.damping_n_s_m);
         if let Some(turn) = &tie.turn {
-            turn.lean(motion.rotation, spin, &mut all);
+            turn.add_to(motion.rotation, spin, &mut all);
         }
     }
     all
@@ -230,7 +236,7 @@ struct System {
 
 impl System {
     /// A body without springs.
-    fn free(motion: &Motion, body: &MassDistribution, under: &Under) -> Self {
+    fn free(motion: &Motion, body: &MassDistribution, under: &PartLoads) -> Self {
         let columns = DVec3::AXES.map(|axis| motion.inertia_times(body, axis));
         let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [linear, angular] = under.lasting;

@@ -36,12 +36,12 @@ impl OrientationSpring {
             damping: pull.damping_n_s_m * square,
             impulse: DVec3::ZERO,
         };
-        turn.go_on(age_s);
+        turn.advance(age_s);
         turn
     }
 
     /// Advances the jaws by `h` seconds.
-    pub(super) fn go_on(&mut self, h: f64) {
+    pub(super) fn advance(&mut self, h: f64) {
         if self.spin != DVec3::ZERO {
             self.target = (DQuat::from_scaled_axis(self.spin * h) * self.target).normalize();
         }
@@ -65,13 +65,13 @@ impl OrientationSpring {
 
     /// Stores its impulse over `h` seconds on a body whose spin changes by `change`: `steady` is the impulse without that change
     /// ([`Self::impulse_at`]), `received` the change by impulses at the start.
-    pub(super) fn give(&mut self, steady: DVec3, change: DVec3, h: f64, received: &VelocityStep) {
+    pub(super) fn store_impulse(&mut self, steady: DVec3, change: DVec3, h: f64, received: &VelocityStep) {
         let VelocityStep { change: [_, bent], span_s } = *received;
         self.impulse = steady - change * self.resistance(h) - bent * self.resistance(span_s);
     }
 
     /// Adds its torque on a body in this state, and the derivatives of it, to the published sum of springs.
-    pub(super) fn lean(&self, rotation: DQuat, spin: DVec3, all: &mut Sprung) {
+    pub(super) fn add_to(&self, rotation: DQuat, spin: DVec3, all: &mut Sprung) {
         all.force[1] += self.away(rotation) * self.stiffness + (self.spin - spin) * self.damping;
         all.rising[1] += self.spin * self.stiffness;
         all.stiffness.add_turning(DVec3::ZERO, self.stiffness);

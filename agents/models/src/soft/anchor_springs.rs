@@ -11,7 +11,7 @@ use metachron_core::{AgentId, Anchor};
 
 /// A spring on one vertex.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Tie {
+pub(super) struct VertexSpring {
     /// The pulling agent; `None` for a user spring.
     pub by: Option<AgentId>,
     /// Which vertex.
@@ -34,13 +34,13 @@ pub(super) struct Tie {
     reach: DMat3,
     yields: DMat3,
     /// Difference between that response and the expected motion of the far end, m/s.
-    spared: DVec3,
+    predicted: DVec3,
     /// The impulse of the last substep, and of the step, N·s.
     pub given: DVec3,
     pub impulse: DVec3,
 }
 
-impl Tie {
+impl VertexSpring {
     /// The tie of a pull; `None` where it has no such vertex or is not finite.
     pub fn of_pull(pull: &AnchorSpring, count: usize) -> Option<Self> {
         let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
@@ -49,7 +49,7 @@ impl Tie {
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
-    /// The tie of a link, whose far end is set later ([`Tie::aim`]).
+    /// The tie of a link, whose far end is set later ([`VertexSpring::aim`]).
     pub fn of_link(link: &Link, count: usize) -> Option<Self> {
         let tie = Self::at(link.here, link.stiffness_n_m, link.damping_n_s_m, count)?;
         Some(Self { by: Some(link.other), link: Some(*link), ..tie })
@@ -72,7 +72,7 @@ impl Tie {
             eased: DMat3::ZERO,
             reach: DMat3::ZERO,
             yields: DMat3::ZERO,
-            spared: DVec3::ZERO,
+            predicted: DVec3::ZERO,
             given: DVec3::ZERO,
             impulse: DVec3::ZERO,
         })
@@ -95,22 +95,22 @@ impl Tie {
         self.by.map(|by| Pulled { by, link: self.link, given: self.given })
     }
 
-    /// The error of `spared`, m/s, where the links to the far end's agent change its velocity by `move_m_s` and this end has this
+    /// The error of `predicted`, m/s, where the links to the far end's agent change its velocity by `move_m_s` and this end has this
     /// velocity (eq. 4a).
-    pub fn amiss(&self, move_m_s: DVec3, velocity: DVec3) -> DVec3 {
-        move_m_s + self.yields * self.gives(velocity) - self.spared
+    pub fn prediction_error(&self, move_m_s: DVec3, velocity: DVec3) -> DVec3 {
+        move_m_s + self.yields * self.impulse_at(velocity) - self.predicted
     }
 
-    /// Increases `spared` by `more`, m/s; returns the additional impulse.
-    pub fn spare(&mut self, more: DVec3) -> DVec3 {
-        self.spared += more;
+    /// Increases `predicted` by `more`, m/s; returns the additional impulse.
+    pub fn add_prediction(&mut self, more: DVec3) -> DVec3 {
+        self.predicted += more;
         let impulse = self.reach * more;
         self.still += impulse;
         impulse
     }
 
     /// The impulse that it gives if this end has this velocity after the substep.
-    pub fn gives(&self, velocity: DVec3) -> DVec3 {
+    pub fn impulse_at(&self, velocity: DVec3) -> DVec3 {
         self.still - self.eased * velocity
     }
 
@@ -118,7 +118,7 @@ impl Tie {
     pub fn add(&mut self, position: DVec3, h: f64, system: &mut System) {
         let eased = self.ease * (self.stiffness * (h * h) + self.damping * h);
         self.eased = (eased + eased.transpose()) * 0.5;
-        (self.reach, self.spared) = (eased, DVec3::ZERO);
+        (self.reach, self.predicted) = (eased, DVec3::ZERO);
         let apart = self.target + self.target_velocity * h - position;
         let force = self.ease * (self.stiffness * apart + self.damping * self.target_velocity);
         self.still = force * h;
@@ -128,7 +128,7 @@ impl Tie {
 
     /// Books its impulse in a substep of `h` seconds that ended with `velocity`, and moves a driven end on.
     pub fn book(&mut self, velocity: DVec3, h: f64) {
-        self.given = self.gives(velocity);
+        self.given = self.impulse_at(velocity);
         self.impulse += self.given;
         self.target += self.target_velocity * h;
     }

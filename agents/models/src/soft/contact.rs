@@ -4,7 +4,7 @@
 //! Never here: where two forms touch ([`metachron_geometry::narrow_phase`]). Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::company::Company;
-use super::initial_overlap::Bores;
+use super::initial_overlap::PassingVertices;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use glam::{DQuat, DVec3};
@@ -54,7 +54,7 @@ struct Wall {
     position: DVec3,
     rotation: DQuat,
     /// The vertices of the body that pass through it.
-    bores: Bores,
+    passing: PassingVertices,
 }
 
 impl Contacts {
@@ -68,7 +68,7 @@ impl Contacts {
                 .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
             let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
             let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
-            Ok(Wall { form, position, rotation, bores: Bores::default() })
+            Ok(Wall { form, position, rotation, passing: PassingVertices::default() })
         };
         let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
         Ok(Self {
@@ -84,7 +84,7 @@ impl Contacts {
     }
 
     /// Corrects the free `velocities` of a substep; their number stays one for each vertex.
-    pub fn act(
+    pub fn solve(
         &mut self,
         substep: Substep<'_>,
         velocities: &mut Vec<DVec3>,
@@ -127,9 +127,9 @@ impl Contacts {
         for (wall, number) in walls.iter_mut().zip(0_u64..) {
             let view = ShapePose::Solid { position: wall.position, rotation: wall.rotation };
             touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, room, places);
-            wall.bores.follow(places, held, deep_m);
+            wall.passing.update(places, held, deep_m);
             let friction = (form.friction * wall.form.friction).sqrt();
-            for place in places.iter().filter(|place| !wall.bores.pass(place)) {
+            for place in places.iter().filter(|place| !wall.passing.contains(place)) {
                 let mut slots = ContactJacobian::default();
                 place.on_a.join(&mut slots, 0, DVec3::ZERO, ContactSide::first(place.normal));
                 let closing = slots.velocity(velocities).dot(place.normal);

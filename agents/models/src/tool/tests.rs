@@ -63,18 +63,18 @@ fn snapshot(tool: &Tool) -> Snapshot {
 struct Stage {
     tool: Tool,
     time: SimTime,
-    around: Vec<Neighbour>,
+    neighbours: Vec<Neighbour>,
 }
 
 impl Stage {
     fn new(spec: ToolSpec) -> Self {
-        Self { tool: Tool::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
+        Self { tool: Tool::new(spec).unwrap(), time: SimTime::ZERO, neighbours: vec![tube()] }
     }
 
     fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let around = StepContext { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
-        let report = self.tool.step(dt, &around)?;
+        let context = StepContext { me: ME, time: self.time, neighbours: &self.neighbours, hands, links: &[] };
+        let report = self.tool.step(dt, &context)?;
         self.time += dt;
         Ok(report)
     }
@@ -211,12 +211,12 @@ fn a_tool_reports_received_impulses_as_the_mean_force_since_its_last_read() {
         let snapshot = Snapshot { time, given, ..near.snapshot.as_ref().clone() };
         vec![Neighbour { snapshot: Arc::new(snapshot), ..near }]
     };
-    stage.around = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
+    stage.neighbours = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
     stage.step();
     assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12); // 0.5 N·s in 100 ms
     stage.step();
     assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12, "nothing new is known");
-    stage.around = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
+    stage.neighbours = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
     stage.step();
     assert_eq!(state(&stage.tool).force_n, 0.0, "nothing more was given");
 }
@@ -325,7 +325,7 @@ fn a_tool_wakes_only_the_sleeping_agents_in_its_way() {
         let down = [key(0.0, DVec3::new(0.3, 0.0, 0.4), 0.0), key(1.0, DVec3::new(0.3, 0.0, end_m), 0.0)];
         let turned = down.map(|key| Keyframe { rotation: DQuat::from_rotation_x(std::f64::consts::PI), ..key });
         let mut stage = Stage::new(spec(turned.to_vec()));
-        stage.around = vec![asleep(tube())];
+        stage.neighbours = vec![asleep(tube())];
         let mut woke_at_m = None;
         for _ in 0..130 {
             stage.step();

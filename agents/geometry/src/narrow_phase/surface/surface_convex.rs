@@ -4,8 +4,8 @@
 //! Theory: docs/theory/soft.md, eq. 15a.
 
 use super::super::primitives::Block;
-use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
-use super::{DEEP_SHARE, KINDS, Meeting, PART_SHIFT, SkinPoint, Spot, Triangle, shares};
+use super::super::voronoi_regions::{Feature, LEAN_SHARE};
+use super::{BarycentricPoint, DEEP_SHARE, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
 use crate::near_triangle;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
@@ -36,7 +36,7 @@ struct Projected {
     size_m: f64,
 }
 
-impl Meeting<'_> {
+impl SurfaceQuery<'_> {
     pub(super) fn block(&self, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) {
         let radius_m = self.surface.form.radius_m;
         let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
@@ -52,7 +52,7 @@ impl Meeting<'_> {
             })
         };
         for (vertex, at) in self.surface.vertices_in(self.region) {
-            let touch = nearest(at).and_then(|touch| self.out(Ridge::Vertex(vertex), block, touch));
+            let touch = nearest(at).and_then(|touch| self.out(Feature::Vertex(vertex), block, touch));
             if let Some(touch) = touch {
                 let key = KINDS[0] | u64::from(vertex);
                 into.extend(self.block_contact(key, SkinPoint::vertex(vertex, at), block, touch));
@@ -68,7 +68,7 @@ impl Meeting<'_> {
             let better_m = ROUNDING_SHARE * ends[0].distance(ends[1]);
             let inner = (LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&share)
                 && ends.into_iter().all(|end| touch.distance_m + better_m < apart(end));
-            if let Some(touch) = inner.then(|| self.out(edge.ridge(), block, touch)).flatten() {
+            if let Some(touch) = inner.then(|| self.out(edge.feature(), block, touch)).flatten() {
                 into.extend(self.block_contact(KINDS[1] | edge.number << PART_SHIFT, edge.at(share), block, touch));
             }
         }
@@ -86,18 +86,23 @@ impl Meeting<'_> {
 
     /// The place as reported by a vertex or an edge of the skin, with a push out of the skin and not along it; `None` where a neighbouring
     /// part is nearer. A place deep in the block is pushed out by the shortest way.
-    fn out(&self, ridge: Ridge, block: &Block<'_>, touch: signed_distance::Touch) -> Option<signed_distance::Touch> {
+    fn out(
+        &self,
+        feature: Feature,
+        block: &Block<'_>,
+        touch: signed_distance::Touch,
+    ) -> Option<signed_distance::Touch> {
         if touch.distance_m < -BETTER_SHARE * self.surface.form.edge_m {
             return Some(touch);
         }
         let way = -(block.rotation * touch.normal);
-        let out = ridge.out(self.surface, way)?;
+        let out = feature.out(self.surface, way)?;
         let local = block.rotation.conjugate() * -out;
-        if ridge.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
+        if feature.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
             return Some(signed_distance::Touch { normal: local, ..touch });
         }
         // the face continues there: the vertex may be the one that reaches it, whichever part is nearer now
-        let Ridge::Vertex(vertex) = ridge else { return None };
+        let Feature::Vertex(vertex) = feature else { return None };
         let field = block.field?;
         let here = block.inward(Ball { centre: self.surface.at(vertex), radius_m: 0.0 }).centre;
         let beside = here + (local - touch.normal).normalize_or_zero() * (BESIDE_SHARE * self.surface.form.edge_m);
@@ -128,7 +133,7 @@ impl Meeting<'_> {
                 continue;
             };
             let touch = signed_distance::Touch { normal: -local, distance_m };
-            let point = SkinPoint { spot: Spot { vertices, shares }, position: foot };
+            let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position: foot };
             into.extend(self.block_contact(KINDS[2] | number << PART_SHIFT | name, point, block, touch));
             any = true;
         }
@@ -185,7 +190,7 @@ impl Meeting<'_> {
     }
 
     /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
-    fn is_pierced(&self, spot: Spot, normal: DVec3) -> bool {
+    fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
         let inside = spot.shares[2] > 0.0;
         let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
         self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
