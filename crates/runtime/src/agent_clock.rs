@@ -9,7 +9,7 @@
 
 mod timeline;
 
-pub use timeline::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+pub use timeline::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
 
 use metachron_core::{SimSpan, SimTime};
 use std::time::Duration;
@@ -72,7 +72,7 @@ pub struct AgentClock {
     /// Waits used up of [`PATIENCE`].
     waited: u16,
     /// Hash of the last news of the awaited peers.
-    heard: u16,
+    news: u16,
 }
 
 /// Start of a turn.
@@ -100,7 +100,7 @@ impl AgentClock {
             begun: 0,
             waits: [0; 2],
             waited: 0,
-            heard: 0,
+            news: 0,
         }
     }
 
@@ -168,13 +168,13 @@ impl AgentClock {
         timeline.wall_of(self.scene_time()).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
     }
 
-    /// Waits briefly from wall time `wall` for peers that are behind; returns `false` once its patience is used up. `heard` changes with
+    /// Waits briefly from wall time `wall` for peers that are behind; returns `false` once its patience is used up. `news` changes with
     /// every news of them.
-    pub fn wait(&mut self, wall: Duration, heard: u64) -> bool {
+    pub fn wait(&mut self, wall: Duration, news: u64) -> bool {
         // a different number in nearly all cases
-        let heard = (heard ^ (heard >> 16) ^ (heard >> 32)) as u16;
-        if heard != self.heard {
-            (self.heard, self.waited) = (heard, 0);
+        let news = (news ^ (news >> 16) ^ (news >> 32)) as u16;
+        if news != self.news {
+            (self.news, self.waited) = (news, 0);
         }
         let waits = self.waited < PATIENCE;
         if waits {
@@ -321,8 +321,8 @@ mod tests {
     #[test]
     fn a_peer_with_news_is_waited_for_and_one_without_for_a_second() {
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
-        for heard in 0..1000 {
-            assert!(pace.wait(wall, heard / 100), "at {wall:?}");
+        for news in 0..1000 {
+            assert!(pace.wait(wall, news / 100), "at {wall:?}");
             assert_eq!(pace.due(&line), Some(wall + ms(2)));
             wall += ms(2);
         }

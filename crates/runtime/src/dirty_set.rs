@@ -47,16 +47,16 @@ mod tests {
     #[test]
     fn each_mark_is_visited_once() {
         let set = DirtySet::new(130);
-        let heard = || {
-            let mut heard = Vec::new();
-            set.take(|id| heard.push(id.0));
-            heard
+        let visited = || {
+            let mut visited = Vec::new();
+            set.take(|id| visited.push(id.0));
+            visited
         };
         [129, 0, 64, 0, 63].iter().for_each(|id| set.mark(AgentId(*id)));
-        assert_eq!(heard(), [0, 63, 64, 129]);
-        assert!(heard().is_empty());
+        assert_eq!(visited(), [0, 63, 64, 129]);
+        assert!(visited().is_empty());
         set.mark(AgentId(5000));
-        assert!(heard().is_empty(), "strangers are nobody");
+        assert!(visited().is_empty(), "strangers are nobody");
     }
 
     #[test]

@@ -62,7 +62,7 @@ mod threads;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
-pub use agent_clock::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+pub use agent_clock::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};
@@ -73,7 +73,7 @@ pub use mailbox::{Command, SendError};
 pub use metrics::{AgentState, AgentStats, Spread};
 pub use pool::Pool;
 pub use priority::{Priority, PriorityRefused};
-pub use probe::{SAMPLES_MAX, Sample, Watch};
+pub use probe::{SAMPLES_MAX, Sample, WatchedPoint};
 pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
@@ -98,7 +98,7 @@ pub trait Run: Send {
     fn timeline(&self) -> Timeline;
 
     /// Changes the timeline: pause, run, speed, single step.
-    fn drive(&mut self, drive: Drive);
+    fn drive(&mut self, drive: TimelineCommand);
 
     /// All agents, in the order of their numbers.
     fn agents(&self) -> &[AgentHandle];

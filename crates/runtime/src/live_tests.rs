@@ -1,7 +1,7 @@
 //! Claims about agents in real time, held against every executor that keeps it.
 
 use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
-use super::{AgentState, Clock, Command, Drive, ManualClock, Run};
+use super::{AgentState, Clock, Command, ManualClock, Run, TimelineCommand};
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
@@ -69,10 +69,10 @@ fn no_agent_runs_ahead_of_a_clock_that_stands_still() {
             clock.advance(Duration::from_millis(20));
             covered(&*run, step * 20);
         }
-        run.drive(Drive::Pause);
+        run.drive(TimelineCommand::Pause);
         clock.advance(Duration::from_secs(5));
         assert_eq!(run.sim_now(), SimTime::from_nanos(400_000_000));
-        run.drive(Drive::Step(SimSpan::from_nanos(20_000_000)));
+        run.drive(TimelineCommand::Step(SimSpan::from_nanos(20_000_000)));
         clock.advance(Duration::from_secs(5));
         covered(&*run, 420);
         assert_eq!(run.sim_now(), SimTime::from_nanos(420_000_000));

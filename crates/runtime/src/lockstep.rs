@@ -7,7 +7,7 @@
 mod cores;
 
 use super::Run;
-use super::agent_clock::{Drive, Timeline};
+use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
@@ -277,7 +277,7 @@ impl Run for Lockstep {
         self.timeline
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         self.timeline = self.timeline.after(self.now, drive);
         self.schedule_all();
     }

@@ -226,8 +226,8 @@ const fn is_led(form: &CollisionShape) -> bool {
 fn set_island_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, island_member: bool) {
     if island_member {
         (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
-    } else if let Some(stranger) = peers.neighbour_of(me, neighbour.id) {
-        *neighbour = stranger;
+    } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {
+        *neighbour = outsider;
     }
 }
 

@@ -12,7 +12,7 @@ mod watchdog;
 mod worker;
 
 use super::Run;
-use super::agent_clock::{Drive, Timeline};
+use super::agent_clock::{Timeline, TimelineCommand};
 use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::metrics::AgentStats;
@@ -37,7 +37,7 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Starts a worker per core that the system gives; simulated time is paused until [`Drive::Run`]. If the system refuses `priority`
+    /// Starts a worker per core that the system gives; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority`
     /// ([`Priority::ask`]) workers have the ordinary one.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Pool {
         let workers = workers.clamp(1, handles.len().max(1));
         sleep.set_workers(workers);
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
-        state.timeline.drive(Duration::ZERO, Drive::Pause);
+        state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
         let supervisor = Supervisor::start(Arc::clone(&state), workers, patience, priority).map_err(no_thread)?;
         let messages = supervisor.sender();
@@ -100,7 +100,7 @@ impl Run for Pool {
         self.state.timeline.read()
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         self.state.timeline.drive(self.state.clock.now(), drive);
         self.state.sleep.unpark_all();
     }

@@ -1,6 +1,6 @@
 //! Recording of the paths of material points, state by state.
 //!
-//! In: an agent's snapshots, as it publishes them. Out: for each [`Watch`] the first state at or after every multiple of its
+//! In: an agent's snapshots, as it publishes them. Out: for each [`WatchedPoint`] the first state at or after every multiple of its
 //! period, with that state's own time; while the agent rests, its state at every multiple. Never here: files, units of a report.
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ use metachron_core::{SimSpan, SimTime, Snapshot};
 
 /// A material point to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watch {
+pub struct WatchedPoint {
     /// Which point: share of a tube's rest length, 0 … 1; no meaning for other bodies.
     pub at: f64,
     /// Simulated time between samples, above zero.
@@ -24,13 +24,13 @@ pub type Sample = (SimTime, DVec3);
 /// A point and its samples.
 #[derive(Debug)]
 pub(super) struct Trace {
-    watch: Watch,
+    watch: WatchedPoint,
     next: SimTime,
     samples: Vec<Sample>,
 }
 
 impl Trace {
-    pub fn new(watch: Watch) -> Self {
+    pub fn new(watch: WatchedPoint) -> Self {
         Self { watch, next: SimTime::ZERO, samples: Vec::new() }
     }
 
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn a_watch_keeps_the_first_state_at_or_after_each_multiple_of_its_period() {
-        let mut trace = Trace::new(Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
+        let mut trace = Trace::new(WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
         for ms in [0, 4, 8, 12, 16, 20, 24, 28, 32, 55, 57, 60] {
             trace.record(&state(ms));
         }
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_state_that_holds_is_written_down_at_every_multiple() {
-        let mut trace = Trace::new(Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
+        let mut trace = Trace::new(WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
         trace.record(&state(4));
         trace.hold(&state(4), SimTime::from_nanos(30_000_000));
         trace.hold(&state(4), SimTime::from_nanos(39_000_000));

@@ -64,8 +64,8 @@ impl Reader {
                 self.count(at, agent);
                 let state = agent.state();
                 self.newest[at] = agent.latest();
-                let look = &mut self.readings[at];
-                (look.time, look.rests) = (self.newest[at].moment(), state == AgentState::Resting);
+                let reading = &mut self.readings[at];
+                (reading.time, reading.rests) = (self.newest[at].moment(), state == AgentState::Resting);
                 visit(agent, &self.newest[at], state == AgentState::Running);
             });
         }
@@ -83,15 +83,15 @@ impl Reader {
 
     /// Counts the ages of agent `at` in the frames since its last count.
     fn count(&mut self, at: usize, agent: &AgentHandle) {
-        let look = &mut self.readings[at];
-        let frames = (self.read - look.counted) as usize;
+        let reading = &mut self.readings[at];
+        let frames = (self.read - reading.counted) as usize;
         let first = self.frames.len().saturating_sub(frames);
-        if look.rests {
+        if reading.rests {
             agent.record_no_age(self.frames.len() - first);
         } else {
-            agent.record_ages(self.frames.iter().skip(first).map(|now| now.since(look.time)));
+            agent.record_ages(self.frames.iter().skip(first).map(|now| now.since(reading.time)));
         }
-        look.counted = self.read;
+        reading.counted = self.read;
     }
 
     /// Counts some of the unchanged agents, so that no agent is behind by more frames than are stored.

@@ -142,14 +142,14 @@ impl SleepRegistry {
     /// `id` must not rest before its next turn; if it is at rest, it wakes.
     pub fn wake(&self, id: AgentId) {
         let mut at = Some(id);
-        while let Some(who) = at {
-            let Some(signal) = self.signal(who) else { return };
+        while let Some(next) = at {
+            let Some(signal) = self.signal(next) else { return };
             signal.woken.store(true, Release);
             fence(SeqCst);
             if signal.resting.load(Relaxed) {
-                self.notify(who);
+                self.notify(next);
             }
-            at = self.direct_leader(who);
+            at = self.direct_leader(next);
         }
     }
 

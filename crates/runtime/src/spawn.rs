@@ -14,7 +14,7 @@ use super::island::{Company as Led, Seating, assign};
 use super::mailbox::Mailbox;
 use super::metrics::{Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
-use super::probe::{Trace, Watch};
+use super::probe::{Trace, WatchedPoint};
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use metachron_contact::Agent;
@@ -48,7 +48,7 @@ pub struct AgentSpawn {
     /// Faults injected on purpose.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
-    pub watches: Vec<Watch>,
+    pub watches: Vec<WatchedPoint>,
     /// Governor of its rate; `None` for an agent with fixed settings.
     pub governor: Option<Box<dyn Governor>>,
 }

@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
-use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
+use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::Exchange;
 use metachron_contact::{Agent, Companion, StepContext};
@@ -35,7 +35,7 @@ fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<d
 
 /// Starts the time of a run.
 pub(super) fn running<R: Run + 'static>(mut run: R) -> Box<R> {
-    run.drive(Drive::Run);
+    run.drive(TimelineCommand::Run);
     Box::new(run)
 }
 

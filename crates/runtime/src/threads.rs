@@ -5,7 +5,7 @@
 //! Never here: virtual time, declared costs.
 
 use super::Run;
-use super::agent_clock::{Drive, SharedTimeline, Timeline};
+use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::clock::{Clock, wait_until};
 use super::cpu::CpuBatch;
@@ -43,7 +43,7 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Gives every agent its thread; simulated time is paused until [`Drive::Run`]. If the system refuses `priority` ([`Priority::ask`])
+    /// Gives every agent its thread; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority` ([`Priority::ask`])
     /// the threads have the ordinary one.
     ///
     /// # Errors
@@ -54,7 +54,7 @@ impl Threads {
         }
         let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
         let timeline = Arc::new(SharedTimeline::new());
-        timeline.drive(Duration::ZERO, Drive::Pause);
+        timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (sender, ended) = channel();
         let mut run = Self { clock, timeline, sleep, handles, threads: Vec::new(), ended, priority };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
@@ -132,7 +132,7 @@ impl Run for Threads {
         self.timeline.read()
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         self.timeline.drive(self.clock.now(), drive);
         self.sleep.unpark_all();
     }

@@ -12,7 +12,7 @@ use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
-use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, Watch};
+use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, WatchedPoint};
 use std::borrow::Cow;
 
 /// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps what it has.
@@ -54,7 +54,7 @@ fn spawn(
     let agent = build(member, executor)
         .map_err(|reason| WorldError::Build { name: member.name.clone(), reason: reason.to_string() })?;
     let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
-    let watches = watches.filter_map(|probe| Some(Watch { at: probe.at, every: probe.every? }));
+    let watches = watches.filter_map(|probe| Some(WatchedPoint { at: probe.at, every: probe.every? }));
     Ok(AgentSpawn {
         name: member.name.clone(),
         agent,

@@ -133,7 +133,7 @@ impl Scene {
     /// The shortest displacement that takes `shape` clear of everything it touches; for a tool, back along its shaft if that leads out.
     fn shortest_exit(&self, shape: &StartShape, shapes: &[StartShape]) -> Option<DVec3> {
         let mut surroundings =
-            Surroundings { scene: self, shapes, apart: self.pairs_apart(), room: NarrowPhaseScratch::default() };
+            Surroundings { scene: self, shapes, apart: self.pairs_apart(), scratch: NarrowPhaseScratch::default() };
         let back = shape.shaft_direction();
         if let Some(way) = back
             && let Some(far_m) = surroundings.clear(shape, way, f64::INFINITY)
@@ -160,7 +160,7 @@ struct Surroundings<'a> {
     scene: &'a Scene,
     shapes: &'a [StartShape],
     apart: BTreeSet<(AgentId, AgentId)>,
-    room: NarrowPhaseScratch,
+    scratch: NarrowPhaseScratch,
 }
 
 impl Surroundings<'_> {
@@ -185,8 +185,8 @@ impl Surroundings<'_> {
     /// Depth of `shape` in any other object, metres, ≥ 0; calls `visit` with every touch.
     fn deepest(&mut self, shape: &StartShape, mut visit: impl FnMut(&Touch)) -> f64 {
         let (mut found, mut deep_m) = (Vec::new(), 0.0_f64);
-        let mut look = |other: &StartShape, room: &mut NarrowPhaseScratch| {
-            touches(&shape.placed(), &other.placed(), 0.0, room, &mut found);
+        let mut look = |other: &StartShape, scratch: &mut NarrowPhaseScratch| {
+            touches(&shape.placed(), &other.placed(), 0.0, scratch, &mut found);
             for touch in &found {
                 deep_m = deep_m.max(-touch.gap_m);
                 visit(touch);
@@ -194,12 +194,12 @@ impl Surroundings<'_> {
         };
         let others = self.shapes.iter().filter(|other| other.id != shape.id && shape.box_touches(other, 0.0));
         for other in others.filter(|other| self.scene.collide(shape, other, &self.apart)) {
-            look(other, &mut self.room);
+            look(other, &mut self.scratch);
         }
         // a tool passes through static solids
         for obstacle in self.scene.obstacles.iter().filter(|_| shape.shaft_direction().is_none()) {
             if let Some(fixed) = shape.obstacle_shape(obstacle) {
-                look(&fixed, &mut self.room);
+                look(&fixed, &mut self.scratch);
             }
         }
         deep_m

@@ -67,13 +67,13 @@ impl Scene {
     /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
     /// its axis is inside.
     fn overlaps_with_static(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         let others = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
         for shape in others.filter_map(shape) {
             let held = !(self.is_free(shape.id) || matches!(self.agents[shape.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {
                 let Some(fixed) = shape.obstacle_shape(obstacle) else { continue };
-                touches(&shape.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
+                touches(&shape.placed(), &fixed.placed(), 0.0, &mut scratch, &mut found);
                 let counts = |touch: &&Touch| match touch.on_a {
                     Place::Chain { radius_m, .. } if held => touch.gap_m < -radius_m - OVERLAP_MIN_M,
                     _ => true,
@@ -132,9 +132,9 @@ impl Scene {
 
     /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
     fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape, f64)) {
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         self.box_pairs(self.agents.iter().filter_map(shape).collect(), reach_m, |one, two| {
-            touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
+            touches(&one.placed(), &two.placed(), reach_m, &mut scratch, &mut found);
             if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
                 visit(one, two, gap_m);
             }

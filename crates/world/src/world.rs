@@ -9,8 +9,8 @@ use super::assemble::Govern;
 use super::kinds::ExecutorKind;
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Command, Drive, Lockstep, Pool, Run, RunError, SendError, SystemClock,
-    Threads, Timeline, state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Command, Lockstep, Pool, Run, RunError, SendError, SystemClock, Threads,
+    Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -101,7 +101,7 @@ impl World {
             ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, assemble::machine(scene))?),
         };
         if executor != ExecutorKind::Lockstep {
-            run.drive(Drive::Pause);
+            run.drive(TimelineCommand::Pause);
         }
         let agents = run.agents().to_vec();
         Ok(Self { shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, clock }) })
@@ -153,12 +153,12 @@ impl World {
             return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
         }
         let end = self.time() + span;
-        self.drive(Drive::Run);
+        self.drive(TimelineCommand::Run);
         while !self.has_stopped() {
             let now = self.now();
             self.wait_until(now + POLL_INTERVAL);
             if self.time() >= end && self.shared.agents.iter().all(|agent| has_reached(agent, end)) {
-                return self.drive(Drive::Pause);
+                return self.drive(TimelineCommand::Pause);
             }
         }
     }
@@ -207,7 +207,7 @@ impl World {
     }
 
     /// Changes the flow of time: pause, run, speed, single step.
-    pub fn drive(&self, drive: Drive) {
+    pub fn drive(&self, drive: TimelineCommand) {
         self.with_run(|run| run.drive(drive));
     }
 

@@ -52,11 +52,11 @@ pub fn touches(
     a: &PlacedShape<'_>,
     b: &PlacedShape<'_>,
     reach_m: f64,
-    room: &mut NarrowPhaseScratch,
+    scratch: &mut NarrowPhaseScratch,
     into: &mut Vec<Touch>,
 ) {
     into.clear();
-    let NarrowPhaseScratch { known, chains, blocks, surfaces } = room;
+    let NarrowPhaseScratch { known, chains, blocks, surfaces } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
@@ -111,9 +111,9 @@ pub fn gap(
     a: &PlacedShape<'_>,
     b: &PlacedShape<'_>,
     reach_m: f64,
-    room: &mut NarrowPhaseScratch,
+    scratch: &mut NarrowPhaseScratch,
 ) -> Option<(DVec3, f64)> {
-    let NarrowPhaseScratch { known, chains, blocks, .. } = room;
+    let NarrowPhaseScratch { known, chains, blocks, .. } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;

@@ -21,7 +21,7 @@ pub(super) struct SpringSet {
     /// The agent at the other end of each.
     ends: Vec<Option<End>>,
     /// Scratch storage for one response.
-    room: Vec<DVec3>,
+    scratch: Vec<DVec3>,
 }
 
 /// The other end of a spring.
@@ -74,7 +74,7 @@ impl SpringSet {
     /// Where several springs pull at one agent, each sees its inverse mass times their number: together they never pull
     /// harder than it can follow.
     pub(super) fn update_targets(&mut self, company: &Company) {
-        let Self { all, ends, room } = self;
+        let Self { all, ends, scratch } = self;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
             // a tool's end moves on by itself, as a user spring's does
             let Some(End { guest: i, anchor, .. }) = end.filter(|end| end.kind != PairKind::Grasp) else { continue };
@@ -85,11 +85,11 @@ impl SpringSet {
             let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
             let column = |axis: DVec3| {
-                room.clear();
-                room.resize(other.velocities().len(), DVec3::ZERO);
-                slots.scatter(axis, room);
-                other.respond(room);
-                slots.velocity(room) * shared as f64
+                scratch.clear();
+                scratch.resize(other.velocities().len(), DVec3::ZERO);
+                slots.scatter(axis, scratch);
+                other.respond(scratch);
+                slots.velocity(scratch) * shared as f64
             };
             let [x, y, z] = DVec3::AXES.map(column);
             tie.yields = DMat3::from_cols(x, y, z);
@@ -106,21 +106,21 @@ impl SpringSet {
 
     /// Gives the other ends the reactions to the springs' impulses in `h` seconds from `after_s` seconds into the step on.
     pub(super) fn apply_reactions(&mut self, company: &mut Company, after_s: f64, h: f64) {
-        let Self { all, ends, room } = self;
+        let Self { all, ends, scratch } = self;
         for (tie, end) in all.iter().zip(ends.iter()) {
             let Some(End { guest: i, anchor, kind }) = *end else { continue };
             let (guests, exchange, ..) = company.split();
             let other = &mut guests[i].other;
             let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
-            room.clear();
-            room.resize(other.velocities().len(), DVec3::ZERO);
-            slots.scatter(-tie.impulse, room);
+            scratch.clear();
+            scratch.resize(other.velocities().len(), DVec3::ZERO);
+            slots.scatter(-tie.impulse, scratch);
             if let Some(turn) = &tie.turn {
-                room[1] -= turn.impulse;
+                scratch[1] -= turn.impulse;
             }
-            other.book(exchange, (after_s, h), room);
-            other.push(room, h);
+            other.book(exchange, (after_s, h), scratch);
+            other.push(scratch, h);
             if let Some(id) = other.id() {
                 let state = exchange.pair_mut(id);
                 state.kind = kind;

@@ -82,7 +82,7 @@ impl Standing {
         &mut self,
         mine: &Mine<'_>,
         reach_m: f64,
-        room: &mut NarrowPhaseScratch,
+        scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) {
         if self.mesh.is_some() {
@@ -90,17 +90,17 @@ impl Standing {
             self.touch_triangles(mine, reach_m, into);
         } else {
             let view = ShapePose::Solid { position: self.place(mine.motion.position), rotation: self.rotation };
-            touches(&placed(mine.form, mine.motion), &PlacedShape { form: &self.form, view }, reach_m, room, into);
+            touches(&placed(mine.form, mine.motion), &PlacedShape { form: &self.form, view }, reach_m, scratch, into);
         }
     }
 
     /// The same for a mesh. Its inner edges are smoothed over: a body that slides across two coplanar triangles is not caught by their
     /// edge.
     fn touch_triangles(&mut self, mine: &Mine<'_>, reach_m: f64, into: &mut Vec<Touch>) {
-        let (ShapeKind::Solid(SolidShape { shape, .. }), Some(room)) = (&self.form.kind, &mut self.mesh) else {
+        let (ShapeKind::Solid(SolidShape { shape, .. }), Some(scratch)) = (&self.form.kind, &mut self.mesh) else {
             return;
         };
-        let MeshScratch { manifolds, workspace } = room;
+        let MeshScratch { manifolds, workspace } = scratch;
         // old points would be carried along instead of being recomputed
         manifolds.iter_mut().for_each(|manifold| manifold.points.clear());
         let Mine { mover, motion, .. } = mine;

@@ -37,7 +37,7 @@ pub(super) struct Contacts {
     touches: Vec<Touch>,
     /// Scale of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
-    room: NarrowPhaseScratch,
+    scratch: NarrowPhaseScratch,
     slack_m: f64,
 }
 
@@ -78,7 +78,7 @@ impl Contacts {
             solver: Solver::forming(),
             touches: vec![],
             mobilities: vec![],
-            room: NarrowPhaseScratch::default(),
+            scratch: NarrowPhaseScratch::default(),
             slack_m: SLACK_SHARE * edge_m,
         })
     }
@@ -119,14 +119,14 @@ impl Contacts {
     fn find(&mut self, substep: Substep<'_>, velocities: &[DVec3], company: &mut Company) -> Settings {
         let Substep { positions, h_s: h } = substep;
         let deep_m = DEEP_SHARE * self.edge_m();
-        let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
+        let Self { form, walls, list, touches: places, scratch, slack_m, mobilities, .. } = self;
         let (mut stands, held) = (false, mobilities.contains(&0.0));
         let here = PlacedShape { form, view: ShapePose::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         for (wall, number) in walls.iter_mut().zip(0_u64..) {
             let view = ShapePose::Solid { position: wall.position, rotation: wall.rotation };
-            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, room, places);
+            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, scratch, places);
             wall.passing.update(places, held, deep_m);
             let friction = (form.friction * wall.form.friction).sqrt();
             for place in places.iter().filter(|place| !wall.passing.contains(place)) {
@@ -156,7 +156,7 @@ impl Contacts {
         }
         let fixed = list.len();
         let search = Search { h_s: h, slack_m: *slack_m, speed_m_s: speed };
-        company.mates_mut().find(&here, search, velocities, (room, list));
+        company.mates_mut().find(&here, search, velocities, (scratch, list));
         if stands && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 

@@ -104,14 +104,14 @@ impl Tool {
     }
 
     /// Target of the user spring for the tip.
-    fn user_target(&self, hand: &AnchorSpring) -> PointMotion {
-        let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
-        PointMotion { position: hand.target - self.tool.rotation * local, velocity: hand.target_velocity }
+    fn user_target(&self, spring: &AnchorSpring) -> PointMotion {
+        let local = if let Anchor::Local(local) = spring.anchor { local } else { DVec3::ZERO };
+        PointMotion { position: spring.target - self.tool.rotation * local, velocity: spring.target_velocity }
     }
 
     /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
-    fn follow_user_spring(&self, hand: &AnchorSpring, dt: f64, context: &StepContext<'_>) -> ToolState {
-        let target = self.user_target(hand);
+    fn follow_user_spring(&self, spring: &AnchorSpring, dt: f64, context: &StepContext<'_>) -> ToolState {
+        let target = self.user_target(spring);
         let off = decay(self.commanded.relative_to(target), USER_RATE_PER_S, dt);
         let tip = target.position + target.velocity * dt + off.position;
         let near = nearest(&self.spec, self.tool.tip, context)
@@ -250,9 +250,9 @@ impl Agent for Tool {
         let dt_s = check_span(dt)?;
         let (start_s, end_s) = (context.time.as_secs_f64(), (context.time + dt).as_secs_f64());
         let end = self.script.at(end_s);
-        let hand = context.hands.first();
-        let led = match hand {
-            Some(hand) => self.follow_user_spring(hand, dt_s, context),
+        let spring = context.hands.first();
+        let led = match spring {
+            Some(spring) => self.follow_user_spring(spring, dt_s, context),
             None => self.follow_script(&self.script.at(start_s), &end, dt_s),
         };
         let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
@@ -261,11 +261,11 @@ impl Agent for Tool {
             return Err(StepError::Diverged { model: "tool", dt_s, what });
         }
         let was = self.tool.jaw;
-        let wanted = hand.map_or(end.tip, |hand| self.user_target(hand).position);
+        let wanted = spring.map_or(end.tip, |spring| self.user_target(spring).position);
         let led = self.drive_on(led, context, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        let is_left = hand.is_none() && self.script.is_over(end_s) && self.has_reached(&end);
+        let is_left = spring.is_none() && self.script.is_over(end_s) && self.has_reached(&end);
         self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
         self.jaws.age(dt_s);
         self.jaws.move_to(&self.spec, was, &self.tool, context);

@@ -164,7 +164,7 @@ impl NeighbourList {
     ) -> usize {
         let Some(mine) = self.mine else { return 0 };
         let step = PlannedStep { start: now, dt: self.dt };
-        let (mut room, mut checked) = (2 * LISTED, 0);
+        let (mut limit, mut checked) = (2 * LISTED, 0);
         self.common_check = NEVER;
         self.listed.clear();
         let me = self.me;
@@ -182,8 +182,8 @@ impl NeighbourList {
                 continue;
             }
             self.listed.push(ListedPeer { id, at, near });
-            if self.listed.len() == room {
-                room = self.shorten();
+            if self.listed.len() == limit {
+                limit = self.shorten();
             }
         }
         self.shorten();

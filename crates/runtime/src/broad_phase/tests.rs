@@ -38,30 +38,30 @@ impl Flyer {
     }
 }
 
-/// Everybody's turns in the order of their times; `check` is told who has just looked, before each step.
+/// All turns in the order of their times; `check` gets the agent that has just updated its list, before each step.
 fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &NeighbourList)) {
     let broad_phase = BroadPhase::new(flyers.len());
     let ids = || (0..flyers.len() as u32).map(AgentId);
-    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
-    for (flyer, sight) in flyers.iter().zip(&mut sights) {
-        sight.publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
+    let mut lists: Vec<_> = ids().map(NeighbourList::new).collect();
+    for (flyer, list) in flyers.iter().zip(&mut lists) {
+        list.publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
     }
     let mut turn = 0;
-    while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
-        sights[who].update(
+    while let Some(at) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
+        lists[at].update(
             &broad_phase,
-            PlannedStep { start: flyers[who].time, dt: flyers[who].dt },
+            PlannedStep { start: flyers[at].time, dt: flyers[at].dt },
             &Fellows::default(),
             |_| true,
         );
-        check(who, flyers, &sights[who]);
-        let flyer = &mut flyers[who];
+        check(at, flyers, &lists[at]);
+        let flyer = &mut flyers[at];
         flyer.at = flyer.position_at(flyer.time + flyer.dt);
         flyer.time += flyer.dt;
         flyer.came_with = flyer.velocity;
         let news = flyer.plan[turn % flyer.plan.len()];
         flyer.velocity = news.map_or(flyer.velocity, DVec3::from_array);
-        sights[who].publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
+        lists[at].publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
         turn += 1;
     }
 }
@@ -87,16 +87,16 @@ fn flyer() -> impl Strategy<Value = Flyer> {
 /// Lets `flyers` fly for a while, each looking at the others as one does, and looks at all pairs beside it.
 fn no_near_agent_is_missed(mut flyers: Vec<Flyer>) {
     let mut seen = 0;
-    fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
-        let me = &all[who];
-        for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != who) {
+    fly(&mut flyers, SimTime::from_nanos(400_000_000), |at, all, list| {
+        let me = &all[at];
+        for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != at) {
             let times = (0..=4).map(|q| me.time + SimSpan::from_nanos(me.dt.as_nanos() * q / 4));
             let near = times.clone().any(|time| me.gap_m(other, time) <= 0.0);
-            let listed = sight.near().contains(&AgentId(k as u32));
-            assert!(listed || !near, "{who} misses {k} at {:?}", me.time);
+            let listed = list.near().contains(&AgentId(k as u32));
+            assert!(listed || !near, "{at} misses {k} at {:?}", me.time);
             seen += u32::from(listed);
         }
-        assert!(sight.near().is_sorted());
+        assert!(list.near().is_sorted());
     });
 }
 
@@ -120,22 +120,22 @@ fn memory_per_agent_does_not_grow_with_the_number_of_agents() {
     let dt = SimSpan::from_nanos(4_000_000);
     let held = |count: u32| {
         let broad_phase = BroadPhase::new(count as usize);
-        let mut sights: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
+        let mut lists: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
         let measured = allocation_counter::measure(|| {
             for turn in 0..3_u64 {
                 let now = SimTime::from_nanos(turn * dt.as_nanos());
-                for (k, sight) in sights.iter_mut().enumerate() {
+                for (k, list) in lists.iter_mut().enumerate() {
                     // a square of balls that fly at different speeds, six of them near each
                     let at = DVec3::new((k % 40) as f64, (k / 40) as f64, 0.0);
                     let speed_m_s = 1.0 + (k % 7) as f64;
-                    sight.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
+                    list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
                 }
-                for sight in &mut sights {
-                    sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+                for list in &mut lists {
+                    list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
                 }
             }
         });
-        assert!(sights.iter().all(|sight| (3..=8).contains(&sight.near().len())));
+        assert!(lists.iter().all(|list| (3..=8).contains(&list.near().len())));
         measured.bytes_current / i64::from(count)
     };
     let [few, many] = [200, 1600].map(held);
@@ -146,15 +146,15 @@ fn memory_per_agent_does_not_grow_with_the_number_of_agents() {
 fn a_longer_step_is_checked_ahead_at_once() {
     let broad_phase = BroadPhase::new(2);
     let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
-    let mut sight = NeighbourList::new(AgentId(0));
-    sight.publish(&broad_phase, Some(&ball(0.0)), SimTime::ZERO);
+    let mut list = NeighbourList::new(AgentId(0));
+    list.publish(&broad_phase, Some(&ball(0.0)), SimTime::ZERO);
     broad_phase.publish(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
     let step = |start_ns, dt_ns| PlannedStep { start: SimTime::from_nanos(start_ns), dt: SimSpan::from_nanos(dt_ns) };
-    sight.update(&broad_phase, step(0, 4_000_000), &Fellows::default(), |_| true);
-    assert!(sight.near().is_empty());
-    sight.update(&broad_phase, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
-    assert_eq!(sight.near(), [AgentId(1)]);
+    list.update(&broad_phase, step(0, 4_000_000), &Fellows::default(), |_| true);
+    assert!(list.near().is_empty());
+    list.update(&broad_phase, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
+    assert_eq!(list.near(), [AgentId(1)]);
 }
 
 #[test]
@@ -164,93 +164,93 @@ fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     let broad_phase = BroadPhase::new(count);
     let ids = || (0..count as u32).map(AgentId);
     let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
-    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
+    let mut lists: Vec<_> = ids().map(NeighbourList::new).collect();
     let dt = SimSpan::from_nanos(4_000_000);
-    for (k, sight) in sights.iter_mut().enumerate() {
-        sight.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
+    for (k, list) in lists.iter_mut().enumerate() {
+        list.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
-    let looks = |sights: &mut [NeighbourList], now: SimTime| -> usize {
-        sights
+    let checks = |lists: &mut [NeighbourList], now: SimTime| -> usize {
+        lists
             .iter_mut()
-            .map(|sight| sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
+            .map(|list| list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
             .sum()
     };
-    assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
+    assert_eq!(checks(&mut lists, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
     // 8 m at 2 · 0.0625 m/s is a minute
     for turn in 1..=250_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
-        for (k, sight) in sights.iter_mut().enumerate() {
-            sight.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), now);
+        for (k, list) in lists.iter_mut().enumerate() {
+            list.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), now);
         }
-        assert_eq!(looks(&mut sights, now), 0, "turn {turn}");
+        assert_eq!(checks(&mut lists, now), 0, "turn {turn}");
     }
     let now = SimTime::from_nanos(1_004_000_000);
-    sights[0].publish(&broad_phase, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
+    lists[0].publish(&broad_phase, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
     // everybody looks at the one who has become fast, and he at everybody
-    assert_eq!(looks(&mut sights, now), 2 * (count - 1));
-    assert_eq!((sights[1].near(), sights[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
+    assert_eq!(checks(&mut lists, now), 2 * (count - 1));
+    assert_eq!((lists[1].near(), lists[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
 }
 
 #[test]
 fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
     let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
     let broad_phase = BroadPhase::new(count);
-    let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
+    let mut lists: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
     let half = DVec3::splat(0.25);
     // a floor of them, half a metre apart, a metre below those that swing
-    for (k, sight) in sights.iter_mut().enumerate().skip(10) {
+    for (k, list) in lists.iter_mut().enumerate().skip(10) {
         let at = DVec3::new(0.5 * (k % 40) as f64, 0.5 * (k / 40) as f64, -1.5) - half;
-        sight.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
+        list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
         broad_phase.publish_rest(AgentId(k as u32));
     }
-    let mut looks = 0;
+    let mut checks = 0;
     for turn in 0..2000_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
-        for (k, sight) in sights[..10].iter_mut().enumerate() {
+        for (k, list) in lists[..10].iter_mut().enumerate() {
             // a second to and fro, at 2 m/s in the middle
             let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
             let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
             let speed_m_s = 2.0 * libm::cos(phase).abs();
-            sight.publish(&broad_phase, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
-            looks += sight.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+            list.publish(&broad_phase, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
+            checks += list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
         }
     }
     // everybody once in 33 turns
-    let each = looks as f64 / 20_000.0;
+    let each = checks as f64 / 20_000.0;
     assert!(each < 40.0, "{each} looks a turn");
 }
 
 #[test]
 fn an_overrun_log_makes_all_agents_be_checked() {
     let broad_phase = BroadPhase::new(3);
-    let mut sight = NeighbourList::new(AgentId(0));
+    let mut list = NeighbourList::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
     let dt = SimSpan::from_nanos(1_000_000);
-    sight.publish(&broad_phase, Some(&at(0.0, 0.0)), SimTime::ZERO);
+    list.publish(&broad_phase, Some(&at(0.0, 0.0)), SimTime::ZERO);
     broad_phase.publish(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    sight.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
-    assert!(sight.near().is_empty());
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    assert!(list.near().is_empty());
     broad_phase.publish(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
         broad_phase.publish(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    sight.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
-    assert_eq!(sight.near(), [AgentId(1)]);
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    assert_eq!(list.near(), [AgentId(1)]);
 }
 
 #[test]
 fn a_reported_impulse_is_delivered_once() {
     let broad_phase = BroadPhase::new(200);
     [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.report_impulse(AgentId(7), AgentId(from)));
-    let heard = |id| {
-        let mut heard = Vec::new();
-        broad_phase.take_givers(AgentId(id), |caller| heard.push(caller.0));
-        heard
+    let visited = |id| {
+        let mut visited = Vec::new();
+        broad_phase.take_givers(AgentId(id), |caller| visited.push(caller.0));
+        visited
     };
-    assert!(heard(8).is_empty());
-    assert_eq!(heard(7), [3, 64, 130]);
-    assert!(heard(7).is_empty());
+    assert!(visited(8).is_empty());
+    assert_eq!(visited(7), [3, 64, 130]);
+    assert!(visited(7).is_empty());
 }
 
 #[test]

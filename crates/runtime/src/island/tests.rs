@@ -2,7 +2,7 @@
 
 use super::super::lockstep::Lockstep;
 use super::super::testing::{Bond, Dummy, Fault, Log, RecordedStep, eventually, on_every_executor, system};
-use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, Watch, state_hash};
+use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};
@@ -35,7 +35,7 @@ fn mates(bond: Bond, log: &Log) -> Vec<AgentSpawn> {
 }
 
 fn named(mut spawn: AgentSpawn, hz: f64) -> AgentSpawn {
-    spawn.watches = vec![Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) }];
+    spawn.watches = vec![WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) }];
     spawn.name = format!("mate at {hz}");
     spawn
 }

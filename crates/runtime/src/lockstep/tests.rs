@@ -125,17 +125,17 @@ fn a_state_is_seen_when_its_cost_has_passed() {
 fn pause_freezes_and_a_single_step_advances_exactly_one_frame_span() {
     let mut run = lockstep(vec![Dummy::new(100.0).at(250.0), Dummy::new(100.0).at(125.0)]);
     run.wait_until(ms(402));
-    run.drive(Drive::Pause);
+    run.drive(TimelineCommand::Pause);
     let times = |run: &Lockstep| run.agents().iter().map(|a| a.latest().time).collect::<Vec<_>>();
     assert_eq!(times(&run), [sim_ms(404), sim_ms(408)]);
     run.wait_until(ms(2000));
     assert_eq!(run.sim_now(), sim_ms(402));
     assert_eq!(times(&run), [sim_ms(404), sim_ms(408)]);
-    run.drive(Drive::Step(SimSpan::from_nanos(16_000_000)));
+    run.drive(TimelineCommand::Step(SimSpan::from_nanos(16_000_000)));
     run.wait_until(ms(3000));
     assert_eq!(run.sim_now(), sim_ms(418));
     assert_eq!(times(&run), [sim_ms(420), sim_ms(424)], "four steps of 4 ms, two of 8 ms");
-    run.drive(Drive::Run);
+    run.drive(TimelineCommand::Run);
     run.wait_until(ms(3084));
     assert_eq!(times(&run), [sim_ms(504), sim_ms(504)]);
     assert!(run.shutdown().iter().all(|s| s.dropped == SimSpan::ZERO), "a pause is no lateness");
@@ -144,7 +144,7 @@ fn pause_freezes_and_a_single_step_advances_exactly_one_frame_span() {
 #[test]
 fn half_speed_makes_half_the_steps() {
     let mut run = lockstep(vec![Dummy::new(100.0).at(250.0)]);
-    run.drive(Drive::Speed(0.5));
+    run.drive(TimelineCommand::Speed(0.5));
     run.wait_until(ms(2000));
     assert_eq!(run.agents()[0].latest().time, sim_ms(1000));
     let stats = run.shutdown().remove(0);

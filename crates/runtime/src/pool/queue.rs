@@ -172,7 +172,7 @@ impl<T> Ord for Place<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::agent_clock::Drive;
+    use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::spawn::{AgentSpawn, assemble};
     use super::super::super::testing::Dummy;
     use super::*;
@@ -279,11 +279,11 @@ mod tests {
     #[test]
     fn a_stopped_timeline_releases_no_agent_and_a_running_one_all() {
         let mut queue = queue(vec![Dummy::new(1.0).at(100.0), Dummy::new(1.0).at(10.0)]);
-        let paused = Timeline::new().after(Duration::ZERO, Drive::Pause);
+        let paused = Timeline::new().after(Duration::ZERO, TimelineCommand::Pause);
         queue.set_timeline(&paused, Duration::ZERO);
         assert!(queue.take(Duration::from_secs(9)).is_none());
         assert_eq!((queue.due(), queue.frontier()), (NEVER, NEVER));
-        let running = paused.after(Duration::from_secs(9), Drive::Run);
+        let running = paused.after(Duration::from_secs(9), TimelineCommand::Run);
         queue.set_timeline(&running, Duration::from_secs(9));
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 0, "the earlier deadline");
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 1);

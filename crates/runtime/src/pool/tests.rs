@@ -97,10 +97,10 @@ fn thousands_of_sleepers_wake_at_once_and_sleep_again() {
 fn a_pause_holds_thousands_and_a_step_moves_them_by_its_span() {
     let mut run = pool((0..1000).map(|_| Dummy::new(1.0).at(100.0)).collect(), 2, LONG);
     eventually("all run", || run.agents().iter().all(|a| a.stats().steps >= 1));
-    run.drive(Drive::Pause);
+    run.drive(TimelineCommand::Pause);
     let stopped = run.sim_now();
     let span = SimTime::from_nanos(50_000_000).since(SimTime::ZERO);
-    run.drive(Drive::Step(span));
+    run.drive(TimelineCommand::Step(span));
     let end = stopped + span;
     eventually("the step is made", || run.agents().iter().all(|a| a.latest().time >= end));
     // the step's states may be there before its time has come

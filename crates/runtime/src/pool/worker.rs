@@ -168,7 +168,7 @@ impl Worker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::agent_clock::Drive;
+    use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::spawn::{AssembledRun, assemble};
     use super::super::super::testing::Dummy;
     use super::super::super::{Clock, ManualClock};
@@ -179,7 +179,7 @@ mod tests {
         sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));
-        state.timeline.drive(Duration::ZERO, Drive::Run);
+        state.timeline.drive(Duration::ZERO, TimelineCommand::Run);
         Worker::new(state, 0, Arc::default())
     }
 

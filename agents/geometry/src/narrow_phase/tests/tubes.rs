@@ -115,10 +115,10 @@ fn tested_pairs_grow_linearly_with_the_length_of_the_tubes() {
     let tried = |segments: usize| {
         let (a, b) = (helix(segments, 0.0), helix(segments, std::f64::consts::PI));
         let radii = vec![8e-3; segments + 1];
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
         assert!(found.len() > segments, "the strands of a double helix lie side by side");
-        room.chains.tried
+        scratch.chains.tried
     };
     let (short, long) = (tried(100), tried(400));
     assert!(long < 5 * short, "{short} pairs for 100 spans, {long} for 400");
@@ -131,9 +131,9 @@ fn tubes_far_apart_test_no_pairs() {
     let form = chain();
     let (a, radii) = (helix(400, 0.0), vec![8e-3; 401]);
     let b: Vec<_> = a.iter().map(|p| *p + DVec3::X).collect();
-    let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-    touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
-    assert!(found.is_empty() && room.chains.tried == 0);
+    let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+    touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
+    assert!(found.is_empty() && scratch.chains.tried == 0);
 }
 
 #[test]

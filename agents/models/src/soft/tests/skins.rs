@@ -30,8 +30,8 @@ fn slab(size_m: DVec3, segments: [u32; 3], place: (DVec3, f64)) -> (Arc<Collisio
 /// Every place of the two, and that the other side sees the same.
 fn met(a: &(Arc<CollisionShape>, Vec<DVec3>), b: &(Arc<CollisionShape>, Vec<DVec3>)) -> Vec<Touch> {
     let placed = [a, b].map(|(form, positions)| PlacedShape { form, view: ShapePose::Surface(positions) });
-    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
-    touches(&placed[0], &placed[1], REACH_M, &mut room, &mut list);
+    let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
+    touches(&placed[0], &placed[1], REACH_M, &mut scratch, &mut list);
     list
 }
 
