@@ -37,13 +37,13 @@ pub enum ShapeError {
         why: String,
     },
     /// A mesh has no triangle with an area.
-    #[error("none of the {triangles} triangles of the mesh has an area")]
+    #[error("none of the {triangles} triangles of the mesh has an area above zero")]
     EmptyMesh {
         /// Number of triangles given.
         triangles: usize,
     },
     /// A triangle refers to a corner that does not exist.
-    #[error("triangle {triangle} names corner {corner}, but there are only {points}")]
+    #[error("triangle {triangle} refers to point {corner}, but the mesh has only {points} points")]
     BadCorner {
         /// Index of the triangle, from 0.
         triangle: usize,
@@ -94,7 +94,7 @@ impl Solid {
             Self::Hull { points_m } => {
                 let points: Vec<Vec3> = points_m.iter().map(|p| p.as_vec3()).collect();
                 hull_triangles(points_m)?;
-                SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "its faces do not close"))?
+                SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "the faces of the hull do not close"))?
             }
             Self::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
@@ -138,7 +138,7 @@ fn flat(points: &[DVec3], why: impl Into<String>) -> ShapeError {
 /// The faces of the convex hull of `points`.
 pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     if points.len() < 4 {
-        return Err(flat(points, "it takes four points"));
+        return Err(flat(points, "a hull needs at least four points"));
     }
     let Aabb { low, high } = Aabb::of(points);
     let size = (high - low).max_element();
@@ -150,7 +150,7 @@ pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     if volume > VOLUME_SHARE_MIN * size.powi(3) {
         mesh_triangles(&corners, &triangles)
     } else {
-        Err(flat(points, "all lie in one plane"))
+        Err(flat(points, "all points lie in one plane"))
     }
 }
 

@@ -150,6 +150,6 @@ fn the_end_of_a_run_waits_for_no_step_that_never_returns() {
         eventually("it hangs", || log.lock().unwrap().len() == 3);
         let stats = run.shutdown();
         assert_eq!((&stats[0].state, stats[1].steps), (&AgentState::Running, 2));
-        assert_eq!(stats[1].state, AgentState::Parked("a step has not ended within 0.4 s".into()));
+        assert_eq!(stats[1].state, AgentState::Parked("a step did not end within 0.4 s".into()));
     });
 }

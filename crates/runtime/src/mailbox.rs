@@ -32,7 +32,7 @@ pub enum SendError {
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
     /// The command holds a number that is not finite, or a negative stiffness or damping.
-    #[error("refused {0:?}: every number must be finite, stiffness and damping not negative")]
+    #[error("command {0:?} was refused: every number must be finite, stiffness and damping not negative")]
     BadNumber(Command),
 }
 

@@ -49,7 +49,7 @@ impl AgentRunner {
             self.shared.traces.iter().for_each(|trace| locked(trace).record(state));
             Ok(())
         } else {
-            Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
+            Err(format!("the state of the {model} agent at {:.6} s is not finite", time.as_secs_f64()))
         }
     }
 

@@ -85,9 +85,7 @@ pub const RATE_MAX_HZ: f64 = 1e6;
 #[non_exhaustive]
 pub enum RunError {
     /// More agents than this executor takes.
-    #[error(
-        "{agents} agents are too many for a thread each, at most {most}: run them with executor = \"pool\" or \"auto\""
-    )]
+    #[error("{agents} agents are too many for one thread each (at most {most}); use executor = \"pool\" or \"auto\"")]
     TooMany {
         /// Number of requested agents.
         agents: usize,
@@ -104,7 +102,7 @@ pub enum RunError {
     },
     /// An invalid range of step lengths.
     #[error(
-        "agent \"{name}\": the step range {shortest_s} s to {longest_s} s must rise, lie above zero and end at 1 s at most"
+        "agent \"{name}\": the step range {shortest_s} s to {longest_s} s is invalid; expected 0 < shortest <= longest <= 1 s"
     )]
     BadStep {
         /// The agent's name.
@@ -123,7 +121,7 @@ pub enum RunError {
         link: u32,
     },
     /// Invalid fault rates.
-    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must lie from 0 to below 1")]
+    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must be at least 0 and below 1")]
     BadFaults {
         /// The agent's name.
         name: String,
@@ -133,7 +131,7 @@ pub enum RunError {
         loss: f64,
     },
     /// The system gave no thread.
-    #[error("the system gives no thread for {name}: {source}")]
+    #[error("the operating system refused a thread for {name}: {source}")]
     NoThread {
         /// The purpose of the thread.
         name: String,

@@ -104,7 +104,7 @@ impl Threads {
             }
         }
         for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
-            handle.shared.gauges.park(format!("a step has not ended within {} s", PATIENCE.as_secs_f64()));
+            handle.shared.gauges.park(format!("a step did not end within {} s", PATIENCE.as_secs_f64()));
         }
         self.threads.clear();
         empty_rooms(&self.handles, &self.timeline.read(), self.clock.now());

@@ -33,7 +33,7 @@ const SHEAR_FACTOR: f64 = 27.0 / 28.0;
 #[non_exhaustive]
 pub enum SceneBuildError {
     /// Two parts have one name.
-    #[error("two parts are called \"{name}\"; expected a name of its own for each")]
+    #[error("two objects are named \"{name}\"; every object needs a unique name")]
     SameName {
         /// The name.
         name: String,

@@ -43,7 +43,7 @@ pub enum WorldError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The world has no moving object of that name.
-    #[error("the world has no moving object \"{name}\"; it has {known}")]
+    #[error("the world has no moving object \"{name}\"; its moving objects are {known}")]
     NoObject {
         /// The name asked for.
         name: String,

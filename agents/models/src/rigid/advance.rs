@@ -51,7 +51,11 @@ impl RigidBody {
             };
             left -= span;
             if left <= 0.0 {
-                return if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it flew out of reach") };
+                return if self.motion.is_sane(&self.spread) {
+                    Ok(())
+                } else {
+                    Err("the free flight left the coordinate range")
+                };
             }
         }
         self.touching = true;
@@ -137,7 +141,7 @@ impl RigidBody {
             self.company.go_on(h);
             self.world.moved();
         }
-        if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it was thrown out of reach") }
+        if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("the contact motion left the coordinate range") }
     }
 
     /// Solves contact with all bodies that may touch within `h` seconds, and moves; `false`, with no change, if there are none.

@@ -214,7 +214,11 @@ impl RigidBody {
             self.world.moved();
         }
         let resistance = pulled.map(|pulled| pulled.resistance);
-        if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
+        if self.motion.is_sane(&self.spread) {
+            Ok(resistance)
+        } else {
+            Err("a spring moved the body out of the coordinate range")
+        }
     }
 
     /// Books the additional impulses of the springs and pressing tools in the last part, of `h` seconds, that follow from the `change` of

@@ -35,7 +35,7 @@ impl SoftBody {
                 continue;
             }
             if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
-                return Err(self.diverged("a vertex was thrown out of reach", dt));
+                return Err(self.diverged("a vertex left the coordinate range", dt));
             }
             self.finish_substep(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
@@ -48,7 +48,7 @@ impl SoftBody {
     pub(super) fn predict(&mut self, h: f64) -> Result<(), &'static str> {
         self.assemble(h);
         if !self.system.factor() {
-            return Err("its stiffness has no inverse");
+            return Err("the stiffness matrix is not positive definite");
         }
         let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
         free.clear();

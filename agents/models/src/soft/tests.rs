@@ -168,7 +168,7 @@ fn an_invalid_spec_is_refused_with_its_limit() {
     let fine = SoftShape::Ball { radius_m: 0.1, segments: 40 };
     assert!(fails(spec(fine)).contains("68921 vertices; at most 2048"));
     let point = SoftShape::Rope { path_m: vec![DVec3::X; 3], radius_m: 0.01, segments: 4 };
-    assert!(fails(spec(point)).contains("two points that are apart"));
+    assert!(fails(spec(point)).contains("two different points"));
     let bad = SoftShape::Box { size_m: DVec3::new(1.0, f64::NAN, 1.0), segments: [1; 3] };
     assert!(fails(spec(bad)).contains("the size is NaN"));
 }

@@ -257,7 +257,7 @@ impl Agent for Tool {
         };
         let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
         if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
-            let what = format!("the hand leads its tip to {}", led.tip);
+            let what = format!("the user spring moves the tip to {}", led.tip);
             return Err(StepError::Diverged { model: "tool", dt_s, what });
         }
         let was = self.tool.jaw;

@@ -132,7 +132,7 @@ impl Supervisor {
     fn on_ended(&mut self, number: u32) {
         let Some(at) = self.workers.iter().position(|worker| worker.number == number) else { return };
         if let Some(turn) = self.workers[at].watchdog.current() {
-            self.park(turn.agent(), "its worker broke down, which is a bug in metachron");
+            self.park(turn.agent(), "the worker thread of the agent panicked, which is a bug in metachron");
         }
         if self.state.sleep.stopping() { self.join(number) } else { self.replace(at) }
     }
@@ -145,7 +145,7 @@ impl Supervisor {
     }
 
     fn park_stuck(&self, id: AgentId, patience: Duration) {
-        self.park(id, &format!("a step has not ended within {} s", patience.as_secs_f64()));
+        self.park(id, &format!("a step did not end within {} s", patience.as_secs_f64()));
     }
 
     /// Parks an agent that is stuck in a turn, and all agents it leads, from outside.

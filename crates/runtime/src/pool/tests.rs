@@ -32,7 +32,7 @@ fn a_step_that_never_returns_parks_its_agent_only() {
         eventually("the others go on", || each(false).all(|(at, a)| a.stats().steps >= before[at] + 20));
         let stats = run.shutdown();
         for (at, agent) in stats.iter().enumerate() {
-            let state = AgentState::Parked("a step has not ended within 0.2 s".into());
+            let state = AgentState::Parked("a step did not end within 0.2 s".into());
             assert_eq!(agent.state, if is_hung(at) { state } else { AgentState::Running }, "{at} of {workers}");
         }
     }
