@@ -104,7 +104,7 @@ pub enum SoftError {
     #[error("the path of a rope needs at least two different points")]
     NoPath,
     /// There are more vertices than a step can take.
-    #[error("the soft body has {vertices} vertices, at most {VERTICES_MAX} are supported; use fewer segments")]
+    #[error("the soft body has {vertices} vertices; at most {VERTICES_MAX} are supported: use fewer segments")]
     TooFine {
         /// How many it would have.
         vertices: u64,
