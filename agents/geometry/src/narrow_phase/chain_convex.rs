@@ -31,7 +31,7 @@ pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into
         if strand.count() > 1 {
             let right = pair.node(span + 1, into);
             last = Some((span + 1, right));
-            if field.feels_spans() {
+            if field.needs_span_tests() {
                 pair.span(span, [left, right], into);
             }
         }

@@ -5,7 +5,8 @@
 //! Theory: docs/theory/coupling.md, eq. 4c and 7b–7d.
 
 use super::RigidBody;
-use super::linear_spring::{PartLoads, SpringResult, VelocityStep, spring_state};
+use super::linear_spring::{PartLoads, SpringResult, spring_state};
+use super::motion::VelocityStep;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::StepContext;

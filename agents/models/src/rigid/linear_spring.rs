@@ -9,7 +9,7 @@
 //! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
 
 use super::mass_properties::MassDistribution;
-use super::motion::Motion;
+use super::motion::{Motion, VelocityStep};
 use super::orientation_spring::OrientationSpring;
 use glam::{DMat3, DVec3};
 use metachron_contact::AnchorSpring;
@@ -67,15 +67,6 @@ pub(super) struct PartLoads {
     pub lasting: Twist,
     /// The change by impulses received at the part's start: the reaction of the springs to it is counted in their impulses.
     pub received: VelocityStep,
-}
-
-/// A sudden change of the velocities, and for how long springs reacted to it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct VelocityStep {
-    /// The change of velocity and spin, m/s and rad/s.
-    pub change: Twist,
-    /// How long springs reacted to it, seconds.
-    pub span_s: f64,
 }
 
 /// Result of the springs in a part.

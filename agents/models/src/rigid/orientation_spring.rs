@@ -4,7 +4,7 @@
 //! resists a change of the spin. Never here: the point that is held, and how the system is solved ([`crate::rigid::linear_spring`]).
 //! Theory: docs/theory/coupling.md, eq. 9b.
 
-use super::linear_spring::VelocityStep;
+use super::motion::VelocityStep;
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_core::Sprung;

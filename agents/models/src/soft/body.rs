@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// A sheet, solid or rope with its own clock.
 pub struct SoftBody {
     pub(super) spec: SoftSpec,
-    pub(super) lattice: FeMesh,
+    pub(super) mesh: FeMesh,
     pub(super) system: System,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
@@ -64,24 +64,23 @@ impl SoftBody {
     /// [`SoftError`] for a number outside its range, a side it does not have, an invalid obstacle shape.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let lattice = FeMesh::new(&spec);
+        let mesh = FeMesh::new(&spec);
         let rotation = spec.rotation.normalize();
-        let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
-        let velocities: Vec<_> =
-            lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let held = lattice.held.contains(&true);
+        let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
+        let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
+        let held = mesh.held.contains(&true);
         let height_j_kg = height_j_kg(&positions, spec.gravity, held);
-        let surface = lattice.surface(height_j_kg);
+        let surface = mesh.surface(height_j_kg);
         let edge_m = surface.edge_m;
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
         Ok(Self {
-            system: lattice.system(),
+            system: mesh.system(),
             free: positions.clone(),
             before: velocities.clone(),
             positions,
             velocities,
-            lattice,
+            mesh,
             contacts,
             given: vec![],
             ties: vec![],
@@ -115,10 +114,10 @@ impl SoftBody {
     /// Kinetic, elastic and gravitational energy, J.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
-        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let moving = self.mesh.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
         let of =
             |((mass, v), x): ((&f64, &DVec3), &DVec3)| mass * (0.5 * v.length_squared() - self.spec.gravity.dot(*x));
-        moving.map(of).sum::<f64>() + self.lattice.energy_j(&self.positions)
+        moving.map(of).sum::<f64>() + self.mesh.energy_j(&self.positions)
     }
 
     /// The box around it.
@@ -175,7 +174,7 @@ impl SoftBody {
         self.company.close(context, (dt, mass_kg));
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
-        self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
+        self.acceleration = if self.mesh.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
         let extra = self.foretell(dt);
         self.lately.pass(self.contacts.is_grounded(), dt);
         self.steps += 1;
@@ -220,7 +219,7 @@ impl Agent for SoftBody {
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {
-        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let moving = self.mesh.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
         moving.fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), ((mass, v), x)| {
             let momentum = *v * *mass;
             (linear + momentum, angular + x.cross(momentum))
@@ -228,7 +227,7 @@ impl Agent for SoftBody {
     }
 
     fn mass_kg(&self) -> f64 {
-        self.lattice.mass_kg.iter().sum()
+        self.mesh.mass_kg.iter().sum()
     }
 }
 
@@ -245,6 +244,6 @@ impl SoftBody {
 
     /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
     pub(super) fn work(&self) -> f64 {
-        1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64
+        1e-3 * self.system.work() as f64 + 0.5 * self.mesh.elements() as f64
     }
 }

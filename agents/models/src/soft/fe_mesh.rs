@@ -39,24 +39,24 @@ impl FeMesh {
     pub fn new(spec: &SoftSpec) -> Self {
         let grid = Grid::of(&spec.shape);
         let count = grid.count();
-        let mut lattice = Self {
+        let mut mesh = Self {
             rest: vec![DVec3::ZERO; count],
             mass_kg: vec![0.0; count],
             held: vec![false; count],
             ..Self::default()
         };
         for side in &spec.held {
-            grid.on(*side).for_each(|vertex| lattice.held[vertex as usize] = true);
+            grid.on(*side).for_each(|vertex| mesh.held[vertex as usize] = true);
         }
         match &spec.shape {
-            SoftShape::Sheet { size_m, thickness_m, .. } => lattice.sheet(&grid, *size_m, *thickness_m, &spec.matter),
-            SoftShape::Box { size_m, .. } => lattice.solid(&grid, &spec.matter, |share| *size_m * share),
-            SoftShape::Ball { radius_m, .. } => lattice.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
-            SoftShape::Rope { path_m, radius_m, .. } => lattice.rope(&grid, path_m, *radius_m, &spec.matter),
+            SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.matter),
+            SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
+            SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
+            SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.matter),
         }
         let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
-        lattice.rows = grid.rows().into_iter().map(|row| (row, sag(row, &lattice.rest))).collect();
-        lattice
+        mesh.rows = grid.rows().into_iter().map(|row| (row, sag(row, &mesh.rest))).collect();
+        mesh
     }
 
     fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, matter: &SoftMatter) {

@@ -29,7 +29,7 @@ impl SoftBody {
             let h = dt / f64::from(parts);
             self.predict(h).map_err(|what| self.diverged(what, dt))?;
             self.solve_contacts(h);
-            if self.lattice.edge_change(&self.free, h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
+            if self.mesh.edge_change(&self.free, h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
                 self.given.iter_mut().for_each(|given| *given *= 0.5); // the impulse acts evenly through the step
                 continue;
@@ -50,9 +50,9 @@ impl SoftBody {
         if !self.system.factor() {
             return Err("the stiffness matrix is not positive definite");
         }
-        let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
+        let Self { system, mesh, velocities, free, given, ties, company, .. } = self;
         free.clear();
-        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
+        let momenta = velocities.iter().zip(&mesh.mass_kg).map(|(v, mass)| *v * *mass);
         free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
         free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
         system.respond(free);
@@ -62,12 +62,12 @@ impl SoftBody {
 
     /// Assembles the system of a substep of `h` seconds at the present positions.
     pub(super) fn assemble(&mut self, h: f64) {
-        let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
+        let Self { system, mesh, positions, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let inertia = 1.0 + h * spec.matter.damping_per_s;
-        for (vertex, &mass) in lattice.mass_kg.iter().enumerate() {
+        for (vertex, &mass) in mesh.mass_kg.iter().enumerate() {
             system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
             system.push(vertex as u32, spec.gravity * mass);
         }

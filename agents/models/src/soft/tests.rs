@@ -131,9 +131,9 @@ fn the_forces_of_a_bent_body_have_no_sum_and_no_torque() {
     for shape in all() {
         let mut body = shaken(shape);
         run(&mut body, 0.005, 5);
-        let SoftBody { lattice, system, positions, .. } = &mut body;
+        let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let size: f64 = system.forces.iter().map(|f| f.length()).sum();
         let sum: DVec3 = system.forces.iter().sum();
         let torque: DVec3 = system.forces.iter().zip(&*positions).map(|(f, x)| x.cross(*f)).sum();
@@ -146,13 +146,13 @@ fn forces_are_minus_the_slope_of_the_energy() {
     for shape in all() {
         let mut body = shaken(shape);
         run(&mut body, 0.005, 5);
-        let SoftBody { lattice, system, positions, .. } = &mut body;
+        let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let force = system.forces.clone();
         let way = |k: usize| DVec3::new(libm::sin(k as f64), libm::cos(3.0 * k as f64), libm::sin(5.0 * k as f64));
         let at = |by: f64| -> Vec<DVec3> { positions.iter().enumerate().map(|(k, x)| *x + way(k) * by).collect() };
-        let slope = (lattice.energy_j(&at(1e-7)) - lattice.energy_j(&at(-1e-7))) / 2e-7;
+        let slope = (mesh.energy_j(&at(1e-7)) - mesh.energy_j(&at(-1e-7))) / 2e-7;
         let wanted: f64 = force.iter().enumerate().map(|(k, f)| -f.dot(way(k))).sum();
         // central differences of second order in 1e-7, rounding of energies near 0.1 J
         assert!((slope - wanted).abs() < 1e-5 * force.iter().map(|f| f.length()).sum::<f64>(), "{slope} {wanted}");

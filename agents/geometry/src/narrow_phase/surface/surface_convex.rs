@@ -58,7 +58,7 @@ impl SurfaceQuery<'_> {
                 into.extend(self.block_contact(key, SkinPoint::vertex(vertex, at), block, touch));
             }
         }
-        if !field.feels_spans() {
+        if !field.needs_span_tests() {
             return;
         }
         let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
