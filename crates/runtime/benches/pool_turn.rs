@@ -7,7 +7,7 @@ use metachron_runtime::{AgentSpawn, Pool, Priority, Run, SystemClock, TimelineCo
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Far above what any machine can do: nobody ever waits.
+/// Far above what any machine can do: no agent ever waits.
 const UNPACED_HZ: f64 = 1e5;
 
 /// An agent whose step is next to nothing.

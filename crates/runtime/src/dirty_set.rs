@@ -56,7 +56,7 @@ mod tests {
         assert_eq!(visited(), [0, 63, 64, 129]);
         assert!(visited().is_empty());
         set.mark(AgentId(5000));
-        assert!(visited().is_empty(), "strangers are nobody");
+        assert!(visited().is_empty(), "unknown agents are ignored");
     }
 
     #[test]

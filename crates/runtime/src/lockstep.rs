@@ -104,7 +104,7 @@ impl Lockstep {
         }
     }
 
-    /// Serves the summoned agents: sleepers that are woken, and agents that return from a leader.
+    /// Serves the notified agents: sleepers that are woken, and agents that return from a leader.
     fn wake_sleepers(&mut self) {
         if !self.sleep.take_notified() {
             return;

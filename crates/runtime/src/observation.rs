@@ -143,19 +143,19 @@ impl Observer {
         }
     }
 
-    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which shares an island with `fellows`.
-    pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, fellows: &Fellows) {
+    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which shares an island with `members`.
+    pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, members: &Fellows) {
         let me = self.me;
         if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
             let mine = peers.get(me);
-            neighbour_list.update(broad_phase, step, fellows, |other| {
+            neighbour_list.update(broad_phase, step, members, |other| {
                 mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b))
             });
-            self.collect_wanted(broad_phase, writer, fellows);
+            self.collect_wanted(broad_phase, writer, members);
             self.list_wanted(peers);
         }
         for (neighbour, source) in self.neighbours.iter_mut().zip(&mut self.sources) {
-            let island_member = fellows.has(neighbour.id);
+            let island_member = members.has(neighbour.id);
             if island_member != source.island_member {
                 source.island_member = island_member;
                 set_island_member(neighbour, peers, me, island_member);
@@ -166,14 +166,14 @@ impl Observer {
 
     /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
     /// body to which this agent also gives.
-    fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, fellows: &Fellows) {
+    fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, members: &Fellows) {
         let Self { me, neighbours, links, neighbour_list, wanted, sources } = self;
         let me = *me;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
         let near = neighbour_list.iter().flat_map(|neighbour_list| neighbour_list.near().iter().copied());
-        wanted.extend(near.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+        wanted.extend(near.filter(|id| !is_linked(*id) && !members.has(*id)));
         let near = wanted.len();
         for (neighbour, source) in near_once.iter_mut().zip(&sources[*links..]) {
             if wanted[..near].binary_search(&neighbour.id).is_ok() {
@@ -191,7 +191,7 @@ impl Observer {
         });
         for neighbour in linked.iter().chain(&*near_once) {
             let givers = other_givers(me, &neighbour.snapshot);
-            wanted.extend(givers.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+            wanted.extend(givers.filter(|id| !is_linked(*id) && !members.has(*id)));
         }
         if wanted.len() > near {
             wanted.sort_unstable();

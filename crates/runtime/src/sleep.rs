@@ -61,7 +61,7 @@ impl Default for Signal {
 #[derive(Debug)]
 pub(super) struct SleepRegistry {
     signals: Vec<Signal>,
-    /// An agent was summoned: the lockstep loop serves it.
+    /// An agent was notified: the lockstep loop serves it.
     notified: AtomicBool,
     stop: AtomicBool,
     /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
@@ -85,7 +85,7 @@ impl SleepRegistry {
         }
     }
 
-    /// From now on summons go to this many workers of a pool.
+    /// From now on notifications go to this many workers of a pool.
     pub fn set_workers(&self, workers: usize) {
         self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
     }
@@ -221,7 +221,7 @@ impl SleepRegistry {
         woken
     }
 
-    /// Whether any agent was summoned since the last call.
+    /// Whether any agent was notified since the last call.
     pub fn take_notified(&self) -> bool {
         self.notified.load(Relaxed) && self.notified.swap(false, AcqRel)
     }
@@ -290,7 +290,7 @@ mod tests {
     fn a_wake_before_the_rest_is_not_lost() {
         let sleep = SleepRegistry::new(1);
         sleep.wake(ME);
-        assert!(!try_rest(&sleep, SimTime::ZERO), "woken before it lay down");
+        assert!(!try_rest(&sleep, SimTime::ZERO), "woken before it rested");
         assert!(try_rest(&sleep, SimTime::ZERO), "that wake is used up");
         sleep.wake(ME);
         assert!(sleep.take_notified());

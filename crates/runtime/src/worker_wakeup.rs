@@ -1,9 +1,9 @@
-//! Wake-up of a pool's workers: which agents were summoned, and which sleeping worker can serve them.
+//! Wake-up of a pool's workers: which agents were notified, and which sleeping worker can serve them.
 //!
-//! In: summons from any thread. Out: the summoned agents, once, to the first worker that looks.
-//! No thread blocks another, and no summons is lost: the caller marks the agent first and looks for sleepers after; a worker declares
+//! In: notifications from any thread. Out: the notified agents, once, to the first worker that looks.
+//! No thread blocks another, and no notification is lost: the caller marks the agent first and looks for sleepers after; a worker declares
 //! itself asleep first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
-//! Never here: what a worker does with the summoned agents, how long it sleeps.
+//! Never here: what a worker does with the notified agents, how long it sleeps.
 
 use super::sync::Mutex;
 use super::sync::atomic::{
@@ -74,12 +74,12 @@ impl WorkerWakeup {
         self.workers.iter().for_each(Parker::wake);
     }
 
-    /// Whether any agent was summoned since the last [`Self::take_notified`].
+    /// Whether any agent was notified since the last [`Self::take_notified`].
     pub fn is_notified(&self) -> bool {
         self.notified.load(Acquire)
     }
 
-    /// Visits the agents summoned since the last call, by rising numbers; returns their count.
+    /// Visits the agents notified since the last call, by rising numbers; returns their count.
     pub fn take_notified(&self, mut visit: impl FnMut(AgentId)) -> usize {
         if !self.notified.swap(false, AcqRel) {
             return 0;
@@ -96,7 +96,7 @@ impl WorkerWakeup {
         count
     }
 
-    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was summoned. It may wake early.
+    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was notified. It may wake early.
     pub fn sleep(&self, at: usize, span: Option<Duration>) {
         let Some(worker) = self.workers.get(at) else { return };
         worker.asleep.store(true, Relaxed);
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(answered(&wakeup), [0, 3, 64, 199]);
         assert!(answered(&wakeup).is_empty());
         wakeup.notify(AgentId(5000));
-        assert!(!wakeup.is_notified(), "strangers are nobody");
+        assert!(!wakeup.is_notified(), "unknown agents are ignored");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
 //! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
 //!
-//! A place is told by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): what lies ahead on a flat skin is
-//! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is told in
+//! A place is reported by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): what lies ahead on a flat skin is
+//! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in
 //! the surface itself, so that both sides are pushed at one point.
 
 mod surface_convex;

@@ -1,6 +1,6 @@
 //! The rigid body agent: the sequence of one step.
 //!
-//! In: a span and the surroundings. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
+//! In: a span and the step context. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::borne::Borne;
 use super::company::Company;
@@ -192,9 +192,9 @@ impl RigidBody {
         self.advance(h, if pulled.is_some() { DVec3::ZERO } else { self.gravity })
     }
 
-    /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `fellows`, by rising ids, are in the same island.
-    pub(super) fn begin(&mut self, context: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
-        self.receive(context, fellows, dt);
+    /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `members`, by rising ids, are in the same island.
+    pub(super) fn begin(&mut self, context: &StepContext<'_>, members: &[AgentId], dt: f64) {
+        self.receive(context, members, dt);
         self.apply_one_sided_laws(context, dt);
         self.ties.gather(context, &self.company);
         self.grips.clear();

@@ -30,12 +30,12 @@ impl RigidBody {
     /// Begins a step of `dt` seconds: takes the impulses of the owners of its contacts, and brings each agent that it meets to its
     /// own time.
     ///
-    /// `fellows`, by rising ids, are in the same island as this body: contacts between them are not coupled.
-    pub fn receive(&mut self, context: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
+    /// `members`, by rising ids, are in the same island as this body: contacts between them are not coupled.
+    pub fn receive(&mut self, context: &StepContext<'_>, members: &[AgentId], dt: f64) {
         let before = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.company.exchange.open(context);
         self.company.pairs.open();
-        if fellows.is_empty() {
+        if members.is_empty() {
             self.within = None;
         }
         self.late = None;
@@ -50,10 +50,10 @@ impl RigidBody {
         let given = self.received[0] != DVec3::ZERO;
         let held = given || self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
         self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
-        self.company.gather(context, (&self.world.mover, &self.motion), fellows);
+        self.company.gather(context, (&self.world.mover, &self.motion), members);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
         self.begun_at = (self.motion.position, self.motion.angular);
-        self.held_up = !fellows.is_empty();
+        self.held_up = !members.is_empty();
     }
 
     /// Takes owners' impulses, including those that act in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).

@@ -1,6 +1,6 @@
 //! One substep of a soft body: linearly implicit Euler, contacts between solve and move.
 //!
-//! In: a state and its surroundings. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
+//! In: a state and its step context. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
 use super::contact::Substep;

@@ -243,7 +243,7 @@ impl Agent for Tool {
         "tool"
     }
 
-    /// Moves the tip by `dt`, moves the jaws, reads the forces felt.
+    /// Moves the tip by `dt`, moves the jaws, reads the forces on it.
     ///
     /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {

@@ -1,4 +1,4 @@
-//! Forces felt by a tool: the impulses that peers gave it, as a force, and the part of them that moves the tool.
+//! Forces on a tool: the impulses that peers gave it, as a force, and the part of them that moves the tool.
 //!
 //! In: the ledgers of the agents that touch it or are held by it. Out: a force, and the contact impulses for the drive ([`super::drive`]).
 //! Never here: the path of the tool.

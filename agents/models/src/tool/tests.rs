@@ -336,6 +336,6 @@ fn a_tool_wakes_only_the_sleeping_agents_in_its_way() {
         assert_eq!(woke_at_m.is_some(), wakes, "down to {end_m} m");
         // the jaws reach a centimetre beyond the tip, the skin of the tube one more, two steps at most one more
         assert!(woke_at_m.is_none_or(|z| z > 0.01 && z < 0.06), "{woke_at_m:?}");
-        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool that stands wakes nobody");
+        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool at rest wakes no agent");
     }
 }

@@ -99,19 +99,19 @@ impl NeighbourList {
     }
 
     /// Checks the peers whose next check is due, before a `step`; returns how many were checked. Only peers that it `may_touch` are near;
-    /// members of its own island (`fellows`) are skipped.
+    /// members of its own island (`members`) are skipped.
     pub fn update(
         &mut self,
         broad_phase: &BroadPhase,
         step: PlannedStep,
-        fellows: &Fellows,
+        members: &Fellows,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
         let PlannedStep { start: now, dt } = step;
-        if self.world != fellows.world() {
-            (self.world, self.common_check) = (fellows.world(), SimTime::ZERO);
+        if self.world != members.world() {
+            (self.world, self.common_check) = (members.world(), SimTime::ZERO);
         }
-        self.read_log(broad_phase, fellows);
+        self.read_log(broad_phase, members);
         // checks leave time for two steps
         if dt.as_nanos() > 2 * self.dt.as_nanos() {
             self.common_check = SimTime::ZERO;
@@ -122,9 +122,9 @@ impl NeighbourList {
         let Some(mine) = self.mine else { return 0 };
         let checked = if self.common_check <= now {
             self.dt = dt;
-            self.check_all(broad_phase, now, fellows, may_touch)
+            self.check_all(broad_phase, now, members, may_touch)
         } else {
-            self.listed.retain(|other| !fellows.has(other.id));
+            self.listed.retain(|other| !members.has(other.id));
             self.check_due(broad_phase, &mine, now, may_touch)
         };
         self.soonest = self.listed.iter().map(|other| other.at).min().unwrap_or(NEVER);
@@ -159,7 +159,7 @@ impl NeighbourList {
         &mut self,
         broad_phase: &BroadPhase,
         now: SimTime,
-        fellows: &Fellows,
+        members: &Fellows,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
         let Some(mine) = self.mine else { return 0 };
@@ -169,7 +169,7 @@ impl NeighbourList {
         self.listed.clear();
         let me = self.me;
         for (id, published) in
-            (0..).map(AgentId).zip(&broad_phase.bounds).filter(|(id, _)| *id != me && !fellows.has(*id))
+            (0..).map(AgentId).zip(&broad_phase.bounds).filter(|(id, _)| *id != me && !members.has(*id))
         {
             let seen = published.read();
             checked += 1;
@@ -205,11 +205,11 @@ impl NeighbourList {
     }
 
     /// Makes the peers that became faster than their published speed due for a check.
-    fn read_log(&mut self, broad_phase: &BroadPhase, fellows: &Fellows) {
+    fn read_log(&mut self, broad_phase: &BroadPhase, members: &Fellows) {
         let Self { me, listed, soonest, common_check, near, .. } = self;
         let most = 2 * (LISTED + near.len());
         let (next, whole) = broad_phase.read_log(self.unread, |id| {
-            if id == *me || *common_check == SimTime::ZERO || fellows.has(id) {
+            if id == *me || *common_check == SimTime::ZERO || members.has(id) {
                 return;
             }
             *soonest = SimTime::ZERO;

@@ -175,7 +175,7 @@ fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
             .map(|list| list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
             .sum()
     };
-    assert_eq!(checks(&mut lists, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
+    assert_eq!(checks(&mut lists, SimTime::ZERO), count * (count - 1), "all agents at first");
     // 8 m at 2 · 0.0625 m/s is a minute
     for turn in 1..=250_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
@@ -186,7 +186,7 @@ fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     }
     let now = SimTime::from_nanos(1_004_000_000);
     lists[0].publish(&broad_phase, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
-    // everybody looks at the one who has become fast, and he at everybody
+    // all agents check the one that has become fast, and it checks all agents
     assert_eq!(checks(&mut lists, now), 2 * (count - 1));
     assert_eq!((lists[1].near(), lists[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
 }
@@ -215,7 +215,7 @@ fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
             checks += list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
         }
     }
-    // everybody once in 33 turns
+    // each agent once in 33 turns
     let each = checks as f64 / 20_000.0;
     assert!(each < 40.0, "{each} looks a turn");
 }

@@ -162,7 +162,7 @@ fn rest_stops_the_steps_and_a_command_wakes() {
     agent.send(Command::Retune(Resolution { eps_m: 0.05, n: 1 })).unwrap();
     run.wait_until(ms(2000));
     let stats = agent.stats();
-    assert_eq!((stats.steps, stats.state), (11, AgentState::Resting), "it obeyed and lay down again");
+    assert_eq!((stats.steps, stats.state), (11, AgentState::Resting), "it obeyed and rests again");
     assert_eq!(stats.resolution.unwrap().eps_m, 0.05);
     assert_eq!(agent.latest().time, sim_ms(1004));
     assert_eq!(stats.dropped, SimSpan::ZERO);

@@ -1,9 +1,9 @@
 //! Shared state of a pool's workers.
 //!
-//! In: agents between their turns, summons. Out: for each worker its next turn, or how long it may sleep.
+//! In: agents between their turns, notifications. Out: for each worker its next turn, or how long it may sleep.
 //! Every worker has its own queue, with a lock that is normally uncontended. A worker without work helps one whose turn is overdue, and
 //! takes the agent over; at intervals a worker with work checks whether agents of other workers are served worse.
-//! Agents at rest are stored in one slot each until they are summoned. Never here: threads, turns.
+//! Agents at rest are stored in one slot each until they are notified. Never here: threads, turns.
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::AgentRunner;
@@ -92,7 +92,7 @@ impl PoolState {
     pub fn store_resting(&self, actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let id = actor.id();
         let slot = self.resting.get(id.0 as usize)?;
-        // a summons before this found the slot empty: then its mark is seen here; a later one finds the agent
+        // a notification before this found the slot empty: then its mark is seen here; a later one finds the agent
         drop(slot.swap(Some(actor)));
         if self.sleep.is_woken(id) { slot.take() } else { None }
     }

@@ -49,7 +49,7 @@ fn agents_led_by_a_hung_agent_are_parked_with_it() {
     eventually("they are one", || run.agents()[1..3].iter().all(|a| a.led_by() == Some(AgentId(0))));
     eventually("all three are parked", || run.agents()[..3].iter().all(parked));
     let before = run.agents()[3].stats().steps;
-    eventually("a stranger goes on", || run.agents()[3].stats().steps >= before + 20);
+    eventually("an unrelated agent goes on", || run.agents()[3].stats().steps >= before + 20);
     assert_eq!(run.shutdown()[3].state, AgentState::Running);
 }
 

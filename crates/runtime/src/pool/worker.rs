@@ -1,6 +1,6 @@
 //! One worker of a pool: makes one due turn after the other.
 //!
-//! In: the pool's shared state, a place in it. Out: turns. Between two turns it serves summons, and sleeps if no turn is due: it waits for
+//! In: the pool's shared state, a place in it. Out: turns. Between two turns it serves notifications, and sleeps if no turn is due: it waits for
 //! no lock except its own queue's, and its only system call is to sleep. Never here: the choice of the next turn.
 
 use super::super::agent_clock::Timeline;
@@ -115,7 +115,7 @@ impl Worker {
         }
     }
 
-    /// Serves the summoned agents.
+    /// Serves the notified agents.
     fn serve_notified(&mut self, timeline: &Timeline) {
         let Some(wakeup) = self.state.sleep.wakeup().filter(|wakeup| wakeup.is_notified()) else { return };
         self.now = self.state.clock.now();
@@ -226,7 +226,7 @@ mod tests {
             worker.last = worker.turn(actor, &timeline);
         }
         assert!(worker.last.is_none());
-        assert_eq!(worker.state.pause(0, worker.now), None, "nobody is due");
+        assert_eq!(worker.state.pause(0, worker.now), None, "no agent is due");
         assert!(worker.state.handles.iter().all(|agent| agent.state() == crate::AgentState::Resting));
     }
 
