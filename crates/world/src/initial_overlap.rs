@@ -11,7 +11,7 @@
 
 use super::couplings::{Coupling, CouplingKind};
 use super::initial_shape::{StartShape, shape};
-use super::overlap::{Inside, OVERLAP_MIN_M};
+use super::overlap::{Container, OVERLAP_MIN_M};
 use super::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_core::AgentId;
@@ -50,7 +50,7 @@ impl Scene {
     /// Moves every free deformable out of the objects that it starts inside, along the shortest way that leaves it clear of all; of two
     /// deformables the later one. A free rigid body is moved out of a deformable that is held, a tool out of all that it does not grasp.
     /// Where there is no such way, nothing is moved.
-    pub(super) fn move_apart(&mut self, inside: &[(AgentId, Inside, f64)]) {
+    pub(super) fn move_apart(&mut self, inside: &[(AgentId, Container, f64)]) {
         let pairs: Vec<_> = inside.iter().map(|(a, b, _)| self.movers(*a, *b)).filter(|all| !all.is_empty()).collect();
         if pairs.is_empty() {
             return;
@@ -74,18 +74,18 @@ impl Scene {
     }
 
     /// The agents of a pair that may be moved.
-    fn movers(&self, a: AgentId, b: Inside) -> Vec<AgentId> {
+    fn movers(&self, a: AgentId, b: Container) -> Vec<AgentId> {
         let bends = |id: AgentId| matches!(self.agents[id.0 as usize].spec, Spec::Tube(_) | Spec::Soft(_));
         let loose = |id: &AgentId| bends(*id) && self.is_free(*id);
         match b {
-            Inside::Fixed(_) => Some(a).filter(loose).into_iter().collect(),
-            Inside::Agent(b) if self.is_led(a) || self.is_led(b) => {
+            Container::Fixed(_) => Some(a).filter(loose).into_iter().collect(),
+            Container::Agent(b) if self.is_led(a) || self.is_led(b) => {
                 let (tool, other) = if self.is_led(a) { (a, b) } else { (b, a) };
                 let may_retract = self.may_retract(tool, other);
                 [tool, other].into_iter().filter(|id| may_retract && (*id == tool || loose(id))).collect()
             }
-            Inside::Agent(b) if !(bends(a) || bends(b)) => vec![],
-            Inside::Agent(b) => {
+            Container::Agent(b) if !(bends(a) || bends(b)) => vec![],
+            Container::Agent(b) => {
                 let rigid = || [b, a].into_iter().find(|id| !bends(*id) && self.is_free(*id));
                 [b, a].into_iter().find(loose).or_else(rigid).into_iter().collect()
             }

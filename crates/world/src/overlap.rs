@@ -32,7 +32,7 @@ pub struct Overlap {
 
 /// The object that an agent starts inside of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Inside {
+pub(super) enum Container {
     /// Another agent.
     Agent(AgentId),
     /// A static solid, by its index in [`Scene::obstacles`].
@@ -41,22 +41,22 @@ pub(super) enum Inside {
 
 impl Scene {
     /// The overlaps, with names.
-    pub(super) fn overlaps_by_name(&self, inside: &[(AgentId, Inside, f64)]) -> Vec<Overlap> {
-        let name = |b: Inside| match b {
-            Inside::Agent(id) => self.name_of(id).to_owned(),
-            Inside::Fixed(at) => self.obstacles[at].name.clone(),
+    pub(super) fn overlaps_by_name(&self, inside: &[(AgentId, Container, f64)]) -> Vec<Overlap> {
+        let name = |b: Container| match b {
+            Container::Agent(id) => self.name_of(id).to_owned(),
+            Container::Fixed(at) => self.obstacles[at].name.clone(),
         };
-        let named = |&(a, b, depth_m): &_| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
+        let named = |&(a, b, depth_m): &_| Overlap { a: name(Container::Agent(a)), b: name(b), depth_m };
         inside.iter().map(named).collect()
     }
 
     /// All overlaps at the poses that the scene gives, and their depths, metres: pairs of agents in the order of their ids, then agents
     /// inside static solids.
-    pub(super) fn find_overlaps(&self) -> Vec<(AgentId, Inside, f64)> {
+    pub(super) fn find_overlaps(&self) -> Vec<(AgentId, Container, f64)> {
         let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
             if gap_m <= -OVERLAP_MIN_M {
-                pairs.push((one.id.min(two.id), Inside::Agent(one.id.max(two.id)), -gap_m));
+                pairs.push((one.id.min(two.id), Container::Agent(one.id.max(two.id)), -gap_m));
             }
         });
         pairs.sort_by_key(|&(a, b, _)| (a, b));
@@ -66,7 +66,7 @@ impl Scene {
 
     /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
     /// its axis is inside.
-    fn overlaps_with_static(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
+    fn overlaps_with_static(&self, pairs: &mut Vec<(AgentId, Container, f64)>) {
         let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         let others = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
         for shape in others.filter_map(shape) {
@@ -80,7 +80,7 @@ impl Scene {
                 };
                 let depth_m = found.iter().filter(counts).map(|touch| -touch.gap_m).fold(0.0, f64::max);
                 if depth_m >= OVERLAP_MIN_M {
-                    pairs.push((shape.id, Inside::Fixed(at), depth_m));
+                    pairs.push((shape.id, Container::Fixed(at), depth_m));
                 }
             }
         }

@@ -24,7 +24,7 @@ fn noisy(seed: u64) -> Machine {
 }
 
 /// Four agents of 240 Hz that need 0.5 ms each, and one more whose step costs `work` µs.
-fn company(work: f64, machine: Machine) -> Vec<AgentStats> {
+fn five_agents(work: f64, machine: Machine) -> Vec<AgentStats> {
     let mut spawns: Vec<_> = (0..4).map(|_| Dummy::new(500.0).at(240.0)).collect();
     spawns.push(Dummy::new(work).at(240.0));
     let mut run = Box::new(Lockstep::start(spawns, machine).unwrap());
@@ -36,7 +36,7 @@ fn company(work: f64, machine: Machine) -> Vec<AgentStats> {
 fn an_overloaded_agent_leaves_the_others_their_rates() {
     for machine in [Machine::two_cores_software(), noisy(5)] {
         // 4 ms of 4.17 is a full load; ten times that cannot be kept
-        let (before, after) = (company(4_000.0, machine.clone()), company(40_000.0, machine));
+        let (before, after) = (five_agents(4_000.0, machine.clone()), five_agents(40_000.0, machine));
         for (b, a) in before.iter().zip(&after).take(4) {
             let change = a.steps as f64 / b.steps as f64 - 1.0;
             assert!(change.abs() < 0.01, "{} -> {} steps", b.steps, a.steps);
@@ -67,7 +67,7 @@ fn an_overloaded_agent_lags_no_more_than_the_cap_however_long_it_runs() {
 
 #[test]
 fn a_load_that_fits_keeps_its_rate_under_noise() {
-    let stats = company(1_000.0, noisy(3));
+    let stats = five_agents(1_000.0, noisy(3));
     for agent in stats {
         // 240 Hz in whole nanoseconds over 10 s, and the step under way
         assert!((2399..=2401).contains(&agent.steps), "{} steps", agent.steps);
@@ -339,7 +339,7 @@ fn an_invalid_agent_is_refused_with_its_name() {
 
 #[test]
 fn cpu_time_is_measured_in_virtual_time_too() {
-    let stats = company(100.0, Machine::default());
+    let stats = five_agents(100.0, Machine::default());
     let cpu_s: f64 = stats.iter().map(|s| s.cpu_s).sum();
     // 12,000 turns were really made, in far less than the 10 s of virtual time of two cores
     assert!(cpu_s > 0.0 && cpu_s < 10.0, "{cpu_s}");

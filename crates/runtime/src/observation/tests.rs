@@ -28,8 +28,8 @@ fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
 }
 
 fn crowded(spawns: Vec<AgentSpawn>) -> bool {
-    let company = assemble(spawns).unwrap();
-    company.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
+    let run = assemble(spawns).unwrap();
+    run.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
 }
 
 #[test]
@@ -112,9 +112,9 @@ fn laws_and_attachments_are_known_on_both_sides() {
         law: Law::Ledger,
     };
     spawns[1].attached = vec![link];
-    let mut company = assemble(spawns).unwrap();
+    let mut run = assemble(spawns).unwrap();
     let mut seen = |id: usize| {
-        let actor = company.actors[id].as_mut().unwrap();
+        let actor = run.actors[id].as_mut().unwrap();
         actor.step(SimSpan::from_nanos(4_000_000)).unwrap();
         let met = actor.observer.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
         (met.collect::<Vec<_>>(), actor.links.clone())
