@@ -9,8 +9,8 @@ use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_runtime::{
-    AgentHandle, AgentSpawn, AgentState, Command, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock,
-    Threads, state_hash,
+    AgentHandle, AgentSpawn, AgentState, Command, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads,
+    TimelineCommand, state_hash,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -88,7 +88,7 @@ fn who_rests_takes_no_step_and_no_time_of_any_thread_until_it_is_woken() {
         Box::new(Threads::start(company(40), clock(), Priority::Normal).unwrap()),
     ];
     for mut run in runs {
-        run.drive(Drive::Run);
+        run.drive(TimelineCommand::Run);
         play_until(&mut *run, |run| run.agents()[AWAKE..].iter().all(rests));
         let steps = |run: &dyn Run| run.agents()[..AWAKE].iter().map(AgentHandle::steps).min().unwrap_or(0);
         // the last turn of each is accounted for by then

@@ -2,7 +2,7 @@
 
 use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
-use metachron_runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Priority, Run, SystemClock};
+use metachron_runtime::{AgentSpawn, AgentState, Command, Pool, Priority, Run, SystemClock, TimelineCommand};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ fn agent(cost_us: f64, rate_hz: f64) -> AgentSpawn {
 
 fn pool(spawns: Vec<AgentSpawn>) -> Box<Pool> {
     let mut pool = Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap();
-    pool.drive(Drive::Run);
+    pool.drive(TimelineCommand::Run);
     Box::new(pool)
 }
 
@@ -66,7 +66,7 @@ fn under_overload_everybody_falls_to_the_same_share_of_its_rate() {
 #[test]
 fn a_hundred_thousand_agents_start_and_a_pause_stops_them_all() {
     let mut run = pool((0..100_000).map(|_| agent(0.5, 1.0)).collect());
-    run.drive(Drive::Pause);
+    run.drive(TimelineCommand::Pause);
     // those that were due at the start have made their turns
     let due = |run: &dyn Run| run.agents().iter().filter(|agent| agent.latest().time <= run.sim_now()).count();
     let end = run.now() + Duration::from_secs(60);

@@ -6,8 +6,8 @@
 use super::signed_distance::{Ball, Touch};
 use glam::DVec3;
 
-/// Axes closer than this cross: the direction between them is undefined, metres.
-const CROSSING_M: f64 = 1e-9;
+/// Axes closer than this cross, metres: the vector from one to the other has no direction.
+pub(crate) const CROSSING_M: f64 = 1e-9;
 
 /// The fraction of `segment` at which `point` has its foot on a chain of at least two nodes; `None` where another segment has it. Each foot
 /// belongs to exactly one segment: at a convex joint to the later one, past an end of the chain to the last one there. A segment without

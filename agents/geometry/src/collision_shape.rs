@@ -196,6 +196,35 @@ pub struct Touch {
     pub on_b: Place,
 }
 
+/// One body's side of a contact: how its velocity enters the relative velocity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactSide {
+    /// Unit normal out of this body's skin.
+    pub outward: DVec3,
+    /// With which sign its velocity counts.
+    pub sign: f64,
+}
+
+impl ContactSide {
+    /// The side of the body towards which `normal` points: its velocity counts.
+    #[must_use]
+    pub fn first(normal: DVec3) -> Self {
+        Self { outward: -normal, sign: 1.0 }
+    }
+
+    /// The side of the other body: its velocity is subtracted.
+    #[must_use]
+    pub const fn second(normal: DVec3) -> Self {
+        Self { outward: normal, sign: -1.0 }
+    }
+
+    /// A material point without a contact: its velocity counts, a thickness has no lever arm.
+    #[must_use]
+    pub const fn point() -> Self {
+        Self { outward: DVec3::ZERO, sign: 1.0 }
+    }
+}
+
 impl std::fmt::Debug for SolidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("SolidForm").field("solid", &self.solid).finish_non_exhaustive()
@@ -216,9 +245,10 @@ impl SolidShape {
 }
 
 impl Place {
-    /// Adds `sign` times the velocity of this point to the sum in `slots`. The body's slots begin at `base`: the velocity of its centre
-    /// and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
-    pub fn join(&self, slots: &mut ContactJacobian, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
+    /// Adds the velocity of this point, with the sign of its `side`, to the sum in `slots`. The body's slots begin at `base`: the velocity of
+    /// its centre and its spin, a tube's nodes and segments in turn, or a soft body's vertices.
+    pub fn join(&self, slots: &mut ContactJacobian, base: u32, centre: DVec3, side: ContactSide) {
+        let ContactSide { outward, sign } = side;
         match *self {
             Self::Point(point) => {
                 slots.add_linear(base, sign);
@@ -227,7 +257,7 @@ impl Place {
             Self::Chain { segment, share, radius_m } => {
                 slots.add_linear(base + 2 * segment, sign * (1.0 - share));
                 slots.add_linear(base + 2 * segment + 2, sign * share);
-                slots.add_angular(base + 2 * segment + 1, towards * (radius_m * sign));
+                slots.add_angular(base + 2 * segment + 1, outward * (radius_m * sign));
             }
             Self::Surface { vertices, shares } => {
                 for (vertex, share) in vertices.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {

@@ -109,7 +109,7 @@ impl Foliage {
 /// The trunk with its boughs, thick ones first, and the leaves, in random order.
 #[must_use]
 pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
-    let mut chance = Chance(spec.seed);
+    let mut chance = SplitMix64(spec.seed);
     let grown = grow(spec, &mut chance);
     let lines = grown.boughs.iter().map(|b| Stroke {
         from: b.from.as_vec3(),
@@ -164,7 +164,7 @@ struct Grown {
 }
 
 /// Repeatedly grows the thickest bud: it becomes a bough with two buds at its end.
-fn grow(spec: &TreeSpec, chance: &mut Chance) -> Grown {
+fn grow(spec: &TreeSpec, chance: &mut SplitMix64) -> Grown {
     let height = spec.height_m;
     let first = Bud { at: DVec3::ZERO, way: DVec3::Z, radius_m: GIRTH.0 * height, length_m: BOUGH.0 * height };
     let mut grown = Grown { boughs: Vec::new(), buds: vec![first] };
@@ -186,7 +186,7 @@ fn grow(spec: &TreeSpec, chance: &mut Chance) -> Grown {
 }
 
 /// Leaves around the remaining buds, facing roughly away from the buds' centre.
-fn leaves(spec: &TreeSpec, grown: &Grown, chance: &mut Chance) -> Vec<Leaf> {
+fn leaves(spec: &TreeSpec, grown: &Grown, chance: &mut SplitMix64) -> Vec<Leaf> {
     let middle = grown.buds.iter().map(|b| b.at).sum::<DVec3>() / grown.buds.len().max(1) as f64;
     let leaf = |_| {
         let bud = grown.buds[chance.below(grown.buds.len())];
@@ -238,9 +238,9 @@ fn leaf_mesh(leaves: &[Leaf], side: f64) -> PrimitiveMesh {
 }
 
 /// Pseudo-random numbers from a seed: splitmix.
-struct Chance(u64);
+struct SplitMix64(u64);
 
-impl Chance {
+impl SplitMix64 {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

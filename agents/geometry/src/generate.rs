@@ -74,7 +74,7 @@ impl Generator {
 /// Equal arguments give bit-identical results.
 #[must_use]
 pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
-    let mut sheet = Sheet::default();
+    let mut sheet = MeshBuilder::default();
     match kind {
         Generator::Sphere => sheet.ball(side(triangles, 12), |way| way),
         Generator::Blob => sheet.ball(side(triangles, 12), |way| way * (1.0 + 0.2 * layers(seed, way * 1.5, 2))),
@@ -97,14 +97,14 @@ fn side(triangles: u32, per: u32) -> u32 {
 }
 
 #[derive(Default)]
-struct Sheet {
+struct MeshBuilder {
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Sheet {
+impl MeshBuilder {
     /// A grid of `columns` × `rows` cells, whose corners `place` gives for (0 … columns, 0 … rows).
-    fn grid(&mut self, (columns, rows): (u32, u32), place: impl Fn(u32, u32) -> DVec3) {
+    fn grid(&mut self, columns: u32, rows: u32, place: impl Fn(u32, u32) -> DVec3) {
         let first = self.points.len() as u32;
         self.points.extend((0..=rows).flat_map(|r| (0..=columns).map(move |c| (c, r))).map(|(c, r)| place(c, r)));
         for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
@@ -132,7 +132,7 @@ impl Sheet {
         let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
         for axis in 0..3 {
             for side in [-1.0, 1.0] {
-                self.grid((cells, cells), |c, r| {
+                self.grid(cells, cells, |c, r| {
                     let (u, v) = if side > 0.0 { (at(c), at(r)) } else { (at(r), at(c)) };
                     let mut point = DVec3::ZERO;
                     (point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3]) = (side, u, v);
@@ -146,7 +146,7 @@ impl Sheet {
         let around = ((f64::from(triangles) / 6.0).sqrt().round() as u32).max(3);
         let along = triangles.div_ceil(2 * around).max(3);
         let angle = |i: u32, of: u32| std::f64::consts::TAU * f64::from(i % of) / f64::from(of);
-        self.grid((along, around), |c, r| {
+        self.grid(along, around, |c, r| {
             let (turn, tilt) = (angle(c, along), angle(r, around));
             let out = 1.0 + libm::cos(tilt) / 3.0;
             DVec3::new(libm::cos(turn) * out, libm::sin(turn) * out, libm::sin(tilt) / 3.0)
@@ -158,7 +158,7 @@ impl Sheet {
     fn rod(&mut self, triangles: u32, radius: f64) {
         let around = (libm::sqrt(0.5 * f64::from(triangles)) as u32).clamp(4, 96);
         let rows = (triangles.saturating_sub(2 * around)).div_ceil(2 * around).max(1);
-        self.grid((around, rows), |c, r| {
+        self.grid(around, rows, |c, r| {
             let turn = std::f64::consts::TAU * f64::from(c % around) / f64::from(around);
             let along = 2.0 * f64::from(r) / f64::from(rows) - 1.0;
             DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), along)
@@ -175,7 +175,7 @@ impl Sheet {
 
     fn hills(&mut self, cells: u32, seed: u64) {
         let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
-        self.grid((cells, cells), |c, r| {
+        self.grid(cells, cells, |c, r| {
             let flat = DVec2::new(at(c), at(r));
             flat.extend(0.125 * layers(seed, flat.extend(0.5) * 2.0, 3))
         });

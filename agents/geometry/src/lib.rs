@@ -20,6 +20,7 @@
 //! assert!((normal - DVec3::X).length() < 1e-6); // from the box towards the ball
 //! ```
 
+pub mod aabb;
 pub mod capsule_chain;
 pub mod closest_points;
 pub mod collision_shape;
@@ -43,9 +44,10 @@ pub mod texture;
 pub mod tool;
 pub mod topology;
 
+pub use aabb::Aabb;
 pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
-    CollisionShape, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch, height_j_kg,
+    CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch, height_j_kg,
 };
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
@@ -53,7 +55,7 @@ pub use geodesic::geodesic_edges;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
 pub use model::{Extent, Model, Placement, proxy};
 pub use parry_shapes::ShapeError;
-pub use parry_shapes::{Triangles, bounds, hull_triangles, mesh_triangles};
+pub use parry_shapes::{Triangles, hull_triangles, mesh_triangles};
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use progressive_mesh::{Cut, ProgressiveMesh, ProgressiveMeshError};
 pub use render_curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};

@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 1);
     }
     #[test]
-    fn a_seam_of_doubled_points_is_not_seen_in_the_light() {
+    fn a_seam_of_doubled_points_keeps_smooth_normals() {
         // a roof of 20° with its ridge along y, once shared and once doubled
         let height = 0.5 * libm::tan(20.0_f64.to_radians() / 2.0);
         let ridge = [DVec3::new(0.5, 0.0, height), DVec3::new(0.5, 1.0, height)];

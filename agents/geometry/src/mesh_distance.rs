@@ -19,7 +19,7 @@ pub struct MeshField {
     face_tree: Bvh,
     edges: Vec<Edge>,
     edge_tree: Bvh,
-    bounds: (DVec3, DVec3),
+    bounds: crate::Aabb,
 }
 
 #[derive(Debug, Clone)]
@@ -72,13 +72,13 @@ impl MeshField {
         let edges = standing_edges(&mut faces);
         let face_tree = tree(faces.iter().map(|f| f.corners.as_slice()));
         let edge_tree = tree(edges.iter().map(|e| e.ends.as_slice()));
-        let bounds = crate::bounds(&mesh.points);
+        let bounds = crate::Aabb::of(&mesh.points);
         Self { faces, face_tree, edges, edge_tree, bounds }
     }
 
     /// Distance of `point` from the bounding box of all triangles, metres; 0 inside.
     pub fn distance_from_bounds(&self, point: DVec3) -> f64 {
-        let (low, high) = self.bounds;
+        let crate::Aabb { low, high } = self.bounds;
         (low - point).max(point - high).max(DVec3::ZERO).length()
     }
 
@@ -288,7 +288,7 @@ fn standing_edges(faces: &mut [Face]) -> Vec<Edge> {
 fn tree<'a>(items: impl Iterator<Item = &'a [DVec3]>) -> Bvh {
     let boxes: Vec<Aabb> = items
         .map(|points| {
-            let (low, high) = crate::bounds(points);
+            let crate::Aabb { low, high } = crate::Aabb::of(points);
             let slack = Vec3::splat(BOX_MARGIN * (1.0 + low.abs().max(high.abs()).max_element() as f32));
             Aabb::new(low.as_vec3() - slack, high.as_vec3() + slack)
         })

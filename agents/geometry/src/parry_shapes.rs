@@ -2,8 +2,8 @@
 //!
 //! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: the pose or the mass of the solid.
 
-use super::Solid;
 use super::topology::is_closed;
+use super::{Aabb, Solid};
 use glam::{DVec3, Vec3};
 use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::shape::{SharedShape, TriMeshFlags};
@@ -37,13 +37,13 @@ pub enum ShapeError {
         why: String,
     },
     /// A mesh has no triangle with an area.
-    #[error("none of the {triangles} triangles of the mesh has an area")]
+    #[error("none of the {triangles} triangles of the mesh has an area above zero")]
     EmptyMesh {
         /// Number of triangles given.
         triangles: usize,
     },
     /// A triangle refers to a corner that does not exist.
-    #[error("triangle {triangle} names corner {corner}, but there are only {points}")]
+    #[error("triangle {triangle} refers to point {corner}, but the mesh has only {points} points")]
     BadCorner {
         /// Index of the triangle, from 0.
         triangle: usize,
@@ -94,7 +94,7 @@ impl Solid {
             Self::Hull { points_m } => {
                 let points: Vec<Vec3> = points_m.iter().map(|p| p.as_vec3()).collect();
                 hull_triangles(points_m)?;
-                SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "its faces do not close"))?
+                SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "the faces of the hull do not close"))?
             }
             Self::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
@@ -138,9 +138,9 @@ fn flat(points: &[DVec3], why: impl Into<String>) -> ShapeError {
 /// The faces of the convex hull of `points`.
 pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     if points.len() < 4 {
-        return Err(flat(points, "it takes four points"));
+        return Err(flat(points, "a hull needs at least four points"));
     }
-    let (low, high) = bounds(points);
+    let Aabb { low, high } = Aabb::of(points);
     let size = (high - low).max_element();
     let single: Vec<Vec3> = points.iter().map(|p| p.as_vec3()).collect();
     let (corners, triangles) = try_convex_hull(&single).map_err(|e| flat(points, e.to_string()))?;
@@ -150,7 +150,7 @@ pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     if volume > VOLUME_SHARE_MIN * size.powi(3) {
         mesh_triangles(&corners, &triangles)
     } else {
-        Err(flat(points, "all lie in one plane"))
+        Err(flat(points, "all points lie in one plane"))
     }
 }
 
@@ -171,11 +171,6 @@ pub fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<Triang
         return Err(ShapeError::EmptyMesh { triangles: triangles.len() });
     }
     Ok(Triangles { points: points.to_vec(), triangles: kept })
-}
-
-/// Lowest and highest coordinates.
-pub fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
-    points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
 }
 
 #[cfg(test)]

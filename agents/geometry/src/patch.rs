@@ -77,7 +77,7 @@ mod tests {
     use std::collections::HashMap;
 
     #[test]
-    fn counts_are_what_they_promise_at_every_level() {
+    fn counts_are_as_documented_at_every_level() {
         for n in 0..=N_MAX {
             assert_eq!(triangles(n), 12 << n, "level {n}");
             assert_eq!(patch_triangles(n).len(), triangles(n) as usize);

@@ -132,17 +132,17 @@ impl Primitive {
     pub fn mesh(self, n: u8) -> PrimitiveMesh {
         match self {
             Self::Ball => {
-                let round = round_knots(ball_divisions(n));
+                let round = round_lines(ball_divisions(n));
                 swept_box(&[&round, &round, &round])
             }
             Self::Box => {
-                let split = split_knots(bevel_divisions(n));
+                let split = split_lines(bevel_divisions(n));
                 swept_box(&[&split, &split, &split])
             }
             Self::Capsule => {
                 let m = capsule_divisions(n);
-                let round = round_knots(m);
-                swept_box(&[&round, &round, &split_knots(m / 2)])
+                let round = round_lines(m);
+                swept_box(&[&round, &round, &split_lines(m / 2)])
             }
             Self::Cylinder => cylinder(sides(n), bevel_divisions(n)),
             Self::Jaw => super::tool::jaw(n),
@@ -152,22 +152,22 @@ impl Primitive {
 
 /// One line of a face's grid: the side of the core it belongs to (−1, 0, 1), and the tangent of the normal's angle.
 #[derive(Clone, Copy)]
-struct Knot {
+struct GridLine {
     side: f32,
     lean: f64,
 }
 
 /// Lines across a face of a ball: an eighth of a turn to either side of its centre.
-fn round_knots(divisions: u32) -> Vec<Knot> {
+fn round_lines(divisions: u32) -> Vec<GridLine> {
     let lean = |i: u32| lean_at(2.0 * f64::from(i) / f64::from(divisions) - 1.0);
-    (0..=divisions).map(|i| Knot { side: 0.0, lean: lean(i) }).collect()
+    (0..=divisions).map(|i| GridLine { side: 0.0, lean: lean(i) }).collect()
 }
 
 /// Lines across a face with a straight part: `divisions` quads of rounding before and after it.
-fn split_knots(divisions: u32) -> Vec<Knot> {
+fn split_lines(divisions: u32) -> Vec<GridLine> {
     let turned = |i: u32| if divisions == 0 { 0.0 } else { lean_at(f64::from(i) / f64::from(divisions)) };
-    let before = (0..=divisions).rev().map(|i| Knot { side: -1.0, lean: -turned(i) });
-    before.chain((0..=divisions).map(|i| Knot { side: 1.0, lean: turned(i) })).collect()
+    let before = (0..=divisions).rev().map(|i| GridLine { side: -1.0, lean: -turned(i) });
+    before.chain((0..=divisions).map(|i| GridLine { side: 1.0, lean: turned(i) })).collect()
 }
 
 /// Tangent of `share` of 45°; exactly ±1 at the ends, so that neighbouring faces share their border bit for bit.
@@ -176,21 +176,21 @@ fn lean_at(share: f64) -> f64 {
 }
 
 /// Six faces of a cube, each a grid, with the normals of the knots.
-fn swept_box(knots: &[&[Knot]; 3]) -> PrimitiveMesh {
+fn swept_box(lines: &[&[GridLine]; 3]) -> PrimitiveMesh {
     let mut mesh = PrimitiveMesh::default();
     for axis in 0..3 {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         for side in [-1.0, 1.0] {
             let first = mesh.vertices.len() as u32;
-            for p in knots[i] {
-                for q in knots[j] {
+            for p in lines[i] {
+                for q in lines[j] {
                     let (mut core, mut lean) = (Vec3::ZERO, glam::DVec3::ZERO);
                     (core[axis], core[i], core[j]) = (side, p.side, q.side);
                     (lean[axis], lean[i], lean[j]) = (f64::from(side), p.lean, q.lean);
                     mesh.vertices.push(PrimitiveVertex::bare(core, lean.normalize().as_vec3()));
                 }
             }
-            grid(&mut mesh.triangles, first, knots[i].len() as u32, knots[j].len() as u32, side < 0.0);
+            grid(&mut mesh.triangles, first, lines[i].len() as u32, lines[j].len() as u32, side < 0.0);
         }
     }
     mesh
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn triangle_counts_are_what_they_promise() {
+    fn triangle_counts_are_as_documented() {
         for primitive in [Primitive::Ball, Primitive::Box, Primitive::Capsule, Primitive::Cylinder, Primitive::Jaw] {
             for n in 0..=metachron_core::N_MAX {
                 let mesh = primitive.mesh(n);

@@ -195,7 +195,7 @@ impl Field {
     }
 
     /// Whether the inside of a span can come nearer than both of its ends: never with an infinite plane.
-    pub fn feels_spans(&self) -> bool {
+    pub fn needs_span_tests(&self) -> bool {
         !matches!(self.kind, Kind::Plane)
     }
 

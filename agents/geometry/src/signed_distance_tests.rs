@@ -54,7 +54,7 @@ proptest! {
     }
 
     #[test]
-    fn a_hull_feels_like_the_box_it_is(point in vector(1.2)) {
+    fn a_hull_of_a_box_has_the_distance_of_the_box(point in vector(1.2)) {
         let (smooth, faces) = (place(Solid::Box { half_extents_m: HALF }), place(hull(HALF)));
         let (a, b) = (first(&smooth, point), first(&faces, point));
         // the corners of the hull went through single precision: 2^-24 of 0.6 m
@@ -62,7 +62,7 @@ proptest! {
     }
 
     #[test]
-    fn a_span_is_lowest_where_sampling_says(a in vector(1.2), b in vector(1.2), ra in 0.0..0.1, rb in 0.0..0.1) {
+    fn the_lowest_point_of_a_span_agrees_with_sampling(a in vector(1.2), b in vector(1.2), ra in 0.0..0.1, rb in 0.0..0.1) {
         let ends = [Ball { centre: a, radius_m: ra }, Ball { centre: b, radius_m: rb }];
         for solid in primitives() {
             let field = place(solid.clone());
@@ -166,7 +166,7 @@ fn a_floor_of_many_triangles_gives_one_contact() {
 }
 
 #[test]
-fn a_thin_plate_is_felt_on_the_near_side_only() {
+fn a_thin_plate_touches_on_the_near_side_only() {
     let plate = Field::new(&Obstacle {
         name: String::new(),
         solid: hull(DVec3::new(1.0, 1.0, 0.001)),
@@ -185,7 +185,7 @@ fn a_thin_plate_is_felt_on_the_near_side_only() {
 }
 
 #[test]
-fn nothing_is_felt_past_and_below_the_rim_of_a_sheet() {
+fn nothing_touches_past_and_below_the_rim_of_a_sheet() {
     let sheet = quads(&[quad([[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]])]);
     assert_eq!(sheet.touches(DVec3::new(1.02, 0.5, -0.02), 0.1).iter().count(), 0);
     assert_eq!(sheet.touches(DVec3::new(1.02, 0.5, 0.02), 0.1).iter().count(), 1);

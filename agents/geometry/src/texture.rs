@@ -69,7 +69,7 @@ impl Pattern {
 impl Texture {
     /// A texture of width × height pixels; `None` where that is zero or differs from the number of texels.
     #[must_use]
-    pub fn new((width, height): (u32, u32), texels: Vec<[u8; 4]>, wrap: Wrap) -> Option<Self> {
+    pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>, wrap: Wrap) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
         (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, wrap })
     }
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn mean_is_of_light_and_not_of_values() {
-        let two = Texture::new((2, 1), vec![[0, 0, 0, 0], [255, 255, 255, 0]], Wrap::Corners).unwrap();
+        let two = Texture::new(2, 1, vec![[0, 0, 0, 0], [255, 255, 255, 0]], Wrap::Corners).unwrap();
         // half of all light is the sRGB value 188, not 128
         assert_eq!(two.mean(), [188; 3]);
         assert_eq!(two.halved().texels(), [[188, 188, 188, 255]]);
@@ -202,13 +202,13 @@ mod tests {
         }
         // eight halvings, each rounded by half a step
         assert!(texture.mean().iter().zip(mean).all(|(a, b)| a.abs_diff(b) <= 4), "{:?} and {mean:?}", texture.mean());
-        let odd = Texture::new((3, 1), vec![[9; 4]; 3], Wrap::Corners).unwrap();
+        let odd = Texture::new(3, 1, vec![[9; 4]; 3], Wrap::Corners).unwrap();
         assert_eq!(odd.halved().size(), (1, 1));
     }
 
     #[test]
-    fn pixels_that_are_too_few_or_none_are_no_texture() {
-        assert!(Texture::new((2, 2), vec![[0; 4]; 3], Wrap::Corners).is_none());
-        assert!(Texture::new((0, 9), Vec::new(), Wrap::Corners).is_none());
+    fn a_texture_with_missing_pixels_is_refused() {
+        assert!(Texture::new(2, 2, vec![[0; 4]; 3], Wrap::Corners).is_none());
+        assert!(Texture::new(0, 9, Vec::new(), Wrap::Corners).is_none());
     }
 }

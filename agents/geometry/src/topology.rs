@@ -37,7 +37,7 @@ struct Side {
 #[must_use]
 pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Option<Branch> {
     let place = places(points);
-    let sides = sides((points, &place), triangles, object_of);
+    let sides = sides(points, &place, triangles, object_of);
     let shared = sides.chunk_by(same_edge).filter(|sharing| sharing.len() > 2);
     let first = shared.min_by_key(|sharing| sharing[2].triangle)?;
     let Side { edge, triangle, .. } = first[2];
@@ -48,7 +48,7 @@ pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize
 
 /// Whether every edge has equally many triangles in either direction.
 pub fn is_closed(mesh: &Triangles) -> bool {
-    let sides = sides((&mesh.points, &places(&mesh.points)), &mesh.triangles, |_| 0);
+    let sides = sides(&mesh.points, &places(&mesh.points), &mesh.triangles, |_| 0);
     let balanced = |sharing: &[Side]| 2 * sharing.iter().filter(|side| side.forward).count() == sharing.len();
     sides.chunk_by(same_edge).all(balanced)
 }
@@ -66,7 +66,7 @@ pub(super) fn places(points: &[DVec3]) -> Vec<u32> {
 }
 
 /// The sides of all triangles with an area, sorted by object and edge, then by triangle.
-fn sides((points, place): (&[DVec3], &[u32]), triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Vec<Side> {
+fn sides(points: &[DVec3], place: &[u32], triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Vec<Side> {
     let mut sides = Vec::with_capacity(3 * triangles.len());
     for (number, t) in triangles.iter().enumerate() {
         let [a, b, c] = t.map(|i| points[i as usize]);

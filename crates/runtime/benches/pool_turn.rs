@@ -3,11 +3,11 @@
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use metachron_core::{N_MAX, Resolution, ResolutionRange};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
-use metachron_runtime::{AgentSpawn, Drive, Pool, Priority, Run, SystemClock};
+use metachron_runtime::{AgentSpawn, Pool, Priority, Run, SystemClock, TimelineCommand};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Far above what any machine can do: nobody ever waits.
+/// Far above what any machine can do: no agent ever waits.
 const UNPACED_HZ: f64 = 1e5;
 
 /// An agent whose step is next to nothing.
@@ -40,7 +40,7 @@ fn make_turns(c: &mut Criterion) {
     for agents in [100_usize, 1000, 10_000] {
         let spawns = (0..agents).map(agent).collect();
         let mut run = Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).expect("the pool starts");
-        run.drive(Drive::Run);
+        run.drive(TimelineCommand::Run);
         group.throughput(Throughput::Elements(1));
         group.bench_function(BenchmarkId::from_parameter(agents), |b| b.iter_custom(|turns| time(&run, turns)));
         Box::new(run).shutdown();

@@ -5,6 +5,7 @@
 //! Never here: how late an agent is ([`crate::agent_clock`]), steps. Theory: docs/theory/coupling.md, section 3.
 
 use super::agent_runner::AgentRunner;
+use super::broad_phase::PlannedStep;
 use super::fellows::Fellows;
 use super::observation::newest;
 use metachron_contact::beside::{is_beside, leaves_behind};
@@ -21,8 +22,8 @@ impl AgentRunner {
     pub fn waits(&mut self, wall: Duration) -> bool {
         // what it saw last was behind by more than it is now: who was not is not
         let heard = self.awaited().and_then(|_| {
-            self.eyes.look_again();
-            self.company.each(|seat| seat.eyes.look_again());
+            self.observer.refresh();
+            self.company.each(|seat| seat.observer.refresh());
             self.awaited()
         });
         let waits = heard.is_some_and(|heard| self.pace.wait(wall, heard));
@@ -42,7 +43,7 @@ impl AgentRunner {
             .chain(fellows)
             .flat_map(move |actor| actor.met(dt, |n, steps, around, bounds| leaves_behind(n, steps, around, bounds)));
         let strangers = all.filter(|n| self.runs(n.id));
-        let strangers = strangers.filter(|n| self.company.is_empty() || self.shared.board.leader(n.id) != self.id());
+        let strangers = strangers.filter(|n| self.company.is_empty() || self.shared.sleep.leader(n.id) != self.id());
         strangers.map(|n| n.snapshot.time.as_nanos()).reduce(u64::wrapping_add)
     }
 
@@ -52,9 +53,9 @@ impl AgentRunner {
         dt: SimSpan,
         which: impl Fn(&Neighbour, (SimSpan, f64), &StepContext<'_>, &dyn Fn() -> Option<Bounds>) -> bool,
     ) -> impl Iterator<Item = &Neighbour> {
-        let Self { eyes, hands, links, writer, pace, .. } = self;
+        let Self { observer, hands, links, writer, pace, .. } = self;
         let (me, time) = (self.shared.id, pace.time());
-        let around = StepContext { me, time, neighbours: eyes.neighbours(), hands, links };
+        let around = StepContext { me, time, neighbours: observer.neighbours(), hands, links };
         let bounds = move || newest(writer, |state| state.bounds);
         let steps = move |n: &Neighbour| (dt, n.step_s.max(self.step_of(n.id)));
         around.neighbours.iter().filter(move |n| which(n, steps(n), &around, &bounds))
@@ -63,7 +64,7 @@ impl AgentRunner {
     /// Whether it lives at one pace with others: somebody is beside it who does not step with it, or has not taken yet what it gave.
     /// Not asked where nobody is late.
     pub fn keeps_company(&mut self, now: SimTime, late: bool) -> bool {
-        let somebody_is = self.pace.put_off() > SimSpan::ZERO || self.shared.board.is_anybody_far_behind(now);
+        let somebody_is = self.pace.clock_offset() > SimSpan::ZERO || self.shared.sleep.is_any_far_behind(now);
         let was_beside = self.beside.take();
         if !(late || somebody_is) {
             return false;
@@ -85,20 +86,20 @@ impl AgentRunner {
     /// Who comes beside others takes their time for its own, and who has nobody beside it any more that of the scene. Who was beside them
     /// before it was asked keeps its own: it has a share in what they do.
     fn agree_on_time(&mut self, was_beside: Option<bool>, is_beside: bool) {
-        let put_off = match (was_beside, is_beside) {
+        let clock_offset = match (was_beside, is_beside) {
             (_, false) => SimSpan::ZERO,
             (Some(false), true) => self.put_off_beside(),
             _ => return,
         };
-        if put_off != self.pace.put_off() {
-            self.shift_clock(put_off);
-            self.company.each(|seat| seat.shift_clock(put_off));
+        if clock_offset != self.pace.clock_offset() {
+            self.shift_clock(clock_offset);
+            self.company.each(|seat| seat.shift_clock(clock_offset));
         }
     }
 
     /// Whether nothing is on its way between it, with those it leads, and anybody.
     fn is_settled(&self) -> bool {
-        let settled = |actor: &Self| actor.eyes.is_settled(actor.id(), &actor.writer, |id| actor.runs(id));
+        let settled = |actor: &Self| actor.observer.is_settled(actor.id(), &actor.writer, |id| actor.runs(id));
         settled(self) && self.company.all().all(settled)
     }
 
@@ -116,11 +117,11 @@ impl AgentRunner {
         let moment = self.pace.scene_time();
         let far = |n: &&Neighbour| self.pace.time().secs_after(n.snapshot.time) > FAR_BEHIND_S;
         let last = self.strangers().filter(|n| !n.snapshot.at_rest && self.runs(n.id)).filter(far);
-        last.map(|n| n.snapshot.time).min().map_or(self.pace.put_off(), |time| moment.since(time))
+        last.map(|n| n.snapshot.time).min().map_or(self.pace.clock_offset(), |time| moment.since(time))
     }
 
-    fn shift_clock(&mut self, put_off: SimSpan) {
-        let by_s = self.pace.rename(put_off);
+    fn shift_clock(&mut self, clock_offset: SimSpan) {
+        let by_s = self.pace.set_clock_offset(clock_offset);
         self.agent.shift_clock(by_s);
     }
 
@@ -131,11 +132,11 @@ impl AgentRunner {
         if !self.company.is_empty() {
             self.company.gather_fellows(self.id(), time);
         }
-        let Self { eyes, peers, writer, shared, company, .. } = self;
-        eyes.look(peers, writer, (shared.id, moment, dt), company.fellows().unwrap_or(&nobody));
+        let Self { observer, peers, writer, company, .. } = self;
+        observer.update(peers, writer, PlannedStep { start: moment, dt }, company.fellows().unwrap_or(&nobody));
         company.each_beside(|seat, fellows| {
             if seat.pace.time() == time {
-                seat.eyes.look(&seat.peers, &seat.writer, (seat.shared.id, moment, dt), fellows);
+                seat.observer.update(&seat.peers, &seat.writer, PlannedStep { start: moment, dt }, fellows);
             }
         });
     }
@@ -146,7 +147,7 @@ impl AgentRunner {
         let all = std::iter::once(self)
             .chain(self.company.all())
             .flat_map(move |actor| actor.met(dt, |n, steps, around, bounds| is_beside(n, steps, around, bounds)));
-        all.filter(|n| self.company.is_empty() || self.shared.board.leader(n.id) != self.id())
+        all.filter(|n| self.company.is_empty() || self.shared.sleep.leader(n.id) != self.id())
     }
 
     fn is_beside_others(&self) -> bool {

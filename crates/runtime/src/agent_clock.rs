@@ -9,7 +9,7 @@
 
 mod timeline;
 
-pub use timeline::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+pub use timeline::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
 
 use metachron_core::{SimSpan, SimTime};
 use std::time::Duration;
@@ -29,7 +29,7 @@ const PATIENCE: u16 = 500;
 const LAG_CAP_STEPS: u64 = 2;
 
 /// Longer than any step.
-const ANY: u32 = u32::MAX;
+const NO_LIMIT: u32 = u32::MAX;
 
 /// Longest stretched step of an agent that is behind.
 const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
@@ -41,8 +41,8 @@ const STRETCHED_NEAR: (u64, u64) = (5, 2);
 /// And at most this long (docs/theory/coupling.md, eq. 7g).
 const STRETCHED_NEAR_MAX: SimSpan = SimSpan::from_nanos(16_666_667);
 
-/// An agent that waits for peers for more than 1/`WAITER` of its time is behind because of them.
-const WAITER: u16 = 4;
+/// An agent that waits for peers for more than 1/`WAIT_SHARE` of its time is behind because of them.
+const WAIT_SHARE: u16 = 4;
 
 /// Unit of waiting times, wall time.
 const TICK: Duration = Duration::from_micros(125);
@@ -61,7 +61,7 @@ pub struct AgentClock {
     stretched: u32,
     dropped: SimSpan,
     /// Total postponement: it is on time at the timeline's present less this.
-    put_off: SimSpan,
+    clock_offset: SimSpan,
     rested: SimSpan,
     /// No step before this wall time, milliseconds: it waits for peers.
     held_until_ms: u32,
@@ -72,7 +72,7 @@ pub struct AgentClock {
     /// Waits used up of [`PATIENCE`].
     waited: u16,
     /// Hash of the last news of the awaited peers.
-    heard: u16,
+    news: u16,
 }
 
 /// Start of a turn.
@@ -91,16 +91,16 @@ impl AgentClock {
         Self {
             time,
             dt,
-            shorter: ANY,
+            shorter: NO_LIMIT,
             stretched: 0,
             dropped: SimSpan::ZERO,
-            put_off: SimSpan::ZERO,
+            clock_offset: SimSpan::ZERO,
             rested: SimSpan::ZERO,
             held_until_ms: 0,
             begun: 0,
             waits: [0; 2],
             waited: 0,
-            heard: 0,
+            news: 0,
         }
     }
 
@@ -113,13 +113,13 @@ impl AgentClock {
     /// The scene time at which it is on time: its own time plus its postponement.
     #[must_use]
     pub fn scene_time(&self) -> SimTime {
-        self.time + self.put_off
+        self.time + self.clock_offset
     }
 
     /// Its total postponement.
     #[must_use]
-    pub const fn put_off(&self) -> SimSpan {
-        self.put_off
+    pub const fn clock_offset(&self) -> SimSpan {
+        self.clock_offset
     }
 
     /// The length of its steps: the requested one, or the shorter one that it made last.
@@ -142,12 +142,12 @@ impl AgentClock {
     /// The last step, if it was shorter than requested.
     #[must_use]
     pub fn shorter(&self) -> Option<SimSpan> {
-        (self.shorter != ANY).then(|| SimSpan::from_nanos(self.shorter.into()))
+        (self.shorter != NO_LIMIT).then(|| SimSpan::from_nanos(self.shorter.into()))
     }
 
     /// Stores that the agent steps by `made` (above zero, not longer than `wanted`) instead of `wanted`.
     pub fn shorten(&mut self, wanted: SimSpan, made: SimSpan) {
-        self.shorter = if made < wanted { u32::try_from(made.as_nanos()).unwrap_or(ANY) } else { ANY };
+        self.shorter = if made < wanted { u32::try_from(made.as_nanos()).unwrap_or(NO_LIMIT) } else { NO_LIMIT };
     }
 
     /// Simulated time dropped so far because it could not be made up.
@@ -168,13 +168,13 @@ impl AgentClock {
         timeline.wall_of(self.scene_time()).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
     }
 
-    /// Waits briefly from wall time `wall` for peers that are behind; returns `false` once its patience is used up. `heard` changes with
+    /// Waits briefly from wall time `wall` for peers that are behind; returns `false` once its patience is used up. `news` changes with
     /// every news of them.
-    pub fn wait(&mut self, wall: Duration, heard: u64) -> bool {
+    pub fn wait(&mut self, wall: Duration, news: u64) -> bool {
         // a different number in nearly all cases
-        let heard = (heard ^ (heard >> 16) ^ (heard >> 32)) as u16;
-        if heard != self.heard {
-            (self.heard, self.waited) = (heard, 0);
+        let news = (news ^ (news >> 16) ^ (news >> 32)) as u16;
+        if news != self.news {
+            (self.news, self.waited) = (news, 0);
         }
         let waits = self.waited < PATIENCE;
         if waits {
@@ -204,7 +204,7 @@ impl AgentClock {
         if late > cap && late > timeline.wall_span(steps) {
             if near {
                 dropped = timeline.sim_span(late - cap);
-                self.put_off += dropped;
+                self.clock_offset += dropped;
             } else {
                 dropped = lag;
                 self.time += lag;
@@ -229,7 +229,7 @@ impl AgentClock {
             STRETCHED_MAX
         };
         // an agent that waits for peers is behind because of them: longer steps would not help
-        let waits = self.is_waiter(wall);
+        let waits = self.waits_often(wall);
         let next = if lag > times(now, LAG_CAP_STEPS, 1) && !waits {
             times(now, 5, 4).min(most).max(wanted)
         } else if lag <= now {
@@ -252,11 +252,11 @@ impl AgentClock {
     }
 
     /// Whether it has lately spent much of its time waiting; called once per step.
-    fn is_waiter(&mut self, wall: Duration) -> bool {
+    fn waits_often(&mut self, wall: Duration) -> bool {
         let (now, [waited, of]) = (ticks(wall), self.waits);
         let of = of.saturating_add(u16::try_from(now.wrapping_sub(self.begun)).unwrap_or(u16::MAX));
         (self.begun, self.waits) = (now, [waited, of].map(|ticks| ticks - ticks / 8));
-        waited > of / WAITER
+        waited > of / WAIT_SHARE
     }
 
     /// The step is done: advances the agent's time by it.
@@ -270,22 +270,22 @@ impl AgentClock {
     }
 
     /// Drops the time that this agent's leader has dropped, of which its time jumped by `leapt`.
-    pub fn give_up(&mut self, dropped: SimSpan, leapt: SimSpan) {
+    pub fn drop_time(&mut self, dropped: SimSpan, leapt: SimSpan) {
         self.dropped += dropped;
         self.time += leapt;
-        self.put_off += dropped - leapt;
+        self.clock_offset += dropped - leapt;
     }
 
-    /// Takes the leader's total postponement `put_off`: the increase counts as dropped.
-    pub fn keep_up(&mut self, put_off: SimSpan) {
-        self.dropped = self.dropped + put_off - self.put_off;
-        self.put_off = put_off;
+    /// Takes the leader's total postponement `clock_offset`: the increase counts as dropped.
+    pub fn follow_clock_offset(&mut self, clock_offset: SimSpan) {
+        self.dropped = self.dropped + clock_offset - self.clock_offset;
+        self.clock_offset = clock_offset;
     }
 
-    /// Redefines its own time so that its total postponement is `put_off`; returns by how many seconds its own time is later.
-    pub fn rename(&mut self, put_off: SimSpan) -> f64 {
+    /// Redefines its own time so that its total postponement is `clock_offset`; returns by how many seconds its own time is later.
+    pub fn set_clock_offset(&mut self, clock_offset: SimSpan) -> f64 {
         let (moment, before) = (self.scene_time(), self.time);
-        (self.time, self.put_off) = (moment - put_off, put_off);
+        (self.time, self.clock_offset) = (moment - clock_offset, clock_offset);
         self.time.secs_after(before)
     }
 
@@ -319,10 +319,10 @@ mod tests {
     }
 
     #[test]
-    fn who_is_heard_of_is_waited_for_and_who_is_not_for_a_second() {
+    fn a_peer_with_news_is_waited_for_and_one_without_for_a_second() {
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
-        for heard in 0..1000 {
-            assert!(pace.wait(wall, heard / 100), "at {wall:?}");
+        for news in 0..1000 {
+            assert!(pace.wait(wall, news / 100), "at {wall:?}");
             assert_eq!(pace.due(&line), Some(wall + ms(2)));
             wall += ms(2);
         }
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_near_others_is_put_off_and_lives_through_all_of_its_time() {
+    fn an_agent_near_others_is_offset_and_steps_through_all_of_its_time() {
         // a step of 4 ms that takes 10 ms: peers never see time missing, and it is never late by more than the cap
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
         for step in 0..1000 {
@@ -345,18 +345,18 @@ mod tests {
             wall += ms(10);
             assert!(line.sim_at(wall).since(pace.scene_time()) <= SimSpan::from_nanos(520_000_000));
         }
-        assert_eq!(pace.dropped(), pace.put_off());
-        assert!(pace.put_off() > span_ms(5400), "of 10 s it lived through 4");
+        assert_eq!(pace.dropped(), pace.clock_offset());
+        assert!(pace.clock_offset() > span_ms(5400), "of 10 s it lived through 4");
     }
 
     #[test]
-    fn another_name_for_its_time_changes_nothing_of_when_it_is_due() {
+    fn a_change_of_clock_offset_leaves_the_due_time() {
         let (line, mut pace) = (Timeline::new(), pace(4));
         pace.begin(&line, ms(3500), true);
         let (due, dropped) = (pace.due(&line), pace.dropped());
-        assert_eq!(pace.rename(SimSpan::ZERO), 3.0);
-        assert_eq!((pace.time(), pace.put_off()), (SimTime::ZERO + span_ms(3000), SimSpan::ZERO));
-        assert_eq!(pace.rename(span_ms(1000)), -1.0);
+        assert_eq!(pace.set_clock_offset(SimSpan::ZERO), 3.0);
+        assert_eq!((pace.time(), pace.clock_offset()), (SimTime::ZERO + span_ms(3000), SimSpan::ZERO));
+        assert_eq!(pace.set_clock_offset(span_ms(1000)), -1.0);
         assert_eq!((pace.time(), pace.due(&line), pace.dropped()), (SimTime::ZERO + span_ms(2000), due, dropped));
     }
 
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pace_that_is_kept_is_due_every_dt_and_drops_nothing() {
+    fn an_agent_on_time_is_due_every_dt_and_drops_nothing() {
         let line = Timeline::new();
         let mut pace = pace(4);
         for k in 0..1000 {
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn overload_is_no_death_spiral() {
+    fn overload_does_not_accumulate_lag() {
         // a step of 4 ms that takes 40 ms: own time + dropped time is always the wall's, and the lag stays capped
         let line = Timeline::new();
         let mut pace = pace(4);
@@ -432,7 +432,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn whatever_turns_cost_the_lag_stays_capped_and_every_nanosecond_is_stepped_or_dropped(
+        fn the_lag_stays_capped_and_every_nanosecond_is_stepped_or_dropped_at_any_cost(
             dt_us in 500_u64..200_000,
             costs_us in proptest::collection::vec(0_u64..500_000, 1..200),
         ) {

@@ -10,6 +10,7 @@
 
 use super::agent_clock::Timeline;
 use super::agent_clock::{AgentClock, LAG_CAP, Start};
+use super::broad_phase::PlannedStep;
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -37,13 +38,13 @@ pub(super) struct AgentRunner {
     pub governor: Option<Box<dyn Governor>>,
     pub faults: Faults,
     pub writer: SlotWriter<Snapshot>,
-    pub eyes: Observer,
+    pub observer: Observer,
     pub links: Vec<Link>,
     pub hands: Vec<AnchorSpring>,
     /// The agents it leads.
     pub company: Company,
-    pub diary: MetricsWriter,
-    pub rhythm: TurnPeriod,
+    pub metrics: MetricsWriter,
+    pub turn_period: TurnPeriod,
     pub open: Option<PendingTurn>,
     /// Whether an agent that does not step with it was next to it in its previous turn, if that was checked.
     pub beside: Option<bool>,
@@ -74,7 +75,7 @@ pub(super) struct PendingTurn {
 
 /// A step that was made.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Made {
+pub(super) struct StepOutcome {
     pub report: StepReport,
     /// Its length: at most the requested one.
     pub dt: SimSpan,
@@ -110,7 +111,7 @@ pub(super) struct TurnPeriod {
 }
 
 impl TurnPeriod {
-    fn beat(&mut self, timeline: &Timeline, wall: Duration) {
+    fn record(&mut self, timeline: &Timeline, wall: Duration) {
         let piece = timeline.piece();
         match self.last.filter(|&(_, p)| p == piece) {
             None => self.period_s = None,
@@ -134,34 +135,35 @@ impl AgentRunner {
     }
 
     /// Publishes the initial state of the agent, or parks it.
-    pub fn introduce(&mut self) {
+    pub fn publish_initial(&mut self) {
         let time = self.pace.time();
         let written = contained(|| self.write_snapshot(time, false));
         match written {
             Ok(()) => drop(self.writer.publish()),
             Err(reason) => self.park(reason),
         }
-        self.tell();
-        self.diary.pace(&self.shared.gauges, &self.pace);
+        self.notify_reader();
+        self.metrics.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Looks around before the first step and publishes the result, if the agent has links; to be called after [`Self::introduce`] of all
+    /// Reads the neighbours before the first step and publishes the result, if the agent has links; to be called after [`Self::publish_initial`] of all
     /// agents.
-    pub fn look(&mut self) {
+    pub fn observe(&mut self) {
         if self.links.is_empty() || self.is_parked() {
             return;
         }
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
-        self.eyes.look(&self.peers, &self.writer, (me, self.pace.scene_time(), dt), &Fellows::default());
-        let neighbours = self.eyes.neighbours();
-        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let step = PlannedStep { start: self.pace.scene_time(), dt };
+        self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
+        let neighbours = self.observer.neighbours();
+        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
         let looked = contained(|| {
-            agent.observe(dt, &around);
+            agent.observe(dt, &context);
             Ok(())
         });
         match looked {
-            Ok(()) => self.introduce(),
+            Ok(()) => self.publish_initial(),
             Err(reason) => self.park(reason),
         }
     }
@@ -169,7 +171,7 @@ impl AgentRunner {
     /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
     /// and is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
-        self.shared.board.heed(self.id());
+        self.shared.sleep.clear_wake(self.id());
         self.take_in();
         match contained(|| self.attempt(timeline, wall)) {
             Ok((open, effort)) => {
@@ -189,9 +191,9 @@ impl AgentRunner {
         // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
-        let mut published = self.conclude(&open, now, work_s);
+        let mut published = self.record_step(&open, now, work_s);
         published &= self.conclude_led(now, work_s);
-        if let Err(reason) = contained(|| self.consult(timeline, &open, work_s)) {
+        if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
             self.disband(timeline, wall);
             return Next::Parked;
@@ -201,15 +203,15 @@ impl AgentRunner {
             return Next::Join(leader);
         }
         // an agent does not rest in a state that was not published
-        if open.rests && published && self.lie_down(now) { Next::Rest } else { Next::Due }
+        if open.rests && published && self.try_to_rest(now) { Next::Rest } else { Next::Due }
     }
 
     /// Whether the agent was woken from its rest; it then runs again at the timeline's present, with all agents it leads.
-    pub fn wakes(&mut self, timeline: &Timeline, wall: Duration) -> bool {
-        if !self.shared.board.take_wake(self.id()) {
+    pub fn try_wake(&mut self, timeline: &Timeline, wall: Duration) -> bool {
+        if !self.shared.sleep.take_wake(self.id()) {
             return false;
         }
-        self.get_up(timeline, wall);
+        self.resume(timeline, wall);
         true
     }
 
@@ -236,20 +238,20 @@ impl AgentRunner {
         if self.shared.gauges.is_resting() {
             self.hold_watched(timeline.sim_at(wall));
             self.pace.wake(timeline, wall);
-            self.diary.pace(&self.shared.gauges, &self.pace);
+            self.metrics.pace(&self.shared.gauges, &self.pace);
         }
-        self.diary.flush(&self.shared.gauges);
+        self.metrics.flush(&self.shared.gauges);
         self.company.each(|seat| seat.close_account(timeline, wall));
     }
 
     /// Parks the agent for good, for this reason.
     pub fn park(&mut self, reason: String) {
         self.show_withheld();
-        self.diary.flush(&self.shared.gauges);
+        self.metrics.flush(&self.shared.gauges);
         self.shared.gauges.park(reason);
-        self.tell();
-        if let Some(crowd) = &self.peers.crowd {
-            crowd.stay(self.id());
+        self.notify_reader();
+        if let Some(broad_phase) = &self.peers.broad_phase {
+            broad_phase.publish_rest(self.id());
         }
         self.shut_door();
     }
@@ -262,22 +264,22 @@ impl AgentRunner {
         let before = self.pace.time();
         let start = self.pace.begin(timeline, wall, near);
         let leapt = self.pace.time().since(before);
-        if near && start.late > LAG_CAP || self.pace.put_off() > SimSpan::ZERO {
-            self.shared.board.note_far_behind(now);
+        if near && start.late > LAG_CAP || self.pace.clock_offset() > SimSpan::ZERO {
+            self.shared.sleep.note_far_behind(now);
         }
         // even if it waits: the awaited agents may wait for one that it leads
         let alone = self.gather(timeline, wall, (&start, leapt));
-        if self.waits(wall) || self.is_called() {
+        if self.waits(wall) || self.should_join() {
             return Ok((None, Effort { work: 0.0, steps: alone }));
         }
         if self.governor.is_some() {
-            self.rhythm.beat(timeline, wall);
+            self.turn_period.record(timeline, wall);
         }
-        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
-        let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
+        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.metrics.steps());
+        let is_met = self.peers.broad_phase.is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
-        let (Made { report, dt }, led) =
+        let (StepOutcome { report, dt }, led) =
             if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };
         self.pace.shorten(wanted, dt);
         let done = &self.shared.gauges.work;
@@ -293,56 +295,52 @@ impl AgentRunner {
 
     /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
     /// not be where its leader expects it.
-    fn is_called(&mut self) -> bool {
-        if self.shared.seating.is_none() || self.eyes.neighbours().is_empty() {
+    fn should_join(&mut self) -> bool {
+        if self.shared.seating.is_none() || self.observer.neighbours().is_empty() {
             return false;
         }
-        self.eyes.look_again();
+        self.observer.refresh();
         self.seek_leader().is_some()
     }
 
     /// Steps alone, by `wanted` or by the shorter step that the agent chooses.
-    pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
+    pub fn step(&mut self, wanted: SimSpan) -> Result<StepOutcome, String> {
         let time = self.pace.time();
-        self.eyes.look(
-            &self.peers,
-            &self.writer,
-            (self.shared.id, self.pace.scene_time(), wanted),
-            &Fellows::default(),
-        );
-        let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
-        let around = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
-        let dt = self.agent.longest_step(wanted, &around).min(wanted);
-        let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
-        Ok(Made { report, dt })
+        let step = PlannedStep { start: self.pace.scene_time(), dt: wanted };
+        self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
+        let (me, neighbours) = (self.shared.id, self.observer.neighbours());
+        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let dt = self.agent.longest_step(wanted, &context).min(wanted);
+        let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
+        Ok(StepOutcome { report, dt })
     }
 
     pub fn take_commands(&mut self) {
-        let letters = self.shared.mail.take();
-        if let Some(wanted) = letters.set_resolution {
+        let pending = self.shared.mail.take();
+        if let Some(wanted) = pending.set_resolution {
             self.set_resolution(wanted);
         }
-        if let Some(dt) = letters.dt {
+        if let Some(dt) = pending.dt {
             self.set_dt(dt);
         }
-        if let Some(hand) = letters.hand {
+        if let Some(hand) = pending.hand {
             self.hands.clear();
             self.hands.extend(hand);
         }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.
-    pub fn is_let_alone(&self, now: SimTime) -> bool {
-        self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
+    pub fn is_undisturbed(&self, now: SimTime) -> bool {
+        self.hands.is_empty() && !self.shared.sleep.must_stay_awake(self.id(), now)
     }
 
-    fn consult(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
+    fn run_governor(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
         let Some(governor) = &mut self.governor else { return Ok(()) };
         let wanted_period_s = 1.0 / (self.shared.wanted_hz * timeline.speed());
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
             work_s,
             wanted_period_s,
-            real_period_s: self.rhythm.period_s.map_or(wanted_period_s, f64::from),
+            real_period_s: self.turn_period.period_s.map_or(wanted_period_s, f64::from),
             lateness_s: open.start.late.as_secs_f64(),
             dropped: open.start.dropped,
             dt: open.dt,
@@ -367,9 +365,9 @@ impl AgentRunner {
         }
     }
 
-    fn lie_down(&mut self, now: SimTime) -> bool {
+    fn try_to_rest(&mut self, now: SimTime) -> bool {
         let led = self.company.ids();
-        let rests = self.shared.board.try_rest(self.id(), led, now);
+        let rests = self.shared.sleep.try_rest(self.id(), led, now);
         if rests {
             self.rest_now();
         }
@@ -378,27 +376,27 @@ impl AgentRunner {
 
     /// Puts it to rest, with all agents it leads.
     fn rest_now(&mut self) {
-        self.diary.flush(&self.shared.gauges);
+        self.metrics.flush(&self.shared.gauges);
         self.shared.gauges.set_resting(true);
-        self.tell();
-        if let Some(crowd) = &self.peers.crowd {
-            crowd.stay(self.id());
+        self.notify_reader();
+        if let Some(broad_phase) = &self.peers.broad_phase {
+            broad_phase.publish_rest(self.id());
         }
         self.company.each(AgentRunner::rest_now);
     }
 
     /// Continues after a rest, at the timeline's present, with all agents it leads.
-    fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
+    fn resume(&mut self, timeline: &Timeline, wall: Duration) {
         self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
         // as an agent that newly comes near its peers: while it slept their time went on
         self.beside = Some(false);
-        self.rhythm = TurnPeriod::default();
-        self.diary.restart(timeline.sim_at(wall));
-        self.diary.pace(&self.shared.gauges, &self.pace);
+        self.turn_period = TurnPeriod::default();
+        self.metrics.restart(timeline.sim_at(wall));
+        self.metrics.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.set_resting(false);
-        self.tell();
-        self.company.each(|seat| seat.get_up(timeline, wall));
+        self.notify_reader();
+        self.company.each(|seat| seat.resume(timeline, wall));
     }
 }
 

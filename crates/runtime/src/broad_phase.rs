@@ -4,22 +4,31 @@
 //! its next turns, and of those that have given impulses to it ([`NeighbourList`]). Agents exchange atomic words only: no agent waits for another.
 //! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
 //! published speed enters itself in a common log, and is checked again.
-//! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no crowd.
+//! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no broad phase.
 
 mod neighbour_list;
 mod published_bounds;
 
 pub(super) use neighbour_list::NeighbourList;
 
-use metachron_core::{AgentId, Bounds, SimTime};
-use published_bounds::{PublishedBounds, Reach, Seen};
+use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
+use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
+
+/// The step that an agent is about to make.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlannedStep {
+    /// Its time at the start.
+    pub start: SimTime,
+    /// Its length.
+    pub dt: SimSpan,
+}
 
 /// Shared data by which the agents of a run find each other.
 #[derive(Debug)]
 pub(super) struct BroadPhase {
-    berths: Vec<PublishedBounds>,
+    bounds: Vec<PublishedBounds>,
     /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
     /// Number of entries ever written.
@@ -51,10 +60,10 @@ const SPEED_LEAST_M_S: f64 = 0.0625;
 const SPEED_ROOM: f64 = 1.25;
 
 impl BroadPhase {
-    /// A crowd of that many agents, none of which has published a box.
+    /// The broad phase of that many agents, none of which has published a box.
     pub fn new(agents: usize) -> Self {
         Self {
-            berths: std::iter::repeat_with(PublishedBounds::default).take(agents).collect(),
+            bounds: std::iter::repeat_with(PublishedBounds::default).take(agents).collect(),
             log: zeros(LOG_LENGTH as usize),
             noted: AtomicU64::new(0),
             calls: std::iter::repeat_with(Calls::default).take(agents).collect(),
@@ -62,33 +71,33 @@ impl BroadPhase {
     }
 
     /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
-    pub fn stand(&self, id: AgentId, bounds: &Bounds, time: SimTime) -> f64 {
-        let Some(berth) = self.berths.get(id.0 as usize) else { return 0.0 };
-        let before = berth.mine();
-        let said = before.map_or(0.0, |reach| reach.speed_m_s);
-        let speed_m_s = promise(bounds.speed_m_s, said);
-        berth.write(&Reach::new(bounds, speed_m_s, time));
-        if speed_m_s > said || before.is_none() {
-            self.note(id);
+    pub fn publish(&self, id: AgentId, bounds: &Bounds, time: SimTime) -> f64 {
+        let Some(published) = self.bounds.get(id.0 as usize) else { return 0.0 };
+        let before = published.mine();
+        let speed_before_m_s = before.map_or(0.0, |reach| reach.speed_m_s);
+        let speed_m_s = published_speed(bounds.speed_m_s, speed_before_m_s);
+        published.write(&MovingBox::new(bounds, speed_m_s, time));
+        if speed_m_s > speed_before_m_s || before.is_none() {
+            self.log_speed(id);
         }
         speed_m_s
     }
 
     /// The last published box of `id`.
-    fn seen(&self, id: AgentId) -> Seen {
-        self.berths.get(id.0 as usize).map_or(Seen::Nowhere, PublishedBounds::read)
+    fn bounds_of(&self, id: AgentId) -> ReadBounds {
+        self.bounds.get(id.0 as usize).map_or(ReadBounds::Unpublished, PublishedBounds::read)
     }
 
     /// Publishes speed zero for `id`: it stays in place until it publishes a box again.
-    pub fn stay(&self, id: AgentId) {
-        let Some(berth) = self.berths.get(id.0 as usize) else { return };
-        if let Some(reach) = berth.mine() {
-            berth.write(&Reach { speed_m_s: 0.0, ..reach });
+    pub fn publish_rest(&self, id: AgentId) {
+        let Some(published) = self.bounds.get(id.0 as usize) else { return };
+        if let Some(reach) = published.mine() {
+            published.write(&MovingBox { speed_m_s: 0.0, ..reach });
         }
     }
 
     /// Notifies `to` that `from` has given an impulse to it: `to` lists `from` at its next turn.
-    pub fn call(&self, to: AgentId, from: AgentId) {
+    pub fn report_impulse(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
         let pages = self.calls.len().div_ceil(64 * PAGE_WORDS);
@@ -100,7 +109,7 @@ impl BroadPhase {
     }
 
     /// Visits the agents that have called `id` since the last query, by rising numbers.
-    pub fn answer(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
+    pub fn take_givers(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
         let Some(calls) = self.calls.get(id.0 as usize) else { return };
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;
@@ -117,22 +126,22 @@ impl BroadPhase {
         }
     }
 
-    fn note(&self, id: AgentId) {
+    fn log_speed(&self, id: AgentId) {
         let at = self.noted.fetch_add(1, SeqCst);
         self.log[(at % LOG_LENGTH) as usize].store(word(at, id), SeqCst);
     }
 
     /// Visits the log entries from number `from` on and returns the number of the next one; `None` if some are overwritten or not yet
     /// written: any agent may be affected.
-    fn notes(&self, from: u64, mut visit: impl FnMut(AgentId)) -> (u64, Option<()>) {
+    fn read_log(&self, from: u64, mut visit: impl FnMut(AgentId)) -> (u64, Option<()>) {
         let end = self.noted.load(SeqCst);
         if end - from > LOG_LENGTH / 2 {
             return (end, None);
         }
         for at in from..end {
-            let note = self.log[(at % LOG_LENGTH) as usize].load(SeqCst);
-            let id = AgentId(note as u32);
-            if note != word(at, id) {
+            let entry = self.log[(at % LOG_LENGTH) as usize].load(SeqCst);
+            let id = AgentId(entry as u32);
+            if entry != word(at, id) {
                 return (end, None);
             }
             visit(id);
@@ -150,12 +159,12 @@ fn zeros(count: usize) -> Vec<AtomicU64> {
     std::iter::repeat_with(AtomicU64::default).take(count).collect()
 }
 
-/// The speed to publish for an agent of `speed_m_s` that published `said` before: a power of two above it, so that it seldom changes,
+/// The speed to publish for an agent of `speed_m_s` that published `published` before: a power of two above it, so that it seldom changes,
 /// lowered only if it is far too high.
-fn promise(speed_m_s: f64, said: f64) -> f64 {
+fn published_speed(speed_m_s: f64, published: f64) -> f64 {
     let wanted = (speed_m_s * SPEED_ROOM).max(SPEED_LEAST_M_S);
-    let told = libm::exp2(libm::ceil(libm::log2(wanted)));
-    if said >= speed_m_s && said >= SPEED_LEAST_M_S && said <= 4.0 * told { said } else { told }
+    let raised = libm::exp2(libm::ceil(libm::log2(wanted)));
+    if published >= speed_m_s && published >= SPEED_LEAST_M_S && published <= 4.0 * raised { published } else { raised }
 }
 
 #[cfg(test)]

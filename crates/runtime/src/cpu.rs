@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_batch_counts_too_much_the_next_ones_make_up() {
+    fn an_overcount_of_one_batch_is_made_up_by_the_next_ones() {
         let mut share = CpuShare::new();
         let mut counted_s = 0.0;
         // turns of an hour that the test does not really compute

@@ -17,7 +17,7 @@ impl DirtySet {
     }
 
     /// Reports a new state of `id`; to be called after the state is visible.
-    pub fn tell(&self, id: AgentId) {
+    pub fn mark(&self, id: AgentId) {
         if let Some(word) = self.0.get(id.0 as usize / 64) {
             // written even if the bit is set: else the reader could clear the bit and miss the state that this caller has published
             word.fetch_or(1 << (id.0 % 64), Ordering::AcqRel);
@@ -45,35 +45,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn news_are_heard_once() {
-        let news = DirtySet::new(130);
-        let heard = || {
-            let mut heard = Vec::new();
-            news.take(|id| heard.push(id.0));
-            heard
+    fn each_mark_is_visited_once() {
+        let set = DirtySet::new(130);
+        let visited = || {
+            let mut visited = Vec::new();
+            set.take(|id| visited.push(id.0));
+            visited
         };
-        [129, 0, 64, 0, 63].iter().for_each(|id| news.tell(AgentId(*id)));
-        assert_eq!(heard(), [0, 63, 64, 129]);
-        assert!(heard().is_empty());
-        news.tell(AgentId(5000));
-        assert!(heard().is_empty(), "strangers are nobody");
+        [129, 0, 64, 0, 63].iter().for_each(|id| set.mark(AgentId(*id)));
+        assert_eq!(visited(), [0, 63, 64, 129]);
+        assert!(visited().is_empty());
+        set.mark(AgentId(5000));
+        assert!(visited().is_empty(), "unknown agents are ignored");
     }
 
     #[test]
-    fn what_is_published_before_the_telling_is_seen_with_it() {
-        let (news, value) = (DirtySet::new(1), AtomicU64::new(0));
+    fn a_value_stored_before_a_mark_is_visible_with_it() {
+        let (set, value) = (DirtySet::new(1), AtomicU64::new(0));
         let last = 100_000;
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 for k in 1..=last {
                     value.store(k, Ordering::Release);
-                    news.tell(AgentId(0));
+                    set.mark(AgentId(0));
                 }
             });
             // a reader that looks only at reported agents reaches the last value
             let mut seen = 0;
             while seen < last {
-                news.take(|_| seen = value.load(Ordering::Acquire));
+                set.take(|_| seen = value.load(Ordering::Acquire));
                 std::thread::yield_now();
             }
         });

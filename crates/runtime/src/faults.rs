@@ -4,7 +4,7 @@
 //! The faults imitate networks and loaded machines, so that couplings can be tested against them.
 //! Never here: a model of physics, time passing.
 
-use super::machine::{GOLDEN, mix};
+use super::machine::{GOLDEN, mix, unit_interval};
 use metachron_core::{AgentId, DT_MAX_S, SimSpan};
 
 /// Faults injected into one agent.
@@ -51,9 +51,8 @@ impl Faults {
 
     /// A number uniform in 0 … 1 that depends only on its arguments.
     fn even(&self, draw: Draw, id: AgentId, step: u64) -> f64 {
-        const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
         let stream = mix((draw as u64).wrapping_mul(GOLDEN) ^ mix(u64::from(id.0).wrapping_add(1)));
-        (mix(mix(self.seed ^ stream) ^ step) >> 11) as f64 / TWO_POW_53
+        unit_interval(mix(self.seed ^ stream) ^ step)
     }
 }
 
@@ -107,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sound_agent_is_left_alone() {
+    fn an_agent_without_faults_is_unchanged() {
         let none = Faults::default();
         assert_eq!(none.span(DT, AgentId(0), 7), DT);
         assert!((0..1000).all(|k| !none.loses(AgentId(0), k)));
@@ -123,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_that_are_none_are_not_sound() {
+    fn shares_outside_their_range_are_invalid() {
         assert!(Faults::default().is_sound());
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(!Faults { jitter: bad, ..Faults::default() }.is_sound());

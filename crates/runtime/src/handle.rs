@@ -24,7 +24,7 @@ pub(super) struct Shared {
     pub gauges: Metrics,
     pub mail: Mailbox,
     pub slot: Arc<LatestSlot<Snapshot>>,
-    pub board: Arc<SleepRegistry>,
+    pub sleep: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
     pub seating: Option<Seating>,
     /// Used by readers only: the agent never waits for this lock.
@@ -97,7 +97,7 @@ impl AgentHandle {
     /// The leader of the island in which it steps; `None` if it makes its own turns.
     #[must_use]
     pub fn led_by(&self) -> Option<AgentId> {
-        Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
+        Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
     }
 
     /// State of its execution.
@@ -111,8 +111,8 @@ impl AgentHandle {
     /// # Errors
     /// [`SendError::BadNumber`]: nothing was delivered.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        self.shared.mail.post(command)?;
-        self.shared.board.wake(self.shared.id);
+        self.shared.mail.send(command)?;
+        self.shared.sleep.wake(self.shared.id);
         Ok(())
     }
 

@@ -153,7 +153,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn whatever_is_counted_percentiles_agree_with_sorting(us in proptest::collection::vec(0_u64..20_000_000, 1..400)) {
+        fn percentiles_of_any_counts_agree_with_sorting(us in proptest::collection::vec(0_u64..20_000_000, 1..400)) {
             let mut times = Histogram::default();
             us.iter().for_each(|us| times.record(Duration::from_micros(*us)));
             let exact = sorted(us.iter().map(|us| (*us).min(LONGEST_US)).collect(), &[0.5, 0.99]);

@@ -17,7 +17,8 @@ pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_i
 
 use super::agent_clock::Start;
 use super::agent_clock::Timeline;
-use super::agent_runner::{AgentRunner, Made, PendingTurn, contained};
+use super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
+use super::broad_phase::PlannedStep;
 use super::fellows::Fellows;
 use super::metrics::Entry;
 use metachron_contact::{IslandMember, StepContext};
@@ -31,17 +32,17 @@ impl AgentRunner {
         if self.company.is_empty() {
             return 0;
         }
-        let (time, put_off, mut steps) = (self.pace.time(), self.pace.put_off(), 0);
+        let (time, clock_offset, mut steps) = (self.pace.time(), self.pace.clock_offset(), 0);
         self.company.each(|seat| {
             let caught_up = contained(|| {
-                seat.shared.board.heed(seat.id());
+                seat.shared.sleep.clear_wake(seat.id());
                 seat.take_commands();
                 if seat.pace.time() == time - leapt {
-                    seat.pace.give_up(start.dropped, leapt);
-                    seat.pace.keep_up(put_off);
+                    seat.pace.drop_time(start.dropped, leapt);
+                    seat.pace.follow_clock_offset(clock_offset);
                     return Ok(0);
                 }
-                seat.pace.keep_up(put_off);
+                seat.pace.follow_clock_offset(clock_offset);
                 seat.catch_up(time, timeline, wall)
             });
             match caught_up {
@@ -58,17 +59,17 @@ impl AgentRunner {
         let mut steps = 0;
         while self.pace.time() < time {
             let span = portion(time.since(self.pace.time()), self.pace.dt());
-            let Made { dt, .. } = self.step(span)?;
+            let StepOutcome { dt, .. } = self.step(span)?;
             self.write_snapshot(self.pace.time() + dt, false)?;
             self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();
             let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
-            self.diary.write(&self.shared.gauges, &self.pace, entry);
+            self.metrics.write(&self.shared.gauges, &self.pace, entry);
             steps += 1;
         }
         if steps > 0 {
             // what it has given on the way is settled before the first common step
-            self.show(timeline.sim_at(wall));
+            self.publish(timeline.sim_at(wall));
         }
         Ok(steps)
     }
@@ -77,16 +78,16 @@ impl AgentRunner {
     ///
     /// An error leaves all as they were: they part, and this agent steps alone. After a panic nobody knows how they are: it is
     /// this agent's, and the others go on from where the next step finds them.
-    pub fn lead(&mut self, dt: SimSpan) -> Result<(Made, u32), String> {
+    pub fn lead(&mut self, dt: SimSpan) -> Result<(StepOutcome, u32), String> {
         let time = self.pace.time();
         let led = self.company.at(time).count() as u32;
         if led == 0 {
             return Ok((self.step(dt)?, 0));
         }
         match self.step_as_one(dt) {
-            Ok(Made { report, dt }) => {
+            Ok(StepOutcome { report, dt }) => {
                 let report = StepReport { work: report.work / f64::from(1 + led), ..report };
-                Ok((Made { report, dt }, led))
+                Ok((StepOutcome { report, dt }, led))
             }
             Err(_) => {
                 self.scatter();
@@ -95,12 +96,12 @@ impl AgentRunner {
         }
     }
 
-    fn step_as_one(&mut self, dt: SimSpan) -> Result<Made, String> {
+    fn step_as_one(&mut self, dt: SimSpan) -> Result<StepOutcome, String> {
         let (me, time) = (self.shared.id, self.pace.time());
         self.company.gather_fellows(me, time);
-        let Self { agent, eyes, hands, links, company, peers, writer, pace, .. } = self;
-        eyes.look(peers, writer, (me, pace.scene_time(), dt), &company.fellows);
-        let around = StepContext { me, time, neighbours: eyes.neighbours(), hands, links };
+        let Self { agent, observer, hands, links, company, peers, writer, pace, .. } = self;
+        observer.update(peers, writer, PlannedStep { start: pace.scene_time(), dt }, &company.fellows);
+        let around = StepContext { me, time, neighbours: observer.neighbours(), hands, links };
         let mut others = emptied(std::mem::take(&mut company.companions));
         for seat in company.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time) {
             others.push(seat.actor.companion((time, dt), &company.fellows));
@@ -112,14 +113,14 @@ impl AgentRunner {
         let report = agent.step_island(dt, &around, &mut others, &mut company.apart).map_err(|e| e.to_string());
         company.companions = emptied(others);
         company.note_apart(time);
-        report.map(|report| Made { report, dt })
+        report.map(|report| StepOutcome { report, dt })
     }
 
     /// This agent, as one who leads it wants it.
     fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> IslandMember<'_> {
         let id = self.shared.id;
-        self.eyes.look(&self.peers, &self.writer, (id, self.pace.scene_time(), dt), fellows);
-        let neighbours = self.eyes.neighbours();
+        self.observer.update(&self.peers, &self.writer, PlannedStep { start: self.pace.scene_time(), dt }, fellows);
+        let neighbours = self.observer.neighbours();
         let around = StepContext { me: id, time, neighbours, hands: &self.hands, links: &self.links };
         IslandMember { id, agent: &mut *self.agent, context: around }
     }
@@ -127,8 +128,8 @@ impl AgentRunner {
     /// Whether nothing keeps it from resting, nor any of those it leads.
     pub fn may_rest(&self, now: SimTime) -> bool {
         let time = self.pace.time();
-        self.is_let_alone(now)
-            && self.company.seats.iter().all(|s| s.actor.pace.time() == time && s.actor.is_let_alone(now))
+        self.is_undisturbed(now)
+            && self.company.seats.iter().all(|s| s.actor.pace.time() == time && s.actor.is_undisturbed(now))
     }
 
     /// Writes the states of those that have just stepped with it. One that is broken is parked alone.
@@ -159,7 +160,7 @@ impl AgentRunner {
         let mut published = true;
         self.company.each(|seat| {
             if let Some(open) = seat.open.take() {
-                published &= seat.conclude(&open, now, share_s);
+                published &= seat.record_step(&open, now, share_s);
             }
         });
         published

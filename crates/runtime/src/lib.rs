@@ -5,7 +5,7 @@
 //!
 //! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`]
 //! gives each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time
-//! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`),
+//! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`broad_phase`),
 //! and agents in lasting contact share the turns of one of them (`island`).
 //!
 //! ```
@@ -62,7 +62,7 @@ mod threads;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
-pub use agent_clock::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+pub use agent_clock::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};
@@ -73,7 +73,7 @@ pub use mailbox::{Command, SendError};
 pub use metrics::{AgentState, AgentStats, Spread};
 pub use pool::Pool;
 pub use priority::{Priority, PriorityRefused};
-pub use probe::{SAMPLES_MAX, Sample, Watch};
+pub use probe::{SAMPLES_MAX, Sample, WatchedPoint};
 pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
@@ -98,7 +98,7 @@ pub trait Run: Send {
     fn timeline(&self) -> Timeline;
 
     /// Changes the timeline: pause, run, speed, single step.
-    fn drive(&mut self, drive: Drive);
+    fn drive(&mut self, drive: TimelineCommand);
 
     /// All agents, in the order of their numbers.
     fn agents(&self) -> &[AgentHandle];

@@ -1,7 +1,7 @@
 //! Claims about agents in real time, held against every executor that keeps it.
 
 use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
-use super::{AgentState, Clock, Command, Drive, ManualClock, Run};
+use super::{AgentState, Clock, Command, ManualClock, Run, TimelineCommand};
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
@@ -56,7 +56,7 @@ fn an_agent_at_rest_wakes_for_a_command_and_for_a_touch() {
 }
 
 #[test]
-fn on_a_clock_that_stands_still_nobody_runs_ahead() {
+fn no_agent_runs_ahead_of_a_clock_that_stands_still() {
     on_every_executor(|start| {
         let clock = Arc::new(ManualClock::new());
         let spawns = vec![Dummy::new(1.0).at(250.0), Dummy::new(1.0).at(100.0)];
@@ -69,10 +69,10 @@ fn on_a_clock_that_stands_still_nobody_runs_ahead() {
             clock.advance(Duration::from_millis(20));
             covered(&*run, step * 20);
         }
-        run.drive(Drive::Pause);
+        run.drive(TimelineCommand::Pause);
         clock.advance(Duration::from_secs(5));
         assert_eq!(run.sim_now(), SimTime::from_nanos(400_000_000));
-        run.drive(Drive::Step(SimSpan::from_nanos(20_000_000)));
+        run.drive(TimelineCommand::Step(SimSpan::from_nanos(20_000_000)));
         clock.advance(Duration::from_secs(5));
         covered(&*run, 420);
         assert_eq!(run.sim_now(), SimTime::from_nanos(420_000_000));
@@ -150,6 +150,6 @@ fn the_end_of_a_run_waits_for_no_step_that_never_returns() {
         eventually("it hangs", || log.lock().unwrap().len() == 3);
         let stats = run.shutdown();
         assert_eq!((&stats[0].state, stats[1].steps), (&AgentState::Running, 2));
-        assert_eq!(stats[1].state, AgentState::Parked("a step has not ended within 0.4 s".into()));
+        assert_eq!(stats[1].state, AgentState::Parked("a step did not end within 0.4 s".into()));
     });
 }

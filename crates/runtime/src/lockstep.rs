@@ -7,7 +7,7 @@
 mod cores;
 
 use super::Run;
-use super::agent_clock::{Drive, Timeline};
+use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
@@ -28,19 +28,19 @@ pub struct Lockstep {
     machine: Machine,
     timeline: Timeline,
     now: Duration,
-    lives: Vec<Life>,
+    entries: Vec<AgentEntry>,
     /// Due times of the turns of waiting agents, without those that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
     handles: Vec<AgentHandle>,
-    board: Arc<SleepRegistry>,
+    sleep: Arc<SleepRegistry>,
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
 }
 
 /// An agent and the phase of its turns.
-struct Life {
+struct AgentEntry {
     /// `None` while another agent leads it.
     actor: Option<Box<AgentRunner>>,
     phase: Phase,
@@ -66,17 +66,17 @@ impl Lockstep {
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
         let phase = |actor: &Option<Box<AgentRunner>>| match actor {
             None => Phase::Led,
             Some(actor) if actor.is_parked() => Phase::Parked,
             Some(_) => Phase::Waiting,
         };
-        let lives = actors.into_iter().map(|actor| Life { phase: phase(&actor), actor, turns: 0 }).collect();
+        let entries = actors.into_iter().map(|actor| AgentEntry { phase: phase(&actor), actor, turns: 0 }).collect();
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
         let (due, batch, unsettled) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default(), Vec::new());
         let now = Duration::ZERO;
-        let mut run = Self { machine, timeline, now, lives, due, cores, handles, board, batch, unsettled };
+        let mut run = Self { machine, timeline, now, entries, due, cores, handles, sleep, batch, unsettled };
         run.schedule_all();
         Ok(run)
     }
@@ -89,44 +89,44 @@ impl Lockstep {
 
     fn schedule_all(&mut self) {
         self.due.clear();
-        for whose in 0..self.lives.len() {
-            self.schedule(whose);
+        for agent in 0..self.entries.len() {
+            self.schedule(agent);
         }
     }
 
     /// Schedules the next turn, if the agent waits for one.
-    fn schedule(&mut self, whose: usize) {
-        let life = &self.lives[whose];
-        if life.phase == Phase::Waiting
-            && let Some(due) = life.actor.as_ref().and_then(|actor| actor.pace.due(&self.timeline))
+    fn schedule(&mut self, agent: usize) {
+        let entry = &self.entries[agent];
+        if entry.phase == Phase::Waiting
+            && let Some(due) = entry.actor.as_ref().and_then(|actor| actor.pace.due(&self.timeline))
         {
-            self.due.push(Reverse((due.max(self.now), whose as u32)));
+            self.due.push(Reverse((due.max(self.now), agent as u32)));
         }
     }
 
-    /// Serves the summoned agents: sleepers that are woken, and agents that return from a leader.
+    /// Serves the notified agents: sleepers that are woken, and agents that return from a leader.
     fn wake_sleepers(&mut self) {
-        if !self.board.take_rung() {
+        if !self.sleep.take_notified() {
             return;
         }
-        for whose in 0..self.lives.len() {
-            let life = &mut self.lives[whose];
-            match (life.phase, &mut life.actor) {
+        for agent in 0..self.entries.len() {
+            let entry = &mut self.entries[agent];
+            match (entry.phase, &mut entry.actor) {
                 (Phase::Resting, Some(actor)) => {
-                    if !actor.wakes(&self.timeline, self.now) {
+                    if !actor.try_wake(&self.timeline, self.now) {
                         continue;
                     }
-                    life.phase = Phase::Waiting;
+                    entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let home = self.handles[whose].shared.seating.as_ref().and_then(Seating::come_home);
+                    let home = self.handles[agent].shared.seating.as_ref().and_then(Seating::come_home);
                     let Some(actor) = home else { continue };
-                    life.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
-                    life.actor = Some(actor);
+                    entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+                    entry.actor = Some(actor);
                 }
                 _ => continue,
             }
-            self.schedule(whose);
+            self.schedule(agent);
         }
     }
 
@@ -143,8 +143,8 @@ impl Lockstep {
         self.now = at;
         // time advanced to the end of a job or to a due turn, whichever was first
         match self.cores.take_ended() {
-            Some(whose) => Some(Event::End(whose)),
-            None => self.due.pop().map(|Reverse((_, whose))| Event::Start(whose)),
+            Some(agent) => Some(Event::End(agent)),
+            None => self.due.pop().map(|Reverse((_, agent))| Event::Start(agent)),
         }
     }
 
@@ -152,66 +152,66 @@ impl Lockstep {
     fn run(&mut self, limit: Duration) {
         while let Some(event) = self.next_event(limit) {
             match event {
-                Event::Start(whose) => self.begin(whose as usize),
+                Event::Start(agent) => self.begin(agent as usize),
                 Event::End(FRAME) => break,
-                Event::End(whose) => self.finish(whose as usize),
+                Event::End(agent) => self.finish(agent as usize),
             }
         }
         self.settle();
     }
 
-    fn begin(&mut self, whose: usize) {
+    fn begin(&mut self, agent: usize) {
         self.batch.open();
         let started = Instant::now();
-        let life = &mut self.lives[whose];
-        let Some(actor) = &mut life.actor else { return };
+        let entry = &mut self.entries[agent];
+        let Some(actor) = &mut entry.actor else { return };
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
                 let model = actor.shared.model;
-                let step_s = self.machine.step_s(model, work, whose as u64, life.turns);
+                let step_s = self.machine.step_s(model, work, agent as u64, entry.turns);
                 let seconds = f64::from(steps) * step_s * self.machine.slower(self.now);
-                self.cores.start(whose as u32, duration(seconds));
-                life.turns += 1;
-                life.phase = Phase::Busy(self.now);
+                self.cores.start(agent as u32, duration(seconds));
+                entry.turns += 1;
+                entry.phase = Phase::Busy(self.now);
             }
-            None => life.phase = Phase::Parked,
+            None => entry.phase = Phase::Parked,
         }
-        self.count_cpu(whose, started.elapsed());
+        self.count_cpu(agent, started.elapsed());
     }
 
-    fn finish(&mut self, whose: usize) {
+    fn finish(&mut self, agent: usize) {
         self.batch.open();
         let started = Instant::now();
-        let life = &mut self.lives[whose];
-        let (Phase::Busy(since), Some(actor)) = (life.phase, &mut life.actor) else { return };
+        let entry = &mut self.entries[agent];
+        let (Phase::Busy(since), Some(actor)) = (entry.phase, &mut entry.actor) else { return };
         let took = (self.now - since).as_secs_f64();
         let next = actor.finish(&self.timeline, self.now, took);
-        life.phase = match next {
+        entry.phase = match next {
             Next::Due | Next::Join(_) => Phase::Waiting,
             Next::Rest => Phase::Resting,
             Next::Parked => Phase::Parked,
         };
-        self.count_cpu(whose, started.elapsed());
+        self.count_cpu(agent, started.elapsed());
         if let Next::Join(leader) = next {
-            self.hand_over(whose, leader);
+            self.hand_over(agent, leader);
         }
-        self.schedule(whose);
+        self.schedule(agent);
     }
 
     /// Hands an agent over to `leader`, if the leader accepts it now.
-    fn hand_over(&mut self, whose: usize, leader: AgentId) {
+    fn hand_over(&mut self, agent: usize, leader: AgentId) {
         self.settle();
-        let life = &mut self.lives[whose];
-        life.actor = life.actor.take().and_then(|actor| move_in(actor, leader).err());
-        if life.actor.is_none() {
-            life.phase = Phase::Led;
+        let entry = &mut self.entries[agent];
+        entry.actor = entry.actor.take().and_then(|actor| move_in(actor, leader).err());
+        if entry.actor.is_none() {
+            entry.phase = Phase::Led;
         }
     }
 
-    fn count_cpu(&mut self, whose: usize, wall: Duration) {
-        if let Some(actor) = &mut self.lives[whose].actor {
+    fn count_cpu(&mut self, agent: usize, wall: Duration) {
+        if let Some(actor) = &mut self.entries[agent].actor {
             if actor.unsettled_ns == 0 {
-                self.unsettled.push(whose as u32);
+                self.unsettled.push(agent as u32);
             }
             actor.count(wall);
         }
@@ -222,7 +222,7 @@ impl Lockstep {
 
     /// Ends all agents, whatever their phase.
     fn end(&mut self) {
-        let actors = self.lives.drain(..).filter_map(|life| life.actor);
+        let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
         empty_rooms(&self.handles, &self.timeline, self.now);
     }
@@ -232,8 +232,8 @@ impl Lockstep {
             return;
         }
         let share = self.batch.close();
-        for whose in self.unsettled.drain(..) {
-            if let Some(actor) = &mut self.lives[whose as usize].actor {
+        for agent in self.unsettled.drain(..) {
+            if let Some(actor) = &mut self.entries[agent as usize].actor {
                 actor.settle(share);
             }
         }
@@ -277,7 +277,7 @@ impl Run for Lockstep {
         self.timeline
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         self.timeline = self.timeline.after(self.now, drive);
         self.schedule_all();
     }

@@ -224,21 +224,22 @@ fn normal(seed: u64, stream: u64, count: u64) -> f64 {
     let mut sum = -6.0;
     for _ in 0..12 {
         state = state.wrapping_add(GOLDEN);
-        sum += part(state);
+        sum += unit_interval(state);
     }
     sum
 }
 
 /// A number between 0 and 1 that depends only on its arguments.
 fn uniform(seed: u64, stream: u64, count: u64) -> f64 {
-    part(start(seed, stream, count).wrapping_add(GOLDEN))
+    unit_interval(start(seed, stream, count).wrapping_add(GOLDEN))
 }
 
 fn start(seed: u64, stream: u64, count: u64) -> u64 {
     mix(mix(seed ^ mix(stream)) ^ count)
 }
 
-fn part(state: u64) -> f64 {
+/// A number uniform in 0 … 1 from a state of SplitMix64.
+pub(super) fn unit_interval(state: u64) -> f64 {
     const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
     (mix(state) >> 11) as f64 / TWO_POW_53
 }
@@ -311,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn prices_that_are_no_price_cost_nothing() {
+    fn invalid_prices_cost_nothing() {
         let machine = Machine { spikes: f64::NAN, ..Machine::default() };
         assert_eq!(machine.frame_time(f64::NAN, 0, Duration::ZERO), Duration::ZERO);
         assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);

@@ -32,7 +32,7 @@ pub enum SendError {
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
     /// The command holds a number that is not finite, or a negative stiffness or damping.
-    #[error("refused {0:?}: every number must be finite, stiffness and damping not negative")]
+    #[error("command {0:?} was refused: every number must be finite, stiffness and damping not negative")]
     BadNumber(Command),
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Mailbox {
     /// Whether there is any command: an agent without commands reads only this.
     full: AtomicBool,
     /// Allocated by the first command: most agents never get one.
-    letters: OnceLock<Box<Mutex<PendingCommands>>>,
+    pending: OnceLock<Box<Mutex<PendingCommands>>>,
 }
 
 /// Contents of a mailbox.
@@ -61,19 +61,19 @@ impl Mailbox {
     ///
     /// # Errors
     /// [`SendError::BadNumber`]; nothing is delivered then.
-    pub fn post(&self, command: Command) -> Result<(), SendError> {
+    pub fn send(&self, command: Command) -> Result<(), SendError> {
         if !is_sound(&command) {
             return Err(SendError::BadNumber(command));
         }
         if command == Command::Wake {
             return Ok(());
         }
-        let letters = self.letters.get_or_init(Box::default);
-        let mut letters = letters.lock().unwrap_or_else(PoisonError::into_inner);
+        let pending = self.pending.get_or_init(Box::default);
+        let mut pending = pending.lock().unwrap_or_else(PoisonError::into_inner);
         match command {
-            Command::Retune(resolution) => letters.set_resolution = Some(resolution),
-            Command::SetDt(dt) => letters.dt = Some(dt),
-            Command::Hand(pull) => letters.hand = Some(pull),
+            Command::Retune(resolution) => pending.set_resolution = Some(resolution),
+            Command::SetDt(dt) => pending.dt = Some(dt),
+            Command::Hand(pull) => pending.hand = Some(pull),
             Command::Wake => {}
         }
         self.full.store(true, Release);
@@ -81,20 +81,20 @@ impl Mailbox {
     }
 
     /// Whether any command has arrived.
-    pub fn has_letters(&self) -> bool {
+    pub fn has_pending(&self) -> bool {
         self.full.load(Acquire)
     }
 
     /// All commands since the last call. Never blocks: while another thread is writing it returns nothing yet.
     pub fn take(&self) -> PendingCommands {
-        if !self.has_letters() {
+        if !self.has_pending() {
             return PendingCommands::default();
         }
-        let Some(Ok(mut letters)) = self.letters.get().map(|letters| letters.try_lock()) else {
+        let Some(Ok(mut pending)) = self.pending.get().map(|pending| pending.try_lock()) else {
             return PendingCommands::default();
         };
         self.full.store(false, Release);
-        std::mem::take(&mut *letters)
+        std::mem::take(&mut *pending)
     }
 }
 
@@ -131,9 +131,9 @@ mod tests {
     fn the_newest_command_of_a_kind_takes_the_place_of_the_older() {
         let mail = Mailbox::default();
         for eps_m in [0.1, 0.2, 0.3] {
-            mail.post(Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
+            mail.send(Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
         }
-        mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
+        mail.send(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
         let taken = mail.take();
         assert_eq!((taken.set_resolution.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
         let taken = mail.take();
@@ -141,32 +141,32 @@ mod tests {
     }
 
     #[test]
-    fn letting_go_is_a_command_too() {
+    fn a_release_is_a_command_too() {
         let mail = Mailbox::default();
-        mail.post(Command::Hand(Some(pull(DVec3::X)))).unwrap();
-        mail.post(Command::Hand(None)).unwrap();
+        mail.send(Command::Hand(Some(pull(DVec3::X)))).unwrap();
+        mail.send(Command::Hand(None)).unwrap();
         assert_eq!(mail.take().hand, Some(None));
         assert_eq!(mail.take().hand, None);
     }
 
     #[test]
-    fn who_finds_somebody_writing_finds_it_the_next_time() {
+    fn a_reader_that_meets_a_writer_reads_the_command_the_next_time() {
         let mail = Mailbox::default();
-        mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
-        let writing = mail.letters.get().unwrap().lock().unwrap();
+        mail.send(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
+        let writing = mail.pending.get().unwrap().lock().unwrap();
         assert_eq!(mail.take().dt, None);
         drop(writing);
         assert_eq!(mail.take().dt, Some(SimSpan::from_nanos(5)));
     }
 
     #[test]
-    fn a_pull_that_is_not_finite_is_refused_at_the_door() {
+    fn a_spring_that_is_not_finite_is_refused_when_sent() {
         let mail = Mailbox::default();
         let bad = Command::Hand(Some(pull(DVec3::NAN)));
-        assert!(matches!(mail.post(bad), Err(SendError::BadNumber(_))));
+        assert!(matches!(mail.send(bad), Err(SendError::BadNumber(_))));
         let negative = AnchorSpring { stiffness_n_m: -1.0, ..pull(DVec3::X) };
-        assert!(mail.post(Command::Hand(Some(negative))).is_err());
-        assert!(mail.post(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
+        assert!(mail.send(Command::Hand(Some(negative))).is_err());
+        assert!(mail.send(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
         assert_eq!(mail.take().hand, None);
     }
 }

@@ -1,17 +1,16 @@
 //! An agent's view of its peers: which it sees, and by which law each pair interacts.
 //!
-//! In: the links and laws of the scene, the crowd. Out: [`Neighbour`]s with their newest states: first the linked peers, always and in
+//! In: the links and laws of the scene, the broad phase. Out: [`Neighbour`]s with their newest states: first the linked peers, always and in
 //! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
 //! settle. Never here: when an agent looks.
 
-use super::broad_phase::BroadPhase;
-use super::broad_phase::NeighbourList;
+use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
 use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
 use metachron_contact::{Law, OwnershipTraits, acknowledged, keep_step, owns};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -20,7 +19,7 @@ use std::sync::Arc;
 pub(super) struct Peers {
     pub all: Vec<Peer>,
     /// `None` if no two agents could touch: then no agent searches for peers.
-    pub crowd: Option<BroadPhase>,
+    pub broad_phase: Option<BroadPhase>,
     /// Pairs joined by links with the ledger law, each in both orders, sorted.
     pub linked: Vec<[AgentId; 2]>,
 }
@@ -34,25 +33,27 @@ pub(super) struct Peer {
 }
 
 /// The list of peers that an agent sees.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Observer {
+    /// The agent whose view it is.
+    me: AgentId,
     neighbours: Vec<Neighbour>,
     /// One for each neighbour, in their order.
-    looks: Vec<Look>,
+    sources: Vec<Source>,
     /// The first `links` neighbours are the linked ones.
     links: usize,
-    /// Only in a crowd.
-    sight: Option<Box<NeighbourList>>,
+    /// Only where there is a broad phase.
+    neighbour_list: Option<Box<NeighbourList>>,
     /// Agents to be seen in addition to the linked ones.
     wanted: Vec<AgentId>,
 }
 
 /// Source of one neighbour's states.
 #[derive(Debug)]
-struct Look {
+struct Source {
     slot: Arc<LatestSlot<Snapshot>>,
     /// It steps in the same island: the island's solve, and no law, determines their interaction.
-    fellow: bool,
+    island_member: bool,
 }
 
 impl std::fmt::Debug for Peer {
@@ -77,7 +78,7 @@ impl Peer {
     }
 
     /// The neighbour `other` as seen by this agent; `linked`: a link by the ledger joins the two.
-    fn meets(&self, other: &Self, linked: bool) -> Neighbour {
+    fn neighbour(&self, other: &Self, linked: bool) -> Neighbour {
         // a tool needs the form to grasp it, even if it passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
         let snapshot = other.shared.slot.latest();
@@ -100,31 +101,32 @@ impl Peers {
     }
 
     /// The neighbour `other` as seen by `me`.
-    fn meet(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
+    fn neighbour_of(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
         let linked = self.linked.binary_search(&[me, other]).is_ok();
-        Some(self.get(me)?.meets(self.get(other)?, linked))
+        Some(self.get(me)?.neighbour(self.get(other)?, linked))
     }
 
     /// The view of `me`, which is linked to `links`.
-    pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Observer {
-        let sight = self.crowd.is_some().then(|| Box::new(NeighbourList::new(me)));
-        let mut eyes = Observer { sight, ..Observer::default() };
-        links.iter().for_each(|id| eyes.list(self, me, *id));
-        eyes.links = eyes.neighbours.len();
-        eyes
+    pub fn observer(&self, me: AgentId, links: &[AgentId]) -> Observer {
+        let neighbour_list = self.broad_phase.is_some().then(|| Box::new(NeighbourList::new(me)));
+        let mut observer =
+            Observer { me, neighbours: Vec::new(), sources: Vec::new(), links: 0, neighbour_list, wanted: Vec::new() };
+        links.iter().for_each(|id| observer.list(self, *id));
+        observer.links = observer.neighbours.len();
+        observer
     }
 }
 
 impl Observer {
-    /// Its neighbours, as they were at the last look.
+    /// Its neighbours, as they were at the last update.
     pub fn neighbours(&self) -> &[Neighbour] {
         &self.neighbours
     }
 
-    /// Publishes the bounds of the state that this agent has just written to the crowd.
-    pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
-        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
-            sight.stand(crowd, state.bounds.as_ref(), state.moment());
+    /// Publishes the bounds of the state that this agent has just written to the broad phase.
+    pub fn publish(&mut self, peers: &Peers, state: &Snapshot) {
+        if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
+            neighbour_list.publish(broad_phase, state.bounds.as_ref(), state.moment());
         }
     }
 
@@ -135,65 +137,61 @@ impl Observer {
     }
 
     /// Reads the newest states of the present neighbours, without searching for others.
-    pub fn look_again(&mut self) {
-        for (neighbour, look) in self.neighbours.iter_mut().zip(&self.looks) {
-            neighbour.snapshot = look.slot.latest();
+    pub fn refresh(&mut self) {
+        for (neighbour, source) in self.neighbours.iter_mut().zip(&self.sources) {
+            neighbour.snapshot = source.slot.latest();
         }
     }
 
-    /// Updates the neighbours before the step of `dt` from `now` of `me`, whose states `writer` writes and which shares an island with
-    /// `fellows`.
-    pub fn look(
-        &mut self,
-        peers: &Peers,
-        me: &SlotWriter<Snapshot>,
-        (id, now, dt): (AgentId, SimTime, SimSpan),
-        fellows: &Fellows,
-    ) {
-        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
-            let mine = peers.get(id);
-            sight
-                .look(crowd, (now, dt), fellows, |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
-            self.want(crowd, me, id, fellows);
-            self.list_wanted(peers, id);
+    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which shares an island with `members`.
+    pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, members: &Fellows) {
+        let me = self.me;
+        if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
+            let mine = peers.get(me);
+            neighbour_list.update(broad_phase, step, members, |other| {
+                mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b))
+            });
+            self.collect_wanted(broad_phase, writer, members);
+            self.list_wanted(peers);
         }
-        for (neighbour, look) in self.neighbours.iter_mut().zip(&mut self.looks) {
-            let fellow = fellows.has(neighbour.id);
-            if fellow != look.fellow {
-                look.fellow = fellow;
-                regard(neighbour, peers, id, fellow);
+        for (neighbour, source) in self.neighbours.iter_mut().zip(&mut self.sources) {
+            let island_member = members.has(neighbour.id);
+            if island_member != source.island_member {
+                source.island_member = island_member;
+                set_island_member(neighbour, peers, me, island_member);
             }
-            neighbour.snapshot = look.slot.latest();
+            neighbour.snapshot = source.slot.latest();
         }
     }
 
     /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
     /// body to which this agent also gives.
-    fn want(&mut self, crowd: &BroadPhase, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
-        let Self { neighbours, links, sight, wanted, looks } = self;
+    fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, members: &Fellows) {
+        let Self { me, neighbours, links, neighbour_list, wanted, sources } = self;
+        let me = *me;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
-        let near = sight.iter().flat_map(|sight| sight.near().iter().copied());
-        wanted.extend(near.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+        let near = neighbour_list.iter().flat_map(|neighbour_list| neighbour_list.near().iter().copied());
+        wanted.extend(near.filter(|id| !is_linked(*id) && !members.has(*id)));
         let near = wanted.len();
-        for (neighbour, look) in near_once.iter_mut().zip(&looks[*links..]) {
+        for (neighbour, source) in near_once.iter_mut().zip(&sources[*links..]) {
             if wanted[..near].binary_search(&neighbour.id).is_ok() {
                 continue;
             }
-            neighbour.snapshot = look.slot.latest();
-            if !newest(me, |mine| is_settled(id, mine, neighbour)) {
+            neighbour.snapshot = source.slot.latest();
+            if !newest(writer, |mine| is_settled(me, mine, neighbour)) {
                 wanted.push(neighbour.id);
             }
         }
-        crowd.answer(id, |caller| {
+        broad_phase.take_givers(me, |caller| {
             if !is_linked(caller) {
                 wanted.push(caller);
             }
         });
         for neighbour in linked.iter().chain(&*near_once) {
-            let givers = others_who_give(id, &neighbour.snapshot);
-            wanted.extend(givers.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+            let givers = other_givers(me, &neighbour.snapshot);
+            wanted.extend(givers.filter(|id| !is_linked(*id) && !members.has(*id)));
         }
         if wanted.len() > near {
             wanted.sort_unstable();
@@ -201,21 +199,21 @@ impl Observer {
         }
     }
 
-    fn list_wanted(&mut self, peers: &Peers, me: AgentId) {
+    fn list_wanted(&mut self, peers: &Peers) {
         if self.neighbours[self.links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
             return;
         }
         self.neighbours.truncate(self.links);
-        self.looks.truncate(self.links);
+        self.sources.truncate(self.links);
         for at in 0..self.wanted.len() {
-            self.list(peers, me, self.wanted[at]);
+            self.list(peers, self.wanted[at]);
         }
     }
 
-    fn list(&mut self, peers: &Peers, me: AgentId, id: AgentId) {
-        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.meet(me, id)) else { return };
+    fn list(&mut self, peers: &Peers, id: AgentId) {
+        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.neighbour_of(self.me, id)) else { return };
         self.neighbours.push(neighbour);
-        self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
+        self.sources.push(Source { slot: Arc::clone(&theirs.shared.slot), island_member: false });
     }
 }
 
@@ -225,11 +223,11 @@ const fn is_led(form: &CollisionShape) -> bool {
 }
 
 /// Treats `neighbour` as a member of the same island, or again as a peer outside it.
-fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
-    if fellow {
+fn set_island_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, island_member: bool) {
+    if island_member {
         (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
-    } else if let Some(stranger) = peers.meet(me, neighbour.id) {
-        *neighbour = stranger;
+    } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {
+        *neighbour = outsider;
     }
 }
 
@@ -243,7 +241,7 @@ fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
 }
 
 /// The other agents that give impulses to an agent to which `me` also gives: their impulses must be anticipated.
-fn others_who_give(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentId> + '_ {
+fn other_givers(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentId> + '_ {
     let mine = other.taken.iter().any(|ledger| ledger.with == me);
     other.taken.iter().map(|ledger| ledger.with).filter(move |with| mine && *with != me)
 }

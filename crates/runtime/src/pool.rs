@@ -12,7 +12,7 @@ mod watchdog;
 mod worker;
 
 use super::Run;
-use super::agent_clock::{Drive, Timeline};
+use super::agent_clock::{Timeline, TimelineCommand};
 use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::metrics::AgentStats;
@@ -24,27 +24,27 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
-use supervisor::{Note, Supervisor};
+use supervisor::{Message, Supervisor};
 
 /// A step that takes longer is given up: its agent is parked, its worker replaced.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Agents that share workers.
 pub struct Pool {
-    hall: Arc<PoolState>,
-    notes: Sender<Note>,
+    state: Arc<PoolState>,
+    messages: Sender<Message>,
     watch: Option<JoinHandle<()>>,
 }
 
 impl Pool {
-    /// Starts a worker per core that the system gives; simulated time is paused until [`Drive::Run`]. If the system refuses `priority`
+    /// Starts a worker per core that the system gives; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority`
     /// ([`Priority::ask`]) workers have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.
     pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         let workers = thread::available_parallelism().map_or(1, NonZero::get);
-        Self::with_workers(spawns, clock, workers, (PATIENCE, priority))
+        Self::with_workers(spawns, clock, workers, PATIENCE, priority)
     }
 
     /// Starts `workers` workers, at least one, each given up after `patience` in one step.
@@ -52,27 +52,29 @@ impl Pool {
         spawns: Vec<AgentSpawn>,
         clock: Arc<dyn Clock>,
         workers: usize,
-        (patience, priority): (Duration, Priority),
+        patience: Duration,
+        priority: Priority,
     ) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
         let workers = workers.clamp(1, handles.len().max(1));
-        board.hire(workers);
-        let hall = Arc::new(PoolState::new(clock, board, handles, actors, workers));
-        hall.timeline.drive(Duration::ZERO, Drive::Pause);
+        sleep.set_workers(workers);
+        let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
+        state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
-        let staff = Supervisor::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
-        let notes = staff.notes();
-        let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
-            hall.board.stop();
-            no_thread(source)
-        })?;
-        Ok(Self { hall, notes, watch: Some(watch) })
+        let supervisor = Supervisor::start(Arc::clone(&state), workers, patience, priority).map_err(no_thread)?;
+        let messages = supervisor.sender();
+        let watch =
+            thread::Builder::new().name("pool:watch".to_owned()).spawn(|| supervisor.watch()).map_err(|source| {
+                state.sleep.stop();
+                no_thread(source)
+            })?;
+        Ok(Self { state, messages, watch: Some(watch) })
     }
 
     fn end(&mut self) {
-        self.hall.board.stop();
+        self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
-        let _ = self.notes.send(Note::Stop);
+        let _ = self.messages.send(Message::Stop);
         drop(self.watch.take().map(JoinHandle::join));
     }
 }
@@ -85,31 +87,31 @@ impl Drop for Pool {
 
 impl Run for Pool {
     fn now(&self) -> Duration {
-        self.hall.clock.now()
+        self.state.clock.now()
     }
 
     fn wait_until(&mut self, until: Duration) {
-        super::clock::wait_until(&*self.hall.clock, until);
+        super::clock::wait_until(&*self.state.clock, until);
     }
 
     fn spend(&mut self, _work: Duration) {}
 
     fn timeline(&self) -> Timeline {
-        self.hall.timeline.read()
+        self.state.timeline.read()
     }
 
-    fn drive(&mut self, drive: Drive) {
-        self.hall.timeline.drive(self.hall.clock.now(), drive);
-        self.hall.board.unpark_all();
+    fn drive(&mut self, drive: TimelineCommand) {
+        self.state.timeline.drive(self.state.clock.now(), drive);
+        self.state.sleep.unpark_all();
     }
 
     fn agents(&self) -> &[AgentHandle] {
-        &self.hall.handles
+        &self.state.handles
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
-        self.hall.handles.iter().map(AgentHandle::stats).collect()
+        self.state.handles.iter().map(AgentHandle::stats).collect()
     }
 }
 

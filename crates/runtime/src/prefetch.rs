@@ -18,7 +18,7 @@ impl AgentRunner {
             self.pace.time().as_nanos(),
             self.served.as_nanos(),
             self.dt_range.0.as_nanos(),
-            self.diary.steps(),
+            self.metrics.steps(),
             self.faults.seed,
             self.unsettled_ns,
         ]);
@@ -27,12 +27,12 @@ impl AgentRunner {
             self.hands.len(),
             self.company.len(),
             self.announced.len(),
-            self.eyes.neighbours().len(),
+            self.observer.neighbours().len(),
         ]);
         black_box([self.open.is_some(), self.governor.is_some(), self.range.is_some(), self.withheld]);
         self.writer.spare().into_iter().for_each(fetch_state);
         fetch_shared(&self.shared);
-        self.diary.fetch();
+        self.metrics.fetch();
     }
 }
 
@@ -46,7 +46,7 @@ fn fetch_shared(shared: &Shared) {
         shared.wanted_hz.to_bits(),
         u64::from(shared.id.0),
     ]);
-    black_box([gauges.is_running(), shared.seating.is_some(), shared.traces.is_empty(), shared.mail.has_letters()]);
+    black_box([gauges.is_running(), shared.seating.is_some(), shared.traces.is_empty(), shared.mail.has_pending()]);
     shared.slot.fetch();
 }
 

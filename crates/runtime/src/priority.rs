@@ -21,7 +21,7 @@ pub enum Priority {
 /// The system does not grant real-time priority.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the system grants no real-time priority ({why}): agents run at ordinary priority; on Linux it takes root, CAP_SYS_NICE or \
+    "the system grants no real-time priority ({why}): agents run at ordinary priority; on Linux real-time priority needs root, CAP_SYS_NICE or \
      an `rtprio` limit above zero (`ulimit -r`)"
 )]
 pub struct PriorityRefused {
@@ -50,7 +50,7 @@ impl Priority {
         let asked = std::thread::Builder::new().name("priority".to_owned()).spawn(move || self.take());
         let refused = |why: String| PriorityRefused { why };
         let answer = asked.map_err(|error| refused(error.to_string()))?.join();
-        answer.unwrap_or_else(|_| Err(refused("the question was not answered".to_owned())))
+        answer.unwrap_or_else(|_| Err(refused("the test thread ended without a result".to_owned())))
     }
 }
 

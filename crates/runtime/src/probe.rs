@@ -1,6 +1,6 @@
 //! Recording of the paths of material points, state by state.
 //!
-//! In: an agent's snapshots, as it publishes them. Out: for each [`Watch`] the first state at or after every multiple of its
+//! In: an agent's snapshots, as it publishes them. Out: for each [`WatchedPoint`] the first state at or after every multiple of its
 //! period, with that state's own time; while the agent rests, its state at every multiple. Never here: files, units of a report.
 
 use glam::DVec3;
@@ -8,7 +8,7 @@ use metachron_core::{SimSpan, SimTime, Snapshot};
 
 /// A material point to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Watch {
+pub struct WatchedPoint {
     /// Which point: share of a tube's rest length, 0 … 1; no meaning for other bodies.
     pub at: f64,
     /// Simulated time between samples, above zero.
@@ -24,13 +24,13 @@ pub type Sample = (SimTime, DVec3);
 /// A point and its samples.
 #[derive(Debug)]
 pub(super) struct Trace {
-    watch: Watch,
+    watch: WatchedPoint,
     next: SimTime,
     samples: Vec<Sample>,
 }
 
 impl Trace {
-    pub fn new(watch: Watch) -> Self {
+    pub fn new(watch: WatchedPoint) -> Self {
         Self { watch, next: SimTime::ZERO, samples: Vec::new() }
     }
 
@@ -39,7 +39,7 @@ impl Trace {
     }
 
     /// Records the state if a sample is due.
-    pub fn look(&mut self, state: &Snapshot) {
+    pub fn record(&mut self, state: &Snapshot) {
         if state.moment() < self.next || self.samples.len() >= SAMPLES_MAX || self.watch.every == SimSpan::ZERO {
             return;
         }
@@ -79,9 +79,9 @@ mod tests {
 
     #[test]
     fn a_watch_keeps_the_first_state_at_or_after_each_multiple_of_its_period() {
-        let mut trace = Trace::new(Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
+        let mut trace = Trace::new(WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
         for ms in [0, 4, 8, 12, 16, 20, 24, 28, 32, 55, 57, 60] {
-            trace.look(&state(ms));
+            trace.record(&state(ms));
         }
         let kept: Vec<u64> = trace.samples().iter().map(|(t, _)| t.as_nanos() / 1_000_000).collect();
         assert_eq!(kept, [0, 12, 20, 32, 55, 60]);
@@ -89,11 +89,11 @@ mod tests {
 
     #[test]
     fn a_state_that_holds_is_written_down_at_every_multiple() {
-        let mut trace = Trace::new(Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
-        trace.look(&state(4));
+        let mut trace = Trace::new(WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
+        trace.record(&state(4));
         trace.hold(&state(4), SimTime::from_nanos(30_000_000));
         trace.hold(&state(4), SimTime::from_nanos(39_000_000));
-        trace.look(&state(41));
+        trace.record(&state(41));
         let kept: Vec<_> = trace.samples().iter().map(|(t, at)| (t.as_nanos() / 1_000_000, at.x)).collect();
         assert_eq!(kept, [(4, 4.0), (10, 4.0), (20, 4.0), (30, 4.0), (41, 41.0)]);
     }

@@ -11,23 +11,23 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 impl AgentRunner {
     /// Records a step in the metrics and publishes its state; whether the state is visible.
-    pub fn conclude(&mut self, open: &PendingTurn, now: SimTime, work_s: f64) -> bool {
+    pub fn record_step(&mut self, open: &PendingTurn, now: SimTime, work_s: f64) -> bool {
         let missed = now > self.pace.scene_time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
         // metrics first: a state that is visible is accounted for
-        self.diary.write(&self.shared.gauges, &self.pace, entry);
-        self.withheld = self.faults.loses(self.id(), self.diary.steps());
-        !self.withheld && self.show(now)
+        self.metrics.write(&self.shared.gauges, &self.pace, entry);
+        self.withheld = self.faults.loses(self.id(), self.metrics.steps());
+        !self.withheld && self.publish(now)
     }
 
     /// Publishes the state that was written last; whether it is visible.
-    pub fn show(&mut self, now: SimTime) -> bool {
+    pub fn publish(&mut self, now: SimTime) -> bool {
         let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
         let published = self.writer.publish();
         if published {
-            self.tell();
+            self.notify_reader();
             if concerns {
-                self.announce(now);
+                self.notify_receivers(now);
             }
         }
         published
@@ -35,34 +35,34 @@ impl AgentRunner {
 
     /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
-        let (agent, put_off, shorter) = (&self.agent, self.pace.put_off(), self.pace.shorter());
+        let (agent, clock_offset, shorter) = (&self.agent, self.pace.clock_offset(), self.pace.shorter());
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
             agent.write_snapshot(into);
-            (into.time, into.clock_offset, into.shortened_step, into.at_rest) = (time, put_off, shorter, at_rest);
+            (into.time, into.clock_offset, into.shortened_step, into.at_rest) = (time, clock_offset, shorter, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;
         if let (true, Some(state)) = (finite, self.writer.filled()) {
-            self.eyes.stand(&self.peers, state);
-            self.shared.traces.iter().for_each(|trace| locked(trace).look(state));
+            self.observer.publish(&self.peers, state);
+            self.shared.traces.iter().for_each(|trace| locked(trace).record(state));
             Ok(())
         } else {
-            Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
+            Err(format!("the state of the {model} agent at {:.6} s is not finite", time.as_secs_f64()))
         }
     }
 
     /// Publishes a withheld state: the last state of an agent is never withheld.
     pub fn show_withheld(&mut self) {
         if std::mem::take(&mut self.withheld) && self.writer.publish() {
-            self.tell();
+            self.notify_reader();
         }
     }
 
     /// Reports a new state of this agent to the run's reader.
-    pub fn tell(&self) {
-        self.shared.board.news.tell(self.shared.id);
+    pub fn notify_reader(&self) {
+        self.shared.sleep.changed.mark(self.shared.id);
     }
 
     /// Records that the watched points stay in place until `now`: a state at rest is still valid.
@@ -75,13 +75,13 @@ impl AgentRunner {
     }
 
     /// Notifies the agents that this agent acts on, once its state is visible.
-    fn announce(&mut self, now: SimTime) {
+    fn notify_receivers(&mut self, now: SimTime) {
         let newest = self.shared.slot.latest();
-        let board = &self.shared.board;
-        let leader = board.leader(self.shared.id);
-        let others = newest.touches.iter().filter(|id| board.leader(**id) != leader);
-        others.for_each(|id| board.touch(*id, now));
-        let Some(crowd) = &self.peers.crowd else { return };
+        let sleep = &self.shared.sleep;
+        let leader = sleep.leader(self.shared.id);
+        let others = newest.touches.iter().filter(|id| sleep.leader(**id) != leader);
+        others.for_each(|id| sleep.touch(*id, now));
+        let Some(broad_phase) = &self.peers.broad_phase else { return };
         for ledger in &newest.given {
             let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);
             if known.as_ref().is_some_and(|(_, revision)| *revision == ledger.revision) {
@@ -91,9 +91,9 @@ impl AgentRunner {
                 Some((_, revision)) => *revision = ledger.revision,
                 None => self.announced.push((ledger.with, ledger.revision)),
             }
-            crowd.call(ledger.with, self.shared.id);
-            if board.rests(ledger.with) {
-                board.wake(ledger.with);
+            broad_phase.report_impulse(ledger.with, self.shared.id);
+            if sleep.is_resting(ledger.with) {
+                sleep.wake(ledger.with);
             }
         }
     }

@@ -17,7 +17,7 @@ const FRAMES_KEPT: usize = 256;
 #[derive(Debug)]
 pub struct Reader {
     newest: Vec<Arc<Snapshot>>,
-    looks: Vec<Look>,
+    readings: Vec<LastReading>,
     /// The times of the last frames.
     frames: VecDeque<SimTime>,
     /// Frames read so far.
@@ -26,7 +26,7 @@ pub struct Reader {
 
 /// An agent at its last reading.
 #[derive(Debug, Clone, Copy)]
-struct Look {
+struct LastReading {
     /// Number of frames up to which its ages are counted.
     counted: u64,
     time: SimTime,
@@ -38,8 +38,9 @@ impl Reader {
     #[must_use]
     pub fn new(agents: &[AgentHandle]) -> Self {
         let newest: Vec<_> = agents.iter().map(AgentHandle::latest).collect();
-        let looks = newest.iter().map(|state| Look { counted: 0, time: state.moment(), rests: false }).collect();
-        Self { newest, looks, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
+        let readings =
+            newest.iter().map(|state| LastReading { counted: 0, time: state.moment(), rests: false }).collect();
+        Self { newest, readings, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
     }
 
     /// The states of the last reading, in the order of the agents.
@@ -57,14 +58,14 @@ impl Reader {
         mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool),
     ) {
         if let Some(first) = agents.first() {
-            first.shared.board.news.take(|id| {
+            first.shared.sleep.changed.take(|id| {
                 let at = id.0 as usize;
-                let (Some(agent), true) = (agents.get(at), at < self.looks.len()) else { return };
+                let (Some(agent), true) = (agents.get(at), at < self.readings.len()) else { return };
                 self.count(at, agent);
                 let state = agent.state();
                 self.newest[at] = agent.latest();
-                let look = &mut self.looks[at];
-                (look.time, look.rests) = (self.newest[at].moment(), state == AgentState::Resting);
+                let reading = &mut self.readings[at];
+                (reading.time, reading.rests) = (self.newest[at].moment(), state == AgentState::Resting);
                 visit(agent, &self.newest[at], state == AgentState::Running);
             });
         }
@@ -75,29 +76,29 @@ impl Reader {
 
     /// Counts all ages that are not counted yet, at the end of a run.
     pub fn finish(&mut self, agents: &[AgentHandle]) {
-        for (at, agent) in agents.iter().enumerate().take(self.looks.len()) {
+        for (at, agent) in agents.iter().enumerate().take(self.readings.len()) {
             self.count(at, agent);
         }
     }
 
     /// Counts the ages of agent `at` in the frames since its last count.
     fn count(&mut self, at: usize, agent: &AgentHandle) {
-        let look = &mut self.looks[at];
-        let frames = (self.read - look.counted) as usize;
+        let reading = &mut self.readings[at];
+        let frames = (self.read - reading.counted) as usize;
         let first = self.frames.len().saturating_sub(frames);
-        if look.rests {
+        if reading.rests {
             agent.record_no_age(self.frames.len() - first);
         } else {
-            agent.record_ages(self.frames.iter().skip(first).map(|now| now.since(look.time)));
+            agent.record_ages(self.frames.iter().skip(first).map(|now| now.since(reading.time)));
         }
-        look.counted = self.read;
+        reading.counted = self.read;
     }
 
     /// Counts some of the unchanged agents, so that no agent is behind by more frames than are stored.
     fn catch_up(&mut self, agents: &[AgentHandle]) {
         let share = agents.len().div_ceil(FRAMES_KEPT);
         let from = (self.read as usize % FRAMES_KEPT) * share;
-        for (at, agent) in agents.iter().enumerate().take(self.looks.len()).skip(from).take(share) {
+        for (at, agent) in agents.iter().enumerate().take(self.readings.len()).skip(from).take(share) {
             self.count(at, agent);
         }
         if self.frames.len() == 2 * FRAMES_KEPT {
@@ -123,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_what_changed_gives_what_reading_all_gives() {
+    fn reading_changed_agents_gives_the_same_as_reading_all() {
         let (mut ours, mut plain) = (run(), run());
         let mut reader = Reader::new(ours.agents());
         let (mut visits, mut last) = (0, vec![true; 6]);
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_news_allocates_nothing_and_visits_nobody() {
+    fn a_frame_without_changes_allocates_nothing_and_visits_no_agent() {
         let mut run = run();
         run.wait_until(Duration::from_millis(100));
         let mut reader = Reader::new(run.agents());

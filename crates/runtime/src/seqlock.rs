@@ -19,11 +19,11 @@ pub(super) struct Seqlock<const N: usize> {
 
 /// Result of a read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Glance<const N: usize> {
+pub(super) enum ReadOutcome<const N: usize> {
     /// Nothing was ever written.
-    Nothing,
+    Empty,
     /// The newest complete write.
-    Whole([u64; N]),
+    Complete([u64; N]),
     /// A write was in progress, or began meanwhile.
     Torn,
 }
@@ -51,15 +51,15 @@ impl<const N: usize> Seqlock<N> {
     }
 
     /// Tries to read once.
-    pub fn read(&self) -> Glance<N> {
+    pub fn read(&self) -> ReadOutcome<N> {
         let version = self.version.load(Ordering::Acquire);
         if version == 0 {
-            return Glance::Nothing;
+            return ReadOutcome::Empty;
         }
         let words = std::array::from_fn(|k| self.words[k].load(Ordering::Relaxed));
         fence(Ordering::Acquire);
         let is_whole = version.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == version;
-        if is_whole { Glance::Whole(words) } else { Glance::Torn }
+        if is_whole { ReadOutcome::Complete(words) } else { ReadOutcome::Torn }
     }
 }
 

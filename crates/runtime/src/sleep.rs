@@ -32,7 +32,7 @@ const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
 struct Signal {
     resting: AtomicBool,
     woken: AtomicBool,
-    /// Number of the agent that makes its turns; [`NOBODY`] if it makes them itself.
+    /// Number of the agent that makes its turns; [`NO_AGENT`] if it makes them itself.
     leader: AtomicU32,
     /// It makes no more turns and accepts no agents to lead.
     closed: AtomicBool,
@@ -42,14 +42,14 @@ struct Signal {
 }
 
 /// Not the number of any agent.
-const NOBODY: u32 = u32::MAX;
+const NO_AGENT: u32 = u32::MAX;
 
 impl Default for Signal {
     fn default() -> Self {
         Self {
             resting: AtomicBool::new(false),
             woken: AtomicBool::new(false),
-            leader: AtomicU32::new(NOBODY),
+            leader: AtomicU32::new(NO_AGENT),
             closed: AtomicBool::new(false),
             touched: AtomicU64::new(0),
             thread: OnceLock::new(),
@@ -61,15 +61,15 @@ impl Default for Signal {
 #[derive(Debug)]
 pub(super) struct SleepRegistry {
     signals: Vec<Signal>,
-    /// An agent was summoned: the lockstep loop serves it.
-    rung: AtomicBool,
+    /// An agent was notified: the lockstep loop serves it.
+    notified: AtomicBool,
     stop: AtomicBool,
     /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
     far_behind: AtomicU64,
     /// Wake-up of the workers, where agents have no threads of their own.
-    bell: OnceLock<WorkerWakeup>,
+    wakeup: OnceLock<WorkerWakeup>,
     /// Agents with new states, for the reader of the run.
-    pub news: DirtySet,
+    pub changed: DirtySet,
 }
 
 impl SleepRegistry {
@@ -77,22 +77,22 @@ impl SleepRegistry {
         let signals = std::iter::repeat_with(Signal::default).take(agents).collect();
         Self {
             signals,
-            rung: AtomicBool::new(false),
+            notified: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             far_behind: AtomicU64::new(0),
-            bell: OnceLock::new(),
-            news: DirtySet::new(agents),
+            wakeup: OnceLock::new(),
+            changed: DirtySet::new(agents),
         }
     }
 
-    /// From now on summons go to this many workers of a pool.
-    pub fn hire(&self, workers: usize) {
-        self.bell.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
+    /// From now on notifications go to this many workers of a pool.
+    pub fn set_workers(&self, workers: usize) {
+        self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
     }
 
     /// Wake-up of the workers; `None` where every agent has its own thread.
-    pub fn bell(&self) -> Option<&WorkerWakeup> {
-        self.bell.get()
+    pub fn wakeup(&self) -> Option<&WorkerWakeup> {
+        self.wakeup.get()
     }
 
     fn signal(&self, id: AgentId) -> Option<&Signal> {
@@ -100,7 +100,7 @@ impl SleepRegistry {
     }
 
     /// Registers the thread to unpark for `id`.
-    pub fn lives_on(&self, id: AgentId, thread: Thread) {
+    pub fn set_thread(&self, id: AgentId, thread: Thread) {
         if let Some(signal) = self.signal(id) {
             signal.thread.get_or_init(|| thread);
         }
@@ -109,20 +109,20 @@ impl SleepRegistry {
     /// Assigns the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
     pub fn follow(&self, id: AgentId, leader: Option<AgentId>) {
         if let Some(signal) = self.signal(id) {
-            signal.leader.store(leader.map_or(NOBODY, |l| l.0), Release);
+            signal.leader.store(leader.map_or(NO_AGENT, |l| l.0), Release);
         }
     }
 
     /// The agent that makes the turns of `id`, at the end of the chain of leaders; `id` itself if it is not led.
     pub fn leader(&self, id: AgentId) -> AgentId {
         let mut at = id;
-        while let Some(next) = self.next_up(at) {
+        while let Some(next) = self.direct_leader(at) {
             at = next;
         }
         at
     }
 
-    fn next_up(&self, id: AgentId) -> Option<AgentId> {
+    fn direct_leader(&self, id: AgentId) -> Option<AgentId> {
         let leader = self.signal(id)?.leader.load(Acquire);
         (leader < id.0).then_some(AgentId(leader))
     }
@@ -142,25 +142,25 @@ impl SleepRegistry {
     /// `id` must not rest before its next turn; if it is at rest, it wakes.
     pub fn wake(&self, id: AgentId) {
         let mut at = Some(id);
-        while let Some(who) = at {
-            let Some(signal) = self.signal(who) else { return };
+        while let Some(next) = at {
+            let Some(signal) = self.signal(next) else { return };
             signal.woken.store(true, Release);
             fence(SeqCst);
             if signal.resting.load(Relaxed) {
-                self.summon(who);
+                self.notify(next);
             }
-            at = self.next_up(who);
+            at = self.direct_leader(next);
         }
     }
 
     /// Makes the thread that serves `id` check its flags.
-    pub fn summon(&self, id: AgentId) {
+    pub fn notify(&self, id: AgentId) {
         let Some(signal) = self.signal(id) else { return };
-        if let Some(bell) = self.bell.get() {
-            bell.ring(id);
+        if let Some(wakeup) = self.wakeup.get() {
+            wakeup.notify(id);
             return;
         }
-        self.rung.store(true, Release);
+        self.notified.store(true, Release);
         signal.thread.get().inspect(|t| t.unpark());
     }
 
@@ -169,18 +169,18 @@ impl SleepRegistry {
         let Some(signal) = self.signal(id) else { return };
         signal.touched.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
         fence(SeqCst);
-        if self.rests(id) {
+        if self.is_resting(id) {
             self.wake(id);
         }
     }
 
     /// Whether the agent that makes the turns of `id` is at rest.
-    pub fn rests(&self, id: AgentId) -> bool {
+    pub fn is_resting(&self, id: AgentId) -> bool {
         self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(Acquire))
     }
 
     /// Whether `id` was woken, or touched so recently that it may not rest at `now`.
-    pub fn is_stirred(&self, id: AgentId, now: SimTime) -> bool {
+    pub fn must_stay_awake(&self, id: AgentId, now: SimTime) -> bool {
         self.signal(id).is_some_and(|signal| signal.woken.load(Acquire) || signal.is_held(now))
     }
 
@@ -200,7 +200,7 @@ impl SleepRegistry {
     }
 
     /// A turn of `id` begins: clears its wake-up, which this turn handles. To be called before the turn reads its inputs.
-    pub fn heed(&self, id: AgentId) {
+    pub fn clear_wake(&self, id: AgentId) {
         if let Some(signal) = self.signal(id) {
             signal.take_wake();
         }
@@ -221,15 +221,15 @@ impl SleepRegistry {
         woken
     }
 
-    /// Whether any agent was summoned since the last call.
-    pub fn take_rung(&self) -> bool {
-        self.rung.load(Relaxed) && self.rung.swap(false, AcqRel)
+    /// Whether any agent was notified since the last call.
+    pub fn take_notified(&self) -> bool {
+        self.notified.load(Relaxed) && self.notified.swap(false, AcqRel)
     }
 
     /// Unparks every thread, so that it reads the timeline again.
     pub fn unpark_all(&self) {
-        if let Some(bell) = self.bell.get() {
-            bell.rouse_all();
+        if let Some(wakeup) = self.wakeup.get() {
+            wakeup.wake_all();
         }
         self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
     }
@@ -244,7 +244,7 @@ impl SleepRegistry {
     }
 
     /// Whether any agent was far behind recently.
-    pub fn is_anybody_far_behind(&self, now: SimTime) -> bool {
+    pub fn is_any_far_behind(&self, now: SimTime) -> bool {
         let noted = self.far_behind.load(Acquire);
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
@@ -282,66 +282,66 @@ mod tests {
 
     const ME: AgentId = AgentId(0);
 
-    fn try_rest(board: &SleepRegistry, now: SimTime) -> bool {
-        board.try_rest(ME, std::iter::empty(), now)
+    fn try_rest(sleep: &SleepRegistry, now: SimTime) -> bool {
+        sleep.try_rest(ME, std::iter::empty(), now)
     }
 
     #[test]
     fn a_wake_before_the_rest_is_not_lost() {
-        let board = SleepRegistry::new(1);
-        board.wake(ME);
-        assert!(!try_rest(&board, SimTime::ZERO), "woken before it lay down");
-        assert!(try_rest(&board, SimTime::ZERO), "that wake is used up");
-        board.wake(ME);
-        assert!(board.take_rung());
-        assert!(board.take_wake(ME));
-        assert!(!board.take_wake(ME));
+        let sleep = SleepRegistry::new(1);
+        sleep.wake(ME);
+        assert!(!try_rest(&sleep, SimTime::ZERO), "woken before it rested");
+        assert!(try_rest(&sleep, SimTime::ZERO), "that wake is used up");
+        sleep.wake(ME);
+        assert!(sleep.take_notified());
+        assert!(sleep.take_wake(ME));
+        assert!(!sleep.take_wake(ME));
     }
 
     #[test]
     fn a_touched_agent_stays_awake_for_the_hold() {
-        let board = SleepRegistry::new(1);
-        board.touch(ME, SimTime::ZERO);
-        assert!(!try_rest(&board, SimTime::from_nanos(99_999_999)));
-        assert!(try_rest(&board, SimTime::from_nanos(100_000_000)));
-        board.touch(ME, SimTime::from_nanos(200_000_000));
-        assert!(board.take_wake(ME));
+        let sleep = SleepRegistry::new(1);
+        sleep.touch(ME, SimTime::ZERO);
+        assert!(!try_rest(&sleep, SimTime::from_nanos(99_999_999)));
+        assert!(try_rest(&sleep, SimTime::from_nanos(100_000_000)));
+        sleep.touch(ME, SimTime::from_nanos(200_000_000));
+        assert!(sleep.take_wake(ME));
     }
 
     #[test]
-    fn who_is_led_wakes_its_leader_and_the_leaders_leader() {
-        let board = SleepRegistry::new(3);
-        board.follow(AgentId(2), Some(AgentId(1)));
-        board.follow(AgentId(1), Some(ME));
-        assert_eq!(board.leader(AgentId(2)), ME);
+    fn a_led_agent_wakes_its_leader_and_the_leaders_leader() {
+        let sleep = SleepRegistry::new(3);
+        sleep.follow(AgentId(2), Some(AgentId(1)));
+        sleep.follow(AgentId(1), Some(ME));
+        assert_eq!(sleep.leader(AgentId(2)), ME);
         let led = || [AgentId(1), AgentId(2)].into_iter();
-        assert!(board.try_rest(ME, led(), SimTime::ZERO));
-        board.wake(AgentId(2));
-        assert!(board.take_rung() && board.take_wake(ME));
-        assert!(!board.try_rest(ME, led(), SimTime::ZERO), "the wake of one it leads is its own");
-        assert!(board.try_rest(ME, led(), SimTime::ZERO));
-        board.touch(AgentId(1), SimTime::from_nanos(500_000_000));
-        assert!(board.take_wake(ME));
-        board.follow(AgentId(1), None);
-        assert_eq!(board.leader(AgentId(2)), AgentId(1));
+        assert!(sleep.try_rest(ME, led(), SimTime::ZERO));
+        sleep.wake(AgentId(2));
+        assert!(sleep.take_notified() && sleep.take_wake(ME));
+        assert!(!sleep.try_rest(ME, led(), SimTime::ZERO), "the wake of one it leads is its own");
+        assert!(sleep.try_rest(ME, led(), SimTime::ZERO));
+        sleep.touch(AgentId(1), SimTime::from_nanos(500_000_000));
+        assert!(sleep.take_wake(ME));
+        sleep.follow(AgentId(1), None);
+        assert_eq!(sleep.leader(AgentId(2)), AgentId(1));
     }
 
     #[test]
-    fn who_was_far_behind_is_forgotten_after_a_while() {
-        let (board, at) = (SleepRegistry::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
-        assert!(!board.is_anybody_far_behind(SimTime::ZERO));
-        board.note_far_behind(SimTime::ZERO);
-        assert!(board.is_anybody_far_behind(at(1999)) && !board.is_anybody_far_behind(at(2000)));
-        board.note_far_behind(at(1500));
-        board.note_far_behind(at(1550));
-        assert!(board.is_anybody_far_behind(at(3499)) && !board.is_anybody_far_behind(at(3500)));
+    fn being_far_behind_is_forgotten_after_a_while() {
+        let (sleep, at) = (SleepRegistry::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
+        assert!(!sleep.is_any_far_behind(SimTime::ZERO));
+        sleep.note_far_behind(SimTime::ZERO);
+        assert!(sleep.is_any_far_behind(at(1999)) && !sleep.is_any_far_behind(at(2000)));
+        sleep.note_far_behind(at(1500));
+        sleep.note_far_behind(at(1550));
+        assert!(sleep.is_any_far_behind(at(3499)) && !sleep.is_any_far_behind(at(3500)));
     }
 
     #[test]
-    fn strangers_are_nobody() {
-        let board = SleepRegistry::new(1);
-        board.wake(AgentId(7));
-        board.touch(AgentId(7), SimTime::ZERO);
-        assert!(!board.take_rung());
+    fn unknown_agents_are_ignored() {
+        let sleep = SleepRegistry::new(1);
+        sleep.wake(AgentId(7));
+        sleep.touch(AgentId(7), SimTime::ZERO);
+        assert!(!sleep.take_notified());
     }
 }

@@ -102,7 +102,7 @@ impl<T: Default> SlotWriter<T> {
     /// that is not yet published is filled again.
     pub fn fill<R>(&mut self, fill: impl FnOnce(&mut T) -> R) -> R {
         let mut free = self.filled.take().unwrap_or_else(|| self.take_spare());
-        let result = fill(Arc::get_mut(&mut free).expect("nobody else holds a spare value"));
+        let result = fill(Arc::get_mut(&mut free).expect("no reader holds a spare value"));
         self.filled = Some(free);
         result
     }

@@ -14,7 +14,7 @@ use super::island::{Company as Led, Seating, assign};
 use super::mailbox::Mailbox;
 use super::metrics::{Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
-use super::probe::{Trace, Watch};
+use super::probe::{Trace, WatchedPoint};
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use metachron_contact::Agent;
@@ -48,7 +48,7 @@ pub struct AgentSpawn {
     /// Faults injected on purpose.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
-    pub watches: Vec<Watch>,
+    pub watches: Vec<WatchedPoint>,
     /// Governor of its rate; `None` for an agent with fixed settings.
     pub governor: Option<Box<dyn Governor>>,
 }
@@ -85,9 +85,7 @@ pub const RATE_MAX_HZ: f64 = 1e6;
 #[non_exhaustive]
 pub enum RunError {
     /// More agents than this executor takes.
-    #[error(
-        "{agents} agents are too many for a thread each, at most {most}: run them with executor = \"pool\" or \"auto\""
-    )]
+    #[error("{agents} agents are too many for one thread each (at most {most}); use executor = \"pool\" or \"auto\"")]
     TooMany {
         /// Number of requested agents.
         agents: usize,
@@ -104,7 +102,7 @@ pub enum RunError {
     },
     /// An invalid range of step lengths.
     #[error(
-        "agent \"{name}\": the step range {shortest_s} s to {longest_s} s must rise, lie above zero and end at 1 s at most"
+        "agent \"{name}\": the step range {shortest_s} s to {longest_s} s is invalid; expected 0 < shortest <= longest <= 1 s"
     )]
     BadStep {
         /// The agent's name.
@@ -123,7 +121,7 @@ pub enum RunError {
         link: u32,
     },
     /// Invalid fault rates.
-    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must lie from 0 to below 1")]
+    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must be at least 0 and below 1")]
     BadFaults {
         /// The agent's name.
         name: String,
@@ -133,7 +131,7 @@ pub enum RunError {
         loss: f64,
     },
     /// The system gave no thread.
-    #[error("the system gives no thread for {name}: {source}")]
+    #[error("the operating system refused a thread for {name}: {source}")]
     NoThread {
         /// The purpose of the thread.
         name: String,
@@ -147,7 +145,7 @@ pub(super) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<AgentRunner>>>,
     pub handles: Vec<AgentHandle>,
-    pub board: Arc<SleepRegistry>,
+    pub sleep: Arc<SleepRegistry>,
 }
 
 /// Assembles all agents; each has published its initial state, at simulated time zero.
@@ -155,17 +153,17 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<AssembledRun, RunE
     let count = spawns.len();
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
-    let board = Arc::new(SleepRegistry::new(count));
-    let (peers, writers) = peers(&mut spawns, &board);
+    let sleep = Arc::new(SleepRegistry::new(count));
+    let (peers, writers) = peers(&mut spawns, &sleep);
     let peers = Arc::new(peers);
     let together: Vec<_> = spawns.iter().map(|spawn| spawn.together).collect();
     let ids = (0..).map(AgentId);
     let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
     let mut actors: Vec<_> = actors.collect();
-    actors.iter_mut().for_each(AgentRunner::introduce);
-    actors.iter_mut().for_each(AgentRunner::look);
+    actors.iter_mut().for_each(AgentRunner::publish_initial);
+    actors.iter_mut().for_each(AgentRunner::observe);
     let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign(actors, &together), handles, board })
+    Ok(AssembledRun { actors: assign(actors, &together), handles, sleep })
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -208,7 +206,7 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 }
 
 /// The data fixed at the start, and the writer of each agent.
-fn peers(spawns: &mut [AgentSpawn], board: &Arc<SleepRegistry>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
     // only rigid bodies can lead and be led
     let rigid =
@@ -219,14 +217,14 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<SleepRegistry>) -> (Peers, Vec<S
     for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
         let writer = SlotWriter::new(Snapshot::default());
         let seated = led && rigid(&form);
-        let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
+        let shared = Arc::new(shared(id, spawn, sleep, &writer, seated));
         writers.push(writer);
         all.push(Peer { shared, form, laws: Vec::new() });
     }
-    settle_laws(spawns, &mut all);
-    let crowd = meet_at_all(&all).then(|| BroadPhase::new(all.len()));
+    store_laws(spawns, &mut all);
+    let broad_phase = may_any_touch(&all).then(|| BroadPhase::new(all.len()));
     let linked = linked(spawns);
-    (Peers { all, crowd, linked }, writers)
+    (Peers { all, broad_phase, linked }, writers)
 }
 
 /// Pairs joined by links with the ledger law, each in both orders, sorted.
@@ -241,13 +239,13 @@ fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
 }
 
 /// Whether any two agents could touch.
-fn meet_at_all(all: &[Peer]) -> bool {
+fn may_any_touch(all: &[Peer]) -> bool {
     let formed: Vec<&Peer> = all.iter().filter(|peer| peer.form.is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
 /// Stores the law of every pair on both sides.
-fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
+fn store_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
     for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
         for &(other, law) in spawn.laws.iter().filter(|(other, _)| *other != me) {
             for (a, b) in [(me, other), (other, me)] {
@@ -263,7 +261,8 @@ fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
 fn shared(
     id: AgentId,
     spawn: &mut AgentSpawn,
-    (board, writer): (&Arc<SleepRegistry>, &SlotWriter<Snapshot>),
+    sleep: &Arc<SleepRegistry>,
+    writer: &SlotWriter<Snapshot>,
     seated: bool,
 ) -> Shared {
     Shared {
@@ -274,7 +273,7 @@ fn shared(
         gauges: Metrics::default(),
         mail: Mailbox::default(),
         slot: writer.slot(),
-        board: Arc::clone(board),
+        sleep: Arc::clone(sleep),
         seating: seated.then(Seating::default),
         ages: Mutex::new(Histogram::default()),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
@@ -299,12 +298,12 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         governor: spawn.governor,
         faults: spawn.faults,
         writer,
-        eyes: peers.eyes(id, &links),
+        observer: peers.observer(id, &links),
         links: spawn.attached,
         hands: Vec::with_capacity(1),
         company: Led::default(),
-        diary: MetricsWriter::new(),
-        rhythm: TurnPeriod::default(),
+        metrics: MetricsWriter::new(),
+        turn_period: TurnPeriod::default(),
         open: None,
         beside: None,
         withheld: false,
@@ -336,15 +335,15 @@ mod tests {
         AgentSpawn::alone("tube", Box::new(Tube::new(spec).unwrap()), 100.0)
     }
 
-    /// Whether a crowd is set up, and how many agents can lead or be led.
+    /// Whether a broad phase is set up, and how many agents can lead or be led.
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
-        let board = Arc::new(SleepRegistry::new(spawns.len()));
-        let (peers, _) = peers(&mut spawns, &board);
-        (peers.crowd.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
+        let sleep = Arc::new(SleepRegistry::new(spawns.len()));
+        let (peers, _) = peers(&mut spawns, &sleep);
+        (peers.broad_phase.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
     }
 
     #[test]
-    fn what_a_scene_does_not_need_is_not_set_up() {
+    fn unneeded_parts_of_a_run_are_not_set_up() {
         assert_eq!(set_up(vec![ball()]), (false, 0));
         assert_eq!(set_up(vec![tube()]), (false, 0));
         assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 0));

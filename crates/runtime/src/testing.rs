@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
-use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
+use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::Exchange;
 use metachron_contact::{Agent, IslandMember, StepContext};
@@ -30,12 +30,12 @@ const LIVE: [(&str, Start); 4] = [
 ];
 
 fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
-    running(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, clock, workers, Duration::from_secs(60), Priority::Normal).unwrap())
 }
 
 /// Starts the time of a run.
 pub(super) fn running<R: Run + 'static>(mut run: R) -> Box<R> {
-    run.drive(Drive::Run);
+    run.drive(TimelineCommand::Run);
     Box::new(run)
 }
 
@@ -80,7 +80,7 @@ pub(super) type Bond = fn(u32, u32, SimTime) -> bool;
 
 /// One step that was made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Made {
+pub(super) struct RecordedStep {
     pub id: AgentId,
     pub from: SimTime,
     pub to: SimTime,
@@ -90,7 +90,7 @@ pub(super) struct Made {
 }
 
 /// All steps made by any agent.
-pub(super) type Log = Arc<Mutex<Vec<Made>>>;
+pub(super) type Log = Arc<Mutex<Vec<RecordedStep>>>;
 
 /// The test agent. Its snapshot reports the impulse taken as energy and the impulse given as residual.
 #[derive(Debug, Clone)]
@@ -113,7 +113,7 @@ pub(super) struct Dummy {
     /// The agents to which it is bonded.
     pub bond: Option<Bond>,
     /// It gives one newton second to every peer whose pair it owns, at each of its first so many steps.
-    pub gifts: u64,
+    pub impulses: u64,
     /// Impulses along x taken, newton seconds.
     pub taken: f64,
     /// Impulses along x given.
@@ -140,7 +140,7 @@ impl Dummy {
             x: 0.0,
             ball: None,
             bond: None,
-            gifts: 0,
+            impulses: 0,
             taken: 0.0,
             given: 0.0,
             exchange: Exchange::wary(),
@@ -152,7 +152,7 @@ impl Dummy {
     }
 
     /// An agent that is bonded to others as `bond` says, and whose steps are recorded in `log`.
-    pub fn mate(work: f64, bond: Bond, log: &Log) -> Self {
+    pub fn bonded(work: f64, bond: Bond, log: &Log) -> Self {
         Self { ball: Some((0.1, 0.0)), bond: Some(bond), log: Some(Arc::clone(log)), ..Self::new(work) }
     }
 
@@ -162,25 +162,25 @@ impl Dummy {
         AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
     }
 
-    fn write_down(&self, to: SimTime, around: &StepContext<'_>) {
+    fn write_down(&self, to: SimTime, context: &StepContext<'_>) {
         let Some(log) = &self.log else { return };
         let thread = thread::current().name().unwrap_or_default().to_owned();
-        let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
-        log.lock().unwrap().push(Made { id: around.me, from: around.time, to, thread, saw });
+        let saw = context.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
+        log.lock().unwrap().push(RecordedStep { id: context.me, from: context.time, to, thread, saw });
     }
 
-    fn trade(&mut self, around: &StepContext<'_>, dt_s: f64) {
+    fn exchange_impulses(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let taken = &mut self.taken;
-        self.exchange.open(around);
-        self.exchange.take(around, around.time, |_, _, impulse, _| *taken += impulse.linear.x);
-        if self.steps <= self.gifts {
-            for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
+        self.exchange.open(context);
+        self.exchange.take(context, context.time, |_, _, impulse, _| *taken += impulse.linear.x);
+        if self.steps <= self.impulses {
+            for other in context.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
                 self.exchange.give(other.id, Site::Whole, 0.0, push);
                 self.given += 1.0;
             }
         }
-        self.exchange.close(around, dt_s);
+        self.exchange.close(context, dt_s);
     }
 }
 
@@ -204,7 +204,7 @@ impl Agent for Dummy {
         "synthetic"
     }
 
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = dt.as_secs_f64();
         match self.fault.filter(|(step, _)| *step == self.steps + 1) {
             Some((_, Fault::NotFinite)) => self.x = f64::NAN,
@@ -213,7 +213,7 @@ impl Agent for Dummy {
             }
             Some((_, Fault::Panic)) => panic!("on demand"),
             Some((_, Fault::Hang)) => {
-                self.write_down(around.time, around);
+                self.write_down(context.time, context);
                 loop {
                     thread::park();
                 }
@@ -221,18 +221,18 @@ impl Agent for Dummy {
             None => {}
         }
         self.steps += 1;
-        let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
-        let pulled = around.anchor_springs().map(|p| p.target.x);
+        let met = context.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
+        let pulled = context.anchor_springs().map(|p| p.target.x);
         self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
-        self.trade(around, dt_s);
-        (self.me, self.time) = (around.me, around.time + dt);
+        self.exchange_impulses(context, dt_s);
+        (self.me, self.time) = (context.me, context.time + dt);
         self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
-        self.write_down(self.time, around);
+        self.write_down(self.time, context);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
     }
 
-    fn longest_step(&self, dt: SimSpan, _around: &StepContext<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, _context: &StepContext<'_>) -> SimSpan {
         let shorter = self.short.filter(|(until, _)| self.steps < *until);
         shorter.map_or(dt, |(_, span)| dt.min(span))
     }
@@ -284,19 +284,19 @@ impl Agent for Dummy {
     fn step_island(
         &mut self,
         dt: SimSpan,
-        around: &StepContext<'_>,
+        context: &StepContext<'_>,
         others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
-        let mut report = self.step(dt, around)?;
+        let mut report = self.step(dt, context)?;
         for other in others.iter_mut() {
             let one = other.agent.step(dt, &other.context)?;
             report.work += one.work;
             report.at_rest &= one.at_rest;
         }
-        let ids = |k: usize| if k == 0 { around.me } else { others[k - 1].id };
-        groups(bond, ids, others.len() + 1, around.time + dt, apart);
+        let ids = |k: usize| if k == 0 { context.me } else { others[k - 1].id };
+        groups(bond, ids, others.len() + 1, context.time + dt, apart);
         Ok(report)
     }
 }

@@ -5,7 +5,7 @@
 //! Never here: virtual time, declared costs.
 
 use super::Run;
-use super::agent_clock::{Drive, SharedTimeline, Timeline};
+use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::clock::{Clock, wait_until};
 use super::cpu::CpuBatch;
@@ -35,7 +35,7 @@ const PATIENCE: Duration = Duration::from_millis(400);
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
-    board: Arc<SleepRegistry>,
+    sleep: Arc<SleepRegistry>,
     handles: Vec<AgentHandle>,
     threads: Vec<Option<JoinHandle<()>>>,
     ended: Receiver<AgentId>,
@@ -43,7 +43,7 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Gives every agent its thread; simulated time is paused until [`Drive::Run`]. If the system refuses `priority` ([`Priority::ask`])
+    /// Gives every agent its thread; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority` ([`Priority::ask`])
     /// the threads have the ordinary one.
     ///
     /// # Errors
@@ -52,16 +52,16 @@ impl Threads {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
         }
-        let AssembledRun { actors, handles, board } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
         let timeline = Arc::new(SharedTimeline::new());
-        timeline.drive(Duration::ZERO, Drive::Pause);
+        timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (sender, ended) = channel();
-        let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended, priority };
+        let mut run = Self { clock, timeline, sleep, handles, threads: Vec::new(), ended, priority };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
             let shared = Arc::clone(&run.handles[id.0 as usize].shared);
             let thread = run.spawn(actor, shared, sender.clone())?;
-            run.board.lives_on(id, thread.thread().clone());
+            run.sleep.set_thread(id, thread.thread().clone());
             run.threads.push(Some(thread));
         }
         Ok(run)
@@ -74,8 +74,11 @@ impl Threads {
         ended: Sender<AgentId>,
     ) -> Result<JoinHandle<()>, RunError> {
         let name = format!("agent:{}", shared.name.replace('\0', ""));
-        let stage =
-            Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
+        let stage = AgentThread {
+            clock: Arc::clone(&self.clock),
+            timeline: Arc::clone(&self.timeline),
+            batch: CpuBatch::default(),
+        };
         let farewell = EndNotice { id: shared.id, ended };
         let builder = thread::Builder::new().name(name.clone());
         let priority = self.priority;
@@ -83,14 +86,14 @@ impl Threads {
             let _farewell = farewell;
             // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
-            stage.live(actor, &shared);
+            stage.run(actor, &shared);
         };
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
 
     /// Ends all threads and waits for them until a timeout.
     fn end(&mut self) {
-        self.board.stop();
+        self.sleep.stop();
         let mut missing = self.threads.iter().flatten().count();
         while missing > 0 {
             let Ok(id) = self.ended.recv_timeout(PATIENCE) else { break };
@@ -101,7 +104,7 @@ impl Threads {
             }
         }
         for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
-            handle.shared.gauges.park(format!("a step has not ended within {} s", PATIENCE.as_secs_f64()));
+            handle.shared.gauges.park(format!("a step did not end within {} s", PATIENCE.as_secs_f64()));
         }
         self.threads.clear();
         empty_rooms(&self.handles, &self.timeline.read(), self.clock.now());
@@ -129,9 +132,9 @@ impl Run for Threads {
         self.timeline.read()
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         self.timeline.drive(self.clock.now(), drive);
-        self.board.unpark_all();
+        self.sleep.unpark_all();
     }
 
     fn agents(&self) -> &[AgentHandle] {
@@ -158,18 +161,18 @@ impl Drop for EndNotice {
 }
 
 /// Working state of an agent's thread.
-struct Stage {
+struct AgentThread {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
     batch: CpuBatch,
 }
 
-impl Stage {
+impl AgentThread {
     /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
-    fn live(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) {
-        while !shared.board.stopping() {
+    fn run(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) {
+        while !shared.sleep.stopping() {
             here = match here {
-                Some(actor) => match self.live_alone(actor) {
+                Some(actor) => match self.make_own_turns(actor) {
                     Some(actor) if actor.is_parked() => return,
                     moved => moved,
                 },
@@ -183,13 +186,13 @@ impl Stage {
     }
 
     /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
-    fn live_alone(&mut self, mut actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
-        let board = Arc::clone(&actor.shared.board);
+    fn make_own_turns(&mut self, mut actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
+        let sleep = Arc::clone(&actor.shared.sleep);
         let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
-        while !board.stopping() {
+        while !sleep.stopping() {
             next = match next {
                 Next::Due => self.wait_or_turn(&mut actor),
-                Next::Rest => self.doze(&mut actor),
+                Next::Rest => self.rest(&mut actor),
                 Next::Join(leader) => {
                     self.settle(&mut actor);
                     actor = move_in(actor, leader).err()?;
@@ -231,8 +234,8 @@ impl Stage {
         }
     }
 
-    fn doze(&mut self, actor: &mut AgentRunner) -> Next {
-        if actor.wakes(&self.timeline.read(), self.clock.now()) {
+    fn rest(&mut self, actor: &mut AgentRunner) -> Next {
+        if actor.try_wake(&self.timeline.read(), self.clock.now()) {
             return Next::Due;
         }
         self.settle(actor);

@@ -1,9 +1,9 @@
-//! Wake-up of a pool's workers: which agents were summoned, and which sleeping worker can serve them.
+//! Wake-up of a pool's workers: which agents were notified, and which sleeping worker can serve them.
 //!
-//! In: summons from any thread. Out: the summoned agents, once, to the first worker that looks.
-//! No thread blocks another, and no summons is lost: the caller marks the agent first and looks for sleepers after; a worker declares
+//! In: notifications from any thread. Out: the notified agents, once, to the first worker that looks.
+//! No thread blocks another, and no notification is lost: the caller marks the agent first and looks for sleepers after; a worker declares
 //! itself asleep first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
-//! Never here: what a worker does with the summoned agents, how long it sleeps.
+//! Never here: what a worker does with the notified agents, how long it sleeps.
 
 use super::sync::Mutex;
 use super::sync::atomic::{
@@ -22,8 +22,8 @@ use std::time::Duration;
 pub(super) struct WorkerWakeup {
     /// One bit per agent.
     marks: Vec<AtomicU64>,
-    rung: AtomicBool,
-    beds: Vec<Parker>,
+    notified: AtomicBool,
+    workers: Vec<Parker>,
 }
 
 /// Sleep state of one worker.
@@ -38,48 +38,50 @@ impl WorkerWakeup {
     pub fn new(agents: usize, workers: usize) -> Self {
         Self {
             marks: std::iter::repeat_with(AtomicU64::default).take(agents.div_ceil(64)).collect(),
-            rung: AtomicBool::new(false),
-            beds: std::iter::repeat_with(Parker::default).take(workers).collect(),
+            notified: AtomicBool::new(false),
+            workers: std::iter::repeat_with(Parker::default).take(workers).collect(),
         }
     }
 
     /// Worker `at` runs on this thread.
-    pub fn enter(&self, at: usize) {
-        if let Some(bed) = self.beds.get(at) {
-            bed.asleep.store(false, Relaxed);
-            *bed.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current());
+    pub fn register(&self, at: usize) {
+        if let Some(worker) = self.workers.get(at) {
+            worker.asleep.store(false, Relaxed);
+            *worker.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current());
         }
     }
 
     /// Summons `id`: a worker that is awake sees it before its next turn, else one is woken.
-    pub fn ring(&self, id: AgentId) {
+    pub fn notify(&self, id: AgentId) {
         let Some(word) = self.marks.get(id.0 as usize / 64) else { return };
         word.fetch_or(1 << (id.0 % 64), Release);
-        self.rung.store(true, Release);
+        self.notified.store(true, Release);
         fence(SeqCst);
-        self.rouse();
+        self.wake_one();
     }
 
     /// Wakes one sleeping worker, if there is one.
-    pub fn rouse(&self) {
-        if let Some(bed) = self.beds.iter().find(|bed| bed.asleep.load(Relaxed) && bed.asleep.swap(false, AcqRel)) {
-            bed.wake();
+    pub fn wake_one(&self) {
+        if let Some(worker) =
+            self.workers.iter().find(|worker| worker.asleep.load(Relaxed) && worker.asleep.swap(false, AcqRel))
+        {
+            worker.wake();
         }
     }
 
     /// Makes every worker check for work, whether it sleeps or is about to.
-    pub fn rouse_all(&self) {
-        self.beds.iter().for_each(Parker::wake);
+    pub fn wake_all(&self) {
+        self.workers.iter().for_each(Parker::wake);
     }
 
-    /// Whether any agent was summoned since the last [`Self::answer`].
-    pub fn has_rung(&self) -> bool {
-        self.rung.load(Acquire)
+    /// Whether any agent was notified since the last [`Self::take_notified`].
+    pub fn is_notified(&self) -> bool {
+        self.notified.load(Acquire)
     }
 
-    /// Visits the agents summoned since the last call, by rising numbers; returns their count.
-    pub fn answer(&self, mut visit: impl FnMut(AgentId)) -> usize {
-        if !self.rung.swap(false, AcqRel) {
+    /// Visits the agents notified since the last call, by rising numbers; returns their count.
+    pub fn take_notified(&self, mut visit: impl FnMut(AgentId)) -> usize {
+        if !self.notified.swap(false, AcqRel) {
             return 0;
         }
         let mut count = 0;
@@ -94,18 +96,18 @@ impl WorkerWakeup {
         count
     }
 
-    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was summoned. It may wake early.
+    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was notified. It may wake early.
     pub fn sleep(&self, at: usize, span: Option<Duration>) {
-        let Some(bed) = self.beds.get(at) else { return };
-        bed.asleep.store(true, Relaxed);
+        let Some(worker) = self.workers.get(at) else { return };
+        worker.asleep.store(true, Relaxed);
         fence(SeqCst);
-        if !self.has_rung() {
+        if !self.is_notified() {
             match span {
                 Some(span) => thread::park_timeout(span),
                 None => thread::park(),
             }
         }
-        bed.asleep.store(false, Relaxed);
+        worker.asleep.store(false, Relaxed);
     }
 }
 
@@ -121,49 +123,49 @@ impl Parker {
 mod tests {
     use super::*;
 
-    fn answered(bell: &WorkerWakeup) -> Vec<u32> {
+    fn answered(wakeup: &WorkerWakeup) -> Vec<u32> {
         let mut seen = Vec::new();
-        let count = bell.answer(|id| seen.push(id.0));
+        let count = wakeup.take_notified(|id| seen.push(id.0));
         assert_eq!(count, seen.len());
         seen
     }
 
     #[test]
-    fn who_was_summoned_is_found_once() {
-        let bell = WorkerWakeup::new(200, 1);
-        assert!(answered(&bell).is_empty());
-        [199, 3, 64, 3, 0].iter().for_each(|id| bell.ring(AgentId(*id)));
-        assert!(bell.has_rung());
-        assert_eq!(answered(&bell), [0, 3, 64, 199]);
-        assert!(answered(&bell).is_empty());
-        bell.ring(AgentId(5000));
-        assert!(!bell.has_rung(), "strangers are nobody");
+    fn a_notified_agent_is_visited_once() {
+        let wakeup = WorkerWakeup::new(200, 1);
+        assert!(answered(&wakeup).is_empty());
+        [199, 3, 64, 3, 0].iter().for_each(|id| wakeup.notify(AgentId(*id)));
+        assert!(wakeup.is_notified());
+        assert_eq!(answered(&wakeup), [0, 3, 64, 199]);
+        assert!(answered(&wakeup).is_empty());
+        wakeup.notify(AgentId(5000));
+        assert!(!wakeup.is_notified(), "unknown agents are ignored");
     }
 
     #[test]
-    fn nobody_sleeps_through_a_summons() {
-        let bell = WorkerWakeup::new(1, 1);
+    fn no_worker_sleeps_through_a_notification() {
+        let wakeup = WorkerWakeup::new(1, 1);
         let (rings, done) = (20_000, AtomicBool::new(false));
         let answered = AtomicU64::new(0);
         std::thread::scope(|scope| {
             scope.spawn(|| {
-                bell.enter(0);
+                wakeup.register(0);
                 while !done.load(SeqCst) {
-                    bell.sleep(0, None);
-                    bell.answer(|_| {
+                    wakeup.sleep(0, None);
+                    wakeup.take_notified(|_| {
                         answered.fetch_add(1, SeqCst);
                     });
                 }
             });
             for ring in 1..=rings {
-                bell.ring(AgentId(0));
+                wakeup.notify(AgentId(0));
                 while answered.load(SeqCst) < ring {
                     thread::yield_now();
                 }
             }
             done.store(true, SeqCst);
-            bell.ring(AgentId(0));
-            bell.rouse_all();
+            wakeup.notify(AgentId(0));
+            wakeup.wake_all();
         });
         assert!(answered.load(SeqCst) >= rings);
     }

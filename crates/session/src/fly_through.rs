@@ -9,7 +9,7 @@ use super::headless::{Drawing, PictureFormat, frame_seen_by};
 use super::outcome::FrameRecord;
 use super::session::Session;
 use metachron_render::{Camera, PictureFile, Size, Style};
-use metachron_runtime::Drive;
+use metachron_runtime::TimelineCommand;
 use metachron_world::Scene;
 
 /// A walk through a scene.
@@ -30,7 +30,7 @@ impl FlyThrough {
     pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
         let length_s = scene.camera.as_ref().and_then(metachron_world::Camera::length_s).unwrap_or(0.0);
         let mut session = Session::open(scene)?;
-        session.drive(Drive::Pause);
+        session.drive(TimelineCommand::Pause);
         if let Drawing::Every(screen) = &drawing {
             let gpu = screen.gpu();
             session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));

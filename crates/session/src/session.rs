@@ -24,7 +24,7 @@ use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy,
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
-use metachron_runtime::{AgentHandle, Command, Drive, Machine, Reader};
+use metachron_runtime::{AgentHandle, Command, Machine, Reader, TimelineCommand};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
 use metachron_world::{Scene, World, machine};
 use std::sync::Arc;
@@ -322,7 +322,7 @@ impl Session {
     /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
     pub fn hold(&mut self) {
         if !self.is_virtual() {
-            self.world.drive(Drive::Pause);
+            self.world.drive(TimelineCommand::Pause);
         }
     }
 
@@ -330,12 +330,12 @@ impl Session {
     pub fn begin(&mut self) {
         if !self.is_virtual() {
             self.begun = self.now();
-            self.world.drive(Drive::Run);
+            self.world.drive(TimelineCommand::Run);
         }
     }
 
     /// Changes the flow of time: pause, run, speed, single step.
-    pub fn drive(&mut self, drive: Drive) {
+    pub fn drive(&mut self, drive: TimelineCommand) {
         self.world.drive(drive);
     }
 

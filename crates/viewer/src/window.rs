@@ -16,7 +16,7 @@ use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimSpan};
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
-use metachron_runtime::Drive;
+use metachron_runtime::TimelineCommand;
 use metachron_scene::{SceneError, Source};
 use metachron_session::SessionError;
 use metachron_session::{Finished, Session};
@@ -111,7 +111,7 @@ impl<'a> WindowSimulation<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(frames_kept(&plan));
         // time is paused until the window shows the scene
-        session.drive(Drive::Pause);
+        session.drive(TimelineCommand::Pause);
         let mut simulation = Self {
             go_on,
             adapter: None,
@@ -146,11 +146,11 @@ impl<'a> WindowSimulation<'a> {
     fn replace(&mut self, mut session: Session) {
         self.stop_tuning();
         session.keep_frames(frames_kept(&self.plan));
-        session.drive(Drive::Speed(self.speed));
+        session.drive(TimelineCommand::Speed(self.speed));
         if self.running {
             session.begin();
         } else {
-            session.drive(Drive::Pause);
+            session.drive(TimelineCommand::Pause);
         }
         let prices = *self.session.control().prices();
         if !session.is_virtual() {
@@ -183,7 +183,7 @@ impl<'a> WindowSimulation<'a> {
     /// Starts time, unless the user has paused it.
     fn begin(&mut self) {
         match (self.running, self.session.is_virtual()) {
-            (true, true) => self.session.drive(Drive::Run),
+            (true, true) => self.session.drive(TimelineCommand::Run),
             (true, false) => self.session.begin(),
             (false, _) => {}
         }
@@ -218,11 +218,11 @@ impl<'a> WindowSimulation<'a> {
         self.notices.push((Instant::now() + MESSAGE_STAYS, message));
     }
 
-    fn drive(&mut self, drive: Drive) {
+    fn drive(&mut self, drive: TimelineCommand) {
         match drive {
-            Drive::Run => self.running = true,
-            Drive::Pause | Drive::Step(_) => self.running = false,
-            Drive::Speed(speed) => self.speed = speed,
+            TimelineCommand::Run => self.running = true,
+            TimelineCommand::Pause | TimelineCommand::Step(_) => self.running = false,
+            TimelineCommand::Speed(speed) => self.speed = speed,
         }
         self.session.drive(drive);
     }
@@ -337,15 +337,15 @@ impl Simulation for WindowSimulation<'_> {
             self.stop_tuning();
         }
         match action {
-            Action::Run => self.drive(Drive::Run),
-            Action::Pause => self.drive(Drive::Pause),
+            Action::Run => self.drive(TimelineCommand::Run),
+            Action::Pause => self.drive(TimelineCommand::Pause),
             Action::SingleStep => {
                 let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
-                self.drive(Drive::Step(frame));
+                self.drive(TimelineCommand::Step(frame));
             }
             Action::Reset => self.reset(),
             Action::Reload => self.reload(),
-            Action::Speed(speed) => self.drive(Drive::Speed(speed)),
+            Action::Speed(speed) => self.drive(TimelineCommand::Speed(speed)),
             Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
             Action::Policy(name) => self.session.set_policy(&name),
             Action::Law(law) => self.session.control().set_law(view_model::control_law(law)),

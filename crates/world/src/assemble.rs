@@ -12,7 +12,7 @@ use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
-use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, Watch};
+use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, WatchedPoint};
 use std::borrow::Cow;
 
 /// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps what it has.
@@ -24,7 +24,7 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 /// [`WorldError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    scene.agents.iter().map(|member| spawn(scene, member, (executor, &mut *govern), &mut ties)).collect()
+    scene.agents.iter().map(|member| spawn(scene, member, executor, &mut *govern, &mut ties)).collect()
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.
@@ -47,13 +47,14 @@ pub(super) const fn priority(scene: &Scene) -> Priority {
 fn spawn(
     scene: &Scene,
     member: &Member,
-    (executor, govern): (ExecutorKind, Govern<'_>),
+    executor: ExecutorKind,
+    govern: Govern<'_>,
     ties: &mut Ties,
 ) -> Result<AgentSpawn, WorldError> {
     let agent = build(member, executor)
         .map_err(|reason| WorldError::Build { name: member.name.clone(), reason: reason.to_string() })?;
     let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
-    let watches = watches.filter_map(|probe| Some(Watch { at: probe.at, every: probe.every? }));
+    let watches = watches.filter_map(|probe| Some(WatchedPoint { at: probe.at, every: probe.every? }));
     Ok(AgentSpawn {
         name: member.name.clone(),
         agent,

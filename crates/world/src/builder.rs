@@ -33,7 +33,7 @@ const SHEAR_FACTOR: f64 = 27.0 / 28.0;
 #[non_exhaustive]
 pub enum SceneBuildError {
     /// Two parts have one name.
-    #[error("two parts are called \"{name}\"; expected a name of its own for each")]
+    #[error("two objects are named \"{name}\"; every object needs a unique name")]
     SameName {
         /// The name.
         name: String,
@@ -312,7 +312,7 @@ impl SceneBuilder {
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
-            ids.zip(parts).map(|(id, (name, part))| member((id, name), part, gravity, &obstacles)).collect();
+            ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity, &obstacles)).collect();
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -332,7 +332,7 @@ impl SceneBuilder {
             camera: None,
             machine: Machine::default(),
             agents: agents?,
-            obstacle_looks: obstacles.iter().map(|_| LOOK).collect(),
+            obstacle_looks: obstacles.iter().map(|_| DEFAULT_LOOK).collect(),
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
@@ -349,11 +349,12 @@ impl SceneBuilder {
 }
 
 /// How parts look that do not say it.
-const LOOK: Look =
+const DEFAULT_LOOK: Look =
     Look { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::PerPixel };
 
 fn member(
-    (id, name): (AgentId, String),
+    id: AgentId,
+    name: String,
     part: Part,
     gravity: DVec3,
     obstacles: &Arc<[Obstacle]>,
@@ -386,7 +387,7 @@ fn member(
         start,
         picture,
         links: Vec::new(),
-        look: LOOK,
+        look: DEFAULT_LOOK,
         faults: Faults::default(),
     })
 }

@@ -10,8 +10,8 @@
 //! back along its shaft, the tool enters as it would from outside.
 
 use super::couplings::{Coupling, CouplingKind};
-use super::initial_shape::{StartShape, figure};
-use super::overlap::{Inside, OVERLAP_MIN_M};
+use super::initial_shape::{StartShape, shape};
+use super::overlap::{Container, OVERLAP_MIN_M};
 use super::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_core::AgentId;
@@ -29,38 +29,38 @@ pub struct Moved {
 }
 
 /// A later direction must be shorter than the best so far by more than this, metres: of equal ones the first is taken.
-const ALIKE_M: f64 = 1e-6;
+const TIE_M: f64 = 1e-6;
 /// Normals whose cosine is above this count as one direction.
-const SAME_WAY: f64 = 0.999;
+const SAME_DIRECTION: f64 = 0.999;
 /// Most directions tried.
-const WAYS: usize = 16;
+const DIRECTIONS_MAX: usize = 16;
 /// Most positions tried along each direction.
-const PLACES: usize = 64;
+const POSITIONS_MAX: usize = 64;
 /// Directions tried first. Up leads, so it wins a tie: an object without room goes on top.
 const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::NEG_Z];
 
 impl Scene {
     /// Finds what starts inside each other and moves apart what can be moved without strain; fills [`Scene::overlaps`] and [`Scene::moved`].
     pub fn resolve_initial_overlaps(&mut self) {
-        let inside = self.inside_each_other();
-        self.overlaps = self.name_overlaps(&inside);
-        self.set_apart(&inside);
+        let inside = self.find_overlaps();
+        self.overlaps = self.overlaps_by_name(&inside);
+        self.move_apart(&inside);
     }
 
     /// Moves every free deformable out of the objects that it starts inside, along the shortest way that leaves it clear of all; of two
     /// deformables the later one. A free rigid body is moved out of a deformable that is held, a tool out of all that it does not grasp.
     /// Where there is no such way, nothing is moved.
-    pub(super) fn set_apart(&mut self, inside: &[(AgentId, Inside, f64)]) {
+    pub(super) fn move_apart(&mut self, inside: &[(AgentId, Container, f64)]) {
         let pairs: Vec<_> = inside.iter().map(|(a, b, _)| self.movers(*a, *b)).filter(|all| !all.is_empty()).collect();
         if pairs.is_empty() {
             return;
         }
-        let mut figures: Vec<StartShape> = self.agents.iter().filter_map(figure).collect();
-        let movers: BTreeSet<AgentId> = pairs.iter().filter_map(|all| self.nearer_out(all, &figures)).collect();
+        let mut shapes: Vec<StartShape> = self.agents.iter().filter_map(shape).collect();
+        let movers: BTreeSet<AgentId> = pairs.iter().filter_map(|all| self.nearest_exit(all, &shapes)).collect();
         for mover in movers {
-            let Some(at) = figures.iter().position(|figure| figure.id == mover) else { continue };
-            let Some(by_m) = self.way_out(&figures[at], &figures) else { continue };
-            figures[at] = figures[at].shifted(by_m);
+            let Some(at) = shapes.iter().position(|shape| shape.id == mover) else { continue };
+            let Some(by_m) = self.shortest_exit(&shapes[at], &shapes) else { continue };
+            shapes[at] = shapes[at].shifted(by_m);
             let member = &mut self.agents[mover.0 as usize];
             match &mut member.spec {
                 Spec::Tube(tube) => tube.path_m.iter_mut().for_each(|point| *point += by_m),
@@ -74,32 +74,32 @@ impl Scene {
     }
 
     /// The agents of a pair that may be moved.
-    fn movers(&self, a: AgentId, b: Inside) -> Vec<AgentId> {
+    fn movers(&self, a: AgentId, b: Container) -> Vec<AgentId> {
         let bends = |id: AgentId| matches!(self.agents[id.0 as usize].spec, Spec::Tube(_) | Spec::Soft(_));
-        let loose = |id: &AgentId| bends(*id) && self.is_loose(*id);
+        let loose = |id: &AgentId| bends(*id) && self.is_free(*id);
         match b {
-            Inside::Fixed(_) => Some(a).filter(loose).into_iter().collect(),
-            Inside::Agent(b) if self.is_led(a) || self.is_led(b) => {
+            Container::Fixed(_) => Some(a).filter(loose).into_iter().collect(),
+            Container::Agent(b) if self.is_led(a) || self.is_led(b) => {
                 let (tool, other) = if self.is_led(a) { (a, b) } else { (b, a) };
-                let comes_back = self.comes_back(tool, other);
-                [tool, other].into_iter().filter(|id| comes_back && (*id == tool || loose(id))).collect()
+                let may_retract = self.may_retract(tool, other);
+                [tool, other].into_iter().filter(|id| may_retract && (*id == tool || loose(id))).collect()
             }
-            Inside::Agent(b) if !(bends(a) || bends(b)) => vec![],
-            Inside::Agent(b) => {
-                let rigid = || [b, a].into_iter().find(|id| !bends(*id) && self.is_loose(*id));
+            Container::Agent(b) if !(bends(a) || bends(b)) => vec![],
+            Container::Agent(b) => {
+                let rigid = || [b, a].into_iter().find(|id| !bends(*id) && self.is_free(*id));
                 [b, a].into_iter().find(loose).or_else(rigid).into_iter().collect()
             }
         }
     }
 
     /// The agent of `all` with the shortest way out of everything.
-    fn nearer_out(&self, all: &[AgentId], figures: &[StartShape]) -> Option<AgentId> {
+    fn nearest_exit(&self, all: &[AgentId], shapes: &[StartShape]) -> Option<AgentId> {
         if let [one] = all {
             return Some(*one);
         }
         let way_m = |id: AgentId| {
-            let figure = figures.iter().find(|figure| figure.id == id)?;
-            Some((self.way_out(figure, figures)?.length(), id))
+            let shape = shapes.iter().find(|shape| shape.id == id)?;
+            Some((self.shortest_exit(shape, shapes)?.length(), id))
         };
         let ways = all.iter().filter_map(|id| way_m(*id));
         ways.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, id)| id)
@@ -110,14 +110,14 @@ impl Scene {
     }
 
     /// Whether a tool may be drawn back out of `other`: it does not grasp it, and no attachment holds the tool.
-    fn comes_back(&self, tool: AgentId, other: AgentId) -> bool {
+    fn may_retract(&self, tool: AgentId, other: AgentId) -> bool {
         let Spec::Tool(spec) = &self.agents[tool.0 as usize].spec else { return false };
         let linked = |c: &Coupling| matches!(c.kind, CouplingKind::Attach { .. }) && (c.a == tool || c.b == tool);
         !(spec.graspable.contains(&other) || self.couplings.iter().any(linked))
     }
 
     /// Whether an agent is free: it has no joint, attachment, clamp, pin or held points, and is no tool and not synthetic.
-    pub(super) fn is_loose(&self, id: AgentId) -> bool {
+    pub(super) fn is_free(&self, id: AgentId) -> bool {
         let jointed = self.joints.iter().any(|joint| joint.a == id || joint.b == Some(id));
         let tied = |kind: &CouplingKind| matches!(kind, CouplingKind::Attach { .. });
         let attached = self.couplings.iter().any(|c| tied(&c.kind) && (c.a == id || c.b == id));
@@ -130,47 +130,47 @@ impl Scene {
         !(jointed || attached || held)
     }
 
-    /// The shortest displacement that takes `figure` clear of everything it touches; for a tool, back along its shaft if that leads out.
-    fn way_out(&self, figure: &StartShape, figures: &[StartShape]) -> Option<DVec3> {
-        let mut around =
-            Around { scene: self, figures, apart: self.pairs_apart(), room: NarrowPhaseScratch::default() };
-        let back = figure.back();
+    /// The shortest displacement that takes `shape` clear of everything it touches; for a tool, back along its shaft if that leads out.
+    fn shortest_exit(&self, shape: &StartShape, shapes: &[StartShape]) -> Option<DVec3> {
+        let mut surroundings =
+            Surroundings { scene: self, shapes, apart: self.pairs_apart(), scratch: NarrowPhaseScratch::default() };
+        let back = shape.shaft_direction();
         if let Some(way) = back
-            && let Some(far_m) = around.clear(figure, way, f64::INFINITY)
+            && let Some(far_m) = surroundings.clear(shape, way, f64::INFINITY)
         {
             return Some(way * far_m);
         }
         let mut ways = AXES.to_vec();
-        around.deepest(figure, |touch| {
-            if ways.len() < WAYS && ways.iter().all(|way| way.dot(touch.normal) < SAME_WAY) {
+        surroundings.deepest(shape, |touch| {
+            if ways.len() < DIRECTIONS_MAX && ways.iter().all(|way| way.dot(touch.normal) < SAME_DIRECTION) {
                 ways.push(touch.normal);
             }
         });
         let mut best: Option<DVec3> = None;
         for way in ways {
-            let most_m = best.map_or(f64::INFINITY, |best| best.length() - ALIKE_M);
-            best = around.clear(figure, way, most_m).map(|far_m| way * far_m).or(best);
+            let most_m = best.map_or(f64::INFINITY, |best| best.length() - TIE_M);
+            best = surroundings.clear(shape, way, most_m).map(|far_m| way * far_m).or(best);
         }
         best
     }
 }
 
 /// The objects that an agent may be inside of.
-struct Around<'a> {
+struct Surroundings<'a> {
     scene: &'a Scene,
-    figures: &'a [StartShape],
+    shapes: &'a [StartShape],
     apart: BTreeSet<(AgentId, AgentId)>,
-    room: NarrowPhaseScratch,
+    scratch: NarrowPhaseScratch,
 }
 
-impl Around<'_> {
-    /// How far `figure` has to move along `way` to be clear, metres; `None` if that is `most_m` or more.
+impl Surroundings<'_> {
+    /// How far `shape` has to move along `way` to be clear, metres; `None` if that is `most_m` or more.
     ///
     /// It cannot be clear before it has moved as far as it is deep, so it moves by its depth and is tested again.
-    fn clear(&mut self, figure: &StartShape, way: DVec3, most_m: f64) -> Option<f64> {
+    fn clear(&mut self, shape: &StartShape, way: DVec3, most_m: f64) -> Option<f64> {
         let mut far_m = 0.0;
-        for _ in 0..PLACES {
-            let deep_m = self.deepest(&figure.shifted(way * far_m), |_| {});
+        for _ in 0..POSITIONS_MAX {
+            let deep_m = self.deepest(&shape.shifted(way * far_m), |_| {});
             if deep_m < OVERLAP_MIN_M {
                 return Some(far_m);
             }
@@ -182,24 +182,24 @@ impl Around<'_> {
         None
     }
 
-    /// Depth of `figure` in any other object, metres, ≥ 0; calls `visit` with every touch.
-    fn deepest(&mut self, figure: &StartShape, mut visit: impl FnMut(&Touch)) -> f64 {
+    /// Depth of `shape` in any other object, metres, ≥ 0; calls `visit` with every touch.
+    fn deepest(&mut self, shape: &StartShape, mut visit: impl FnMut(&Touch)) -> f64 {
         let (mut found, mut deep_m) = (Vec::new(), 0.0_f64);
-        let mut look = |other: &StartShape, room: &mut NarrowPhaseScratch| {
-            touches(&figure.placed(), &other.placed(), 0.0, room, &mut found);
+        let mut look = |other: &StartShape, scratch: &mut NarrowPhaseScratch| {
+            touches(&shape.placed(), &other.placed(), 0.0, scratch, &mut found);
             for touch in &found {
                 deep_m = deep_m.max(-touch.gap_m);
                 visit(touch);
             }
         };
-        let others = self.figures.iter().filter(|other| other.id != figure.id && figure.meets(other, 0.0));
-        for other in others.filter(|other| self.scene.touch(figure, other, &self.apart)) {
-            look(other, &mut self.room);
+        let others = self.shapes.iter().filter(|other| other.id != shape.id && shape.box_touches(other, 0.0));
+        for other in others.filter(|other| self.scene.collide(shape, other, &self.apart)) {
+            look(other, &mut self.scratch);
         }
         // a tool passes through static solids
-        for obstacle in self.scene.obstacles.iter().filter(|_| figure.back().is_none()) {
-            if let Some(fixed) = figure.over(obstacle) {
-                look(&fixed, &mut self.room);
+        for obstacle in self.scene.obstacles.iter().filter(|_| shape.shaft_direction().is_none()) {
+            if let Some(fixed) = shape.obstacle_shape(obstacle) {
+                look(&fixed, &mut self.scratch);
             }
         }
         deep_m

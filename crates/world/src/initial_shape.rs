@@ -35,7 +35,7 @@ enum Pose {
 }
 
 impl StartShape {
-    pub fn meets(&self, other: &Self, reach_m: f64) -> bool {
+    pub fn box_touches(&self, other: &Self, reach_m: f64) -> bool {
         self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
     }
 
@@ -52,13 +52,13 @@ impl StartShape {
     }
 
     /// Direction back along the shaft of a tool; `None` for other agents.
-    pub fn back(&self) -> Option<DVec3> {
+    pub fn shaft_direction(&self) -> Option<DVec3> {
         if let Pose::Tool(_, rotation, _) = &self.place { Some(*rotation * DVec3::NEG_Z) } else { None }
     }
 
     /// A static solid in its pose, if this figure may be inside it. A plane becomes a slab below this figure with its top at the plane.
     /// Meshes are left out: a figure inside one may be in its hollow.
-    pub fn over(&self, obstacle: &Obstacle) -> Option<Self> {
+    pub fn obstacle_shape(&self, obstacle: &Obstacle) -> Option<Self> {
         if matches!(obstacle.solid, Solid::Mesh { .. }) {
             return None;
         }
@@ -80,7 +80,7 @@ impl StartShape {
         let form = CollisionShape { kind: ShapeKind::Solid(form), friction: 0.0, restitution: 0.0 };
         let fixed =
             Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
-        self.meets(&fixed, 0.0).then_some(fixed)
+        self.box_touches(&fixed, 0.0).then_some(fixed)
     }
 
     pub fn placed(&self) -> PlacedShape<'_> {
@@ -95,7 +95,7 @@ impl StartShape {
 }
 
 /// The shape of an agent at its start; `None` for one without contact.
-pub(super) fn figure(member: &Member) -> Option<StartShape> {
+pub(super) fn shape(member: &Member) -> Option<StartShape> {
     let form = |kind| CollisionShape { kind, friction: 0.0, restitution: 0.0 };
     let (kind, place, low, high) = match &member.spec {
         Spec::Rigid(spec) => {

@@ -5,7 +5,7 @@
 //! Never here: the response to it.
 
 use super::couplings::{Coupling, CouplingKind};
-use super::initial_shape::{StartShape, figure};
+use super::initial_shape::{StartShape, shape};
 use super::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_contact::Law;
@@ -32,7 +32,7 @@ pub struct Overlap {
 
 /// The object that an agent starts inside of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Inside {
+pub(super) enum Container {
     /// Another agent.
     Agent(AgentId),
     /// A static solid, by its index in [`Scene::obstacles`].
@@ -41,46 +41,46 @@ pub(super) enum Inside {
 
 impl Scene {
     /// The overlaps, with names.
-    pub(super) fn name_overlaps(&self, inside: &[(AgentId, Inside, f64)]) -> Vec<Overlap> {
-        let name = |b: Inside| match b {
-            Inside::Agent(id) => self.name_of(id).to_owned(),
-            Inside::Fixed(at) => self.obstacles[at].name.clone(),
+    pub(super) fn overlaps_by_name(&self, inside: &[(AgentId, Container, f64)]) -> Vec<Overlap> {
+        let name = |b: Container| match b {
+            Container::Agent(id) => self.name_of(id).to_owned(),
+            Container::Fixed(at) => self.obstacles[at].name.clone(),
         };
-        let named = |&(a, b, depth_m): &_| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
+        let named = |&(a, b, depth_m): &_| Overlap { a: name(Container::Agent(a)), b: name(b), depth_m };
         inside.iter().map(named).collect()
     }
 
     /// All overlaps at the poses that the scene gives, and their depths, metres: pairs of agents in the order of their ids, then agents
     /// inside static solids.
-    pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {
+    pub(super) fn find_overlaps(&self) -> Vec<(AgentId, Container, f64)> {
         let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
             if gap_m <= -OVERLAP_MIN_M {
-                pairs.push((one.id.min(two.id), Inside::Agent(one.id.max(two.id)), -gap_m));
+                pairs.push((one.id.min(two.id), Container::Agent(one.id.max(two.id)), -gap_m));
             }
         });
         pairs.sort_by_key(|&(a, b, _)| (a, b));
-        self.inside_fixed(&mut pairs);
+        self.overlaps_with_static(&mut pairs);
         pairs
     }
 
     /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
     /// its axis is inside.
-    fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
-        for figure in unled.filter_map(figure) {
-            let held = !(self.is_loose(figure.id) || matches!(self.agents[figure.id.0 as usize].spec, Spec::Rigid(_)));
+    fn overlaps_with_static(&self, pairs: &mut Vec<(AgentId, Container, f64)>) {
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        let others = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
+        for shape in others.filter_map(shape) {
+            let held = !(self.is_free(shape.id) || matches!(self.agents[shape.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {
-                let Some(fixed) = figure.over(obstacle) else { continue };
-                touches(&figure.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
-                let told = |touch: &&Touch| match touch.on_a {
+                let Some(fixed) = shape.obstacle_shape(obstacle) else { continue };
+                touches(&shape.placed(), &fixed.placed(), 0.0, &mut scratch, &mut found);
+                let counts = |touch: &&Touch| match touch.on_a {
                     Place::Chain { radius_m, .. } if held => touch.gap_m < -radius_m - OVERLAP_MIN_M,
                     _ => true,
                 };
-                let depth_m = found.iter().filter(told).map(|touch| -touch.gap_m).fold(0.0, f64::max);
+                let depth_m = found.iter().filter(counts).map(|touch| -touch.gap_m).fold(0.0, f64::max);
                 if depth_m >= OVERLAP_MIN_M {
-                    pairs.push((figure.id, Inside::Fixed(at), depth_m));
+                    pairs.push((shape.id, Container::Fixed(at), depth_m));
                 }
             }
         }
@@ -112,7 +112,7 @@ impl Scene {
         let other = self.pairs_by_other_laws();
         let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
         let mut pairs = Vec::new();
-        self.met(rigid.filter_map(figure).collect(), 0.0, |one, two| {
+        self.box_pairs(rigid.filter_map(shape).collect(), 0.0, |one, two| {
             let pair = (one.id.min(two.id), one.id.max(two.id));
             let apart_m = (one.low + one.high).distance(two.low + two.high) / 2.0;
             let reach_m = (one.high.x - one.low.x + two.high.x - two.low.x) / 2.0;
@@ -132,22 +132,22 @@ impl Scene {
 
     /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
     fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape, f64)) {
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        self.met(self.agents.iter().filter_map(figure).collect(), reach_m, |one, two| {
-            touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        self.box_pairs(self.agents.iter().filter_map(shape).collect(), reach_m, |one, two| {
+            touches(&one.placed(), &two.placed(), reach_m, &mut scratch, &mut found);
             if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
                 visit(one, two, gap_m);
             }
         });
     }
 
-    /// Calls `visit` with every pair of `figures` that can collide and whose boxes are no farther apart than `reach_m`.
-    fn met(&self, mut figures: Vec<StartShape>, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape)) {
-        figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+    /// Calls `visit` with every pair of `shapes` that can collide and whose boxes are no farther apart than `reach_m`.
+    fn box_pairs(&self, mut shapes: Vec<StartShape>, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape)) {
+        shapes.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         let apart = self.pairs_apart();
-        for (at, one) in figures.iter().enumerate() {
-            for two in figures[at + 1..].iter().take_while(|two| two.low.x <= one.high.x + reach_m) {
-                if one.meets(two, reach_m) && self.touch(one, two, &apart) {
+        for (at, one) in shapes.iter().enumerate() {
+            for two in shapes[at + 1..].iter().take_while(|two| two.low.x <= one.high.x + reach_m) {
+                if one.box_touches(two, reach_m) && self.collide(one, two, &apart) {
                     visit(one, two);
                 }
             }
@@ -164,8 +164,8 @@ impl Scene {
     }
 
     /// Whether two agents collide; two tools never do.
-    pub(super) fn touch(&self, one: &StartShape, two: &StartShape, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
-        let led = |figure: &StartShape| matches!(figure.form.kind, ShapeKind::Tool(_));
+    pub(super) fn collide(&self, one: &StartShape, two: &StartShape, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
+        let led = |shape: &StartShape| matches!(shape.form.kind, ShapeKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
         named != self.contacts && !(led(one) && led(two))
     }

@@ -343,13 +343,13 @@ impl Camera {
                 let turned = DVec3::new(cos * arm.x - sin * arm.y, sin * arm.x + cos * arm.y, arm.z);
                 View { eye_m: start.look_at_m + turned, ..*start }
             }
-            Self::Path { keys, repeat, even } => view_on_path(keys, (*repeat, *even), seconds),
+            Self::Path { keys, repeat, even } => view_on_path(keys, *repeat, *even, seconds),
         }
     }
 }
 
 /// Between two keyframes the view moves linearly (`even`), or by smoothstep: it starts and stops softly at each.
-fn view_on_path(keys: &[(f64, View)], (repeat, even): (bool, bool), seconds: f64) -> View {
+fn view_on_path(keys: &[(f64, View)], repeat: bool, even: bool, seconds: f64) -> View {
     let last = keys[keys.len() - 1];
     let seconds = if repeat && last.0 > 0.0 { seconds.rem_euclid(last.0) } else { seconds };
     let right = keys.partition_point(|(at, _)| *at <= seconds);

@@ -9,8 +9,8 @@ use super::assemble::Govern;
 use super::kinds::ExecutorKind;
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Command, Drive, Lockstep, Pool, Run, RunError, SendError, SystemClock,
-    Threads, Timeline, state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Command, Lockstep, Pool, Run, RunError, SendError, SystemClock, Threads,
+    Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -43,7 +43,7 @@ pub enum WorldError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The world has no moving object of that name.
-    #[error("the world has no moving object \"{name}\"; it has {known}")]
+    #[error("the world has no moving object \"{name}\"; its moving objects are {known}")]
     NoObject {
         /// The name asked for.
         name: String,
@@ -75,7 +75,7 @@ enum State {
 }
 
 /// How often a real-time world looks whether all agents have arrived.
-const LOOK_EVERY: Duration = Duration::from_micros(500);
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -101,7 +101,7 @@ impl World {
             ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, assemble::machine(scene))?),
         };
         if executor != ExecutorKind::Lockstep {
-            run.drive(Drive::Pause);
+            run.drive(TimelineCommand::Pause);
         }
         let agents = run.agents().to_vec();
         Ok(Self { shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, clock }) })
@@ -153,12 +153,12 @@ impl World {
             return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
         }
         let end = self.time() + span;
-        self.drive(Drive::Run);
+        self.drive(TimelineCommand::Run);
         while !self.has_stopped() {
             let now = self.now();
-            self.wait_until(now + LOOK_EVERY);
-            if self.time() >= end && self.shared.agents.iter().all(|agent| has_lived_to(agent, end)) {
-                return self.drive(Drive::Pause);
+            self.wait_until(now + POLL_INTERVAL);
+            if self.time() >= end && self.shared.agents.iter().all(|agent| has_reached(agent, end)) {
+                return self.drive(TimelineCommand::Pause);
             }
         }
     }
@@ -207,7 +207,7 @@ impl World {
     }
 
     /// Changes the flow of time: pause, run, speed, single step.
-    pub fn drive(&self, drive: Drive) {
+    pub fn drive(&self, drive: TimelineCommand) {
         self.with_run(|run| run.drive(drive));
     }
 
@@ -250,7 +250,7 @@ impl World {
 }
 
 /// Whether nothing more is to be waited for: the agent has reached `end`, rests, or has failed.
-fn has_lived_to(agent: &AgentHandle, end: SimTime) -> bool {
+fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
     let newest = agent.latest();
     newest.at_rest || !matches!(agent.state(), AgentState::Running) || newest.moment() >= end
 }

@@ -67,7 +67,7 @@ fn a_clamped_tube_sags_as_a_beam_does() {
 }
 
 #[test]
-fn two_worlds_in_lockstep_live_to_the_same_bits_however_time_is_divided() {
+fn two_lockstep_worlds_reach_the_same_bits_however_time_is_divided() {
     let run = |parts: u32| {
         let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
         (0..parts).for_each(|_| world.advance(span(0.5 / f64::from(parts))));
@@ -78,7 +78,7 @@ fn two_worlds_in_lockstep_live_to_the_same_bits_however_time_is_divided() {
 }
 
 #[test]
-fn clones_are_one_world_and_a_stopped_one_stays_as_it_is() {
+fn clones_share_one_world_and_a_stopped_world_keeps_its_state() {
     let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
     let other = world.clone();
     world.advance(span(0.1));
@@ -90,7 +90,7 @@ fn clones_are_one_world_and_a_stopped_one_stays_as_it_is() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_name() {
+fn an_invalid_scene_is_refused_with_the_name_of_the_object() {
     let twice = Scene::builder().fixed("a", Solid::Plane).add("a", Rigid::ball(0.1)).build();
     assert_eq!(twice.unwrap_err(), SceneBuildError::SameName { name: "a".to_owned() });
     for rate_hz in [0.0, f64::NAN, -1.0, f64::INFINITY, 1e9] {

@@ -43,7 +43,7 @@ mod time;
 
 use worker_wakeup::WorkerWakeup;
 use dirty_set::DirtySet;
-use seqlock::{Glance, Seqlock};
+use seqlock::{ReadOutcome, Seqlock};
 use slot::SlotWriter;
 use sleep::SleepRegistry;
 use sync::atomic::{AtomicU32, Ordering};
@@ -58,7 +58,7 @@ fn main() {
     check("a reader sees whole states that only rise, and the newest that was published before", slot_is_read_whole);
     check("a state that a reader keeps is never written to", slot_keeps_what_is_held);
     check("who takes the news of a state sees it, and no news is lost", news_come_after_the_state);
-    check("nobody sleeps through a summons", nobody_sleeps_through_a_summons);
+    check("nobody sleeps through a summons", no_worker_sleeps_through_a_notification);
     check("words are read whole or not at all, and newer ones after those that were seen", words_are_read_whole);
     check("who goes to rest is summoned by whoever wakes it meanwhile", a_wake_meets_a_rest);
     check("who goes to rest is summoned by whoever touches it meanwhile", a_touch_meets_a_rest);
@@ -120,39 +120,39 @@ fn slot_keeps_what_is_held() {
 }
 
 fn news_come_after_the_state() {
-    let (news, state) = (Arc::new(DirtySet::new(2)), Arc::new(AtomicU32::new(0)));
+    let (set, state) = (Arc::new(DirtySet::new(2)), Arc::new(AtomicU32::new(0)));
     let teller = {
-        let (news, state) = (Arc::clone(&news), Arc::clone(&state));
+        let (set, state) = (Arc::clone(&set), Arc::clone(&state));
         thread::spawn(move || {
             for value in 1..=2 {
                 state.store(value, Ordering::Relaxed);
-                news.tell(AgentId(1));
+                set.mark(AgentId(1));
             }
         })
     };
     let mut seen = 0;
-    news.take(|_| seen = state.load(Ordering::Relaxed));
+    set.take(|_| seen = state.load(Ordering::Relaxed));
     teller.join().unwrap();
     // whatever was missed is there now
-    news.take(|_| seen = state.load(Ordering::Relaxed));
+    set.take(|_| seen = state.load(Ordering::Relaxed));
     assert_eq!(seen, 2);
 }
 
-fn nobody_sleeps_through_a_summons() {
-    let bell = Arc::new(WorkerWakeup::new(1, 1));
+fn no_worker_sleeps_through_a_notification() {
+    let wakeup = Arc::new(WorkerWakeup::new(1, 1));
     let worker = {
-        let bell = Arc::clone(&bell);
+        let wakeup = Arc::clone(&wakeup);
         thread::spawn(move || {
-            bell.enter(0);
+            wakeup.register(0);
             let mut answered = 0;
             while answered == 0 {
                 // without end: a summons that is lost leaves it asleep, which the checker finds
-                bell.sleep(0, None);
-                answered += bell.answer(|_| ());
+                wakeup.sleep(0, None);
+                answered += wakeup.take_notified(|_| ());
             }
         })
     };
-    bell.ring(AgentId(0));
+    wakeup.notify(AgentId(0));
     worker.join().unwrap();
 }
 
@@ -164,14 +164,14 @@ fn words_are_read_whole() {
     };
     let mut last = 0;
     for _ in 0..2 {
-        if let Glance::Whole([a, b]) = lock.read() {
+        if let ReadOutcome::Complete([a, b]) = lock.read() {
             assert_eq!(a, b, "torn");
             assert!(a >= last, "{a} after {last}");
             last = a;
         }
     }
     writer.join().unwrap();
-    assert_eq!(lock.read(), Glance::Whole([2, 2]));
+    assert_eq!(lock.read(), ReadOutcome::Complete([2, 2]));
 }
 
 const LEADER: AgentId = AgentId(0);
@@ -179,43 +179,43 @@ const LED: AgentId = AgentId(1);
 
 /// One goes to rest, and leads another, while `disturb` does something about it: in the end it must not rest unsummoned.
 fn meets_a_rest(disturb: fn(&SleepRegistry)) {
-    let board = Arc::new(SleepRegistry::new(2));
+    let sleep = Arc::new(SleepRegistry::new(2));
     let disturber = {
-        let board = Arc::clone(&board);
-        thread::spawn(move || disturb(&board))
+        let sleep = Arc::clone(&sleep);
+        thread::spawn(move || disturb(&sleep))
     };
     // it takes in the one it leads, then it lies down
-    board.follow(LED, Some(LEADER));
-    let rests = board.try_rest(LEADER, std::iter::once(LED), SimTime::ZERO);
+    sleep.follow(LED, Some(LEADER));
+    let rests = sleep.try_rest(LEADER, std::iter::once(LED), SimTime::ZERO);
     disturber.join().unwrap();
-    let summoned = board.take_rung();
+    let summoned = sleep.take_notified();
     assert!(!rests || summoned, "it sleeps for good");
-    assert!(!rests || board.take_wake(LEADER), "it would lie down again");
+    assert!(!rests || sleep.take_wake(LEADER), "it would lie down again");
 }
 
 fn a_wake_meets_a_rest() {
-    meets_a_rest(|board| board.wake(LEADER));
+    meets_a_rest(|sleep| sleep.wake(LEADER));
 }
 
 fn a_touch_meets_a_rest() {
-    meets_a_rest(|board| board.touch(LEADER, SimTime::ZERO));
+    meets_a_rest(|sleep| sleep.touch(LEADER, SimTime::ZERO));
 }
 
 fn a_wake_of_one_who_is_led_meets_a_rest() {
-    meets_a_rest(|board| board.wake(LED));
+    meets_a_rest(|sleep| sleep.wake(LED));
 }
 
 fn a_wake_meets_a_turn() {
-    let (board, letter) = (Arc::new(SleepRegistry::new(1)), Arc::new(AtomicU32::new(0)));
+    let (sleep, letter) = (Arc::new(SleepRegistry::new(1)), Arc::new(AtomicU32::new(0)));
     let sender = {
-        let (board, letter) = (Arc::clone(&board), Arc::clone(&letter));
+        let (sleep, letter) = (Arc::clone(&sleep), Arc::clone(&letter));
         thread::spawn(move || {
             letter.store(1, Ordering::Relaxed);
-            board.wake(LEADER);
+            sleep.wake(LEADER);
         })
     };
-    board.heed(LEADER);
+    sleep.clear_wake(LEADER);
     let read = letter.load(Ordering::Relaxed) == 1;
     sender.join().unwrap();
-    assert!(read || board.is_woken(LEADER), "the letter lies unread");
+    assert!(read || sleep.is_woken(LEADER), "the letter lies unread");
 }

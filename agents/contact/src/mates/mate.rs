@@ -15,7 +15,7 @@ pub use feet::Feet;
 use glam::DVec3;
 use metachron_core::{Anchor, Inertia};
 use metachron_core::{ContactJacobian, PairKind, Twist};
-use metachron_geometry::{Place, PlacedShape, ShapeKind, Touch};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapeKind, Touch};
 
 /// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
 const OTHERS_KEY: u64 = 1 << 63;
@@ -293,7 +293,7 @@ impl Mate {
             return DVec3::ZERO;
         }
         let mut slots = ContactJacobian::default();
-        self.other.join(&mut slots, 0, &touch.on_b, (touch.normal, -1.0));
+        self.other.join(&mut slots, 0, &touch.on_b, ContactSide::second(touch.normal));
         let back = slots.velocity(&self.back) * self.fade;
         back - touch.normal * touch.normal.dot(back)
     }
@@ -307,9 +307,9 @@ impl Mate {
             Place::Surface { .. } => place,
         };
         let mut slots = ContactJacobian::default();
-        widened(touch.on_a, -touch.normal).join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
+        widened(touch.on_a, -touch.normal).join(&mut slots, 0, DVec3::ZERO, ContactSide::first(touch.normal));
         let there = widened(touch.on_b, touch.normal);
-        self.other.join(&mut slots, self.slots.0 as u32, &there, (touch.normal, -1.0));
+        self.other.join(&mut slots, self.slots.0 as u32, &there, ContactSide::second(touch.normal));
         slots
     }
 

@@ -4,7 +4,7 @@ use super::{Other, Pose};
 use glam::DVec3;
 use metachron_core::ContactJacobian;
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Place, PlacedShape, ShapePose};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 impl Other {
     /// Where it is; `None` before the first [`Self::meet`] and for a body that has no shape.
@@ -23,8 +23,8 @@ impl Other {
     }
 
     /// Adds the velocity of the place of a contact to what `slots` gather, as [`Place::join`] does; this body's slots begin at `base`.
-    pub fn join(&self, slots: &mut ContactJacobian, base: u32, place: &Place, towards: (DVec3, f64)) {
-        place.join(slots, base, self.pose.centre, towards);
+    pub fn join(&self, slots: &mut ContactJacobian, base: u32, place: &Place, side: ContactSide) {
+        place.join(slots, base, self.pose.centre, side);
     }
 
     /// Where a material point is and how it moves; `None` where there is no such point.
@@ -32,7 +32,7 @@ impl Other {
     pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
         let place = self.place(anchor)?;
         let mut slots = ContactJacobian::default();
-        self.join(&mut slots, 0, &place, (DVec3::ZERO, 1.0));
+        self.join(&mut slots, 0, &place, ContactSide::point());
         let position = match place {
             Place::Point(point) => point,
             Place::Chain { segment, share, .. } => {
@@ -49,7 +49,7 @@ impl Other {
     /// Adds the velocity of a material point to what `slots` gather; this body's slots begin at zero.
     pub fn hold(&self, slots: &mut ContactJacobian, anchor: Anchor) {
         if let Some(place) = self.place(anchor) {
-            self.join(slots, 0, &place, (DVec3::ZERO, 1.0));
+            self.join(slots, 0, &place, ContactSide::point());
         }
     }
 

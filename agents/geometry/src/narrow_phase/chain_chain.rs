@@ -3,7 +3,7 @@
 //! In: two strands. Out: the places where their spans face each other. A grid finds candidate pairs of spans in linear time.
 //! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
 
-use super::primitives::Strand;
+use super::primitives::{Strand, StrandPoint};
 use crate::Touch;
 use crate::capsule_chain::facing;
 use crate::signed_distance;
@@ -30,7 +30,7 @@ const WIDENING: f64 = 4.0;
 #[derive(Default)]
 pub(super) struct ChainScratch {
     grid: Grid,
-    spots: Vec<Spot>,
+    span_bounds: Vec<SpanBounds>,
     /// Span of the first strand in the upper half, of the second in the lower half.
     pairs: Vec<u64>,
     /// How many pairs the last search tested.
@@ -39,7 +39,7 @@ pub(super) struct ChainScratch {
 }
 
 /// A span as the grid stores it.
-struct Spot {
+struct SpanBounds {
     middle: DVec3,
     /// Radius of the ball that encloses it.
     ball_m: f64,
@@ -53,7 +53,7 @@ impl ChainScratch {
         self.find(a, b, reach_m);
         for pair in &self.pairs {
             let spans = [(pair >> 32) as usize, *pair as u32 as usize];
-            Meeting { strands: [a, b], spans, reach_m }.visit(into);
+            SpanPair { strands: [a, b], spans, reach_m }.visit(into);
         }
     }
 
@@ -75,26 +75,26 @@ impl ChainScratch {
 
     /// Lists the pairs of spans whose balls come within `reach_m` of each other, by rising numbers.
     fn find(&mut self, a: &Strand<'_>, b: &Strand<'_>, reach_m: f64) {
-        let Self { grid, spots, pairs, .. } = self;
+        let Self { grid, span_bounds, pairs, .. } = self;
         pairs.clear();
-        spots.clear();
-        spots.extend(spots_of(a, b, reach_m, false));
-        let first = spots.len();
-        spots.extend(spots_of(b, a, reach_m, true));
+        span_bounds.clear();
+        span_bounds.extend(span_bounds_of(a, b, reach_m, false));
+        let first = span_bounds.len();
+        span_bounds.extend(span_bounds_of(b, a, reach_m, true));
         let mut tried = 0;
         let mut try_pair = |i: usize, j: usize| {
             tried += 1;
-            let (p, q) = (&spots[i.min(j)], &spots[i.max(j)]);
+            let (p, q) = (&span_bounds[i.min(j)], &span_bounds[i.max(j)]);
             let within = p.ball_m + q.ball_m + reach_m;
             if p.second != q.second && p.middle.distance_squared(q.middle) <= within * within {
                 pairs.push(u64::from(p.span) << 32 | u64::from(q.span));
             }
         };
-        if first.min(spots.len() - first) <= FEW {
-            (0..first).for_each(|i| (first..spots.len()).for_each(|j| try_pair(i, j)));
+        if first.min(span_bounds.len() - first) <= FEW {
+            (0..first).for_each(|i| (first..span_bounds.len()).for_each(|j| try_pair(i, j)));
         } else {
-            let widest = spots.iter().map(|spot| spot.ball_m).fold(0.0, f64::max);
-            grid.fill(spots.iter().map(|spot| spot.middle), 2.0 * widest + reach_m);
+            let widest = span_bounds.iter().map(|spot| spot.ball_m).fold(0.0, f64::max);
+            grid.fill(span_bounds.iter().map(|spot| spot.middle), 2.0 * widest + reach_m);
             grid.near_pairs(|i, j| try_pair(i as usize, j as usize));
         }
         pairs.sort_unstable();
@@ -106,14 +106,19 @@ impl ChainScratch {
 }
 
 /// The spans of `strand` that come near the bounds of `other`.
-fn spots_of(strand: &Strand<'_>, other: &Strand<'_>, reach_m: f64, second: bool) -> impl Iterator<Item = Spot> {
-    let ((low, high), widest_m) = (other.bounds, other.widest_m);
+fn span_bounds_of(
+    strand: &Strand<'_>,
+    other: &Strand<'_>,
+    reach_m: f64,
+    second: bool,
+) -> impl Iterator<Item = SpanBounds> {
+    let (crate::Aabb { low, high }, widest_m) = (other.bounds, other.widest_m);
     let spot = move |span: usize| {
         let [a, b] = strand.ends(span);
         let ball_m = 0.5 * a.centre.distance(b.centre) + a.radius_m.max(b.radius_m);
-        Spot { middle: (a.centre + b.centre) * 0.5, ball_m, span: span as u32, second }
+        SpanBounds { middle: (a.centre + b.centre) * 0.5, ball_m, span: span as u32, second }
     };
-    let near = move |spot: &Spot| {
+    let near = move |spot: &SpanBounds| {
         let apart = (low - spot.middle).max(spot.middle - high).max(DVec3::ZERO).length();
         apart <= spot.ball_m + widest_m + reach_m
     };
@@ -121,7 +126,7 @@ fn spots_of(strand: &Strand<'_>, other: &Strand<'_>, reach_m: f64, second: bool)
 }
 
 /// Two spans that are near each other.
-struct Meeting<'a> {
+struct SpanPair<'a> {
     strands: [&'a Strand<'a>; 2],
     spans: [usize; 2],
     reach_m: f64,
@@ -135,7 +140,7 @@ struct ReportedContact {
     least_m: f64,
 }
 
-impl Meeting<'_> {
+impl SpanPair<'_> {
     /// Adds the places of the pair (eq. 18): nodes over the other's span, and the crossing where it is nearer.
     fn visit(&self, into: &mut Vec<Touch>) {
         let ([a, b], [i, j]) = (self.strands, self.spans);
@@ -146,43 +151,47 @@ impl Meeting<'_> {
         if nearest.distance_m > self.reach_m + taper(ends_a) + taper(ends_b) {
             return;
         }
-        let mut told = ReportedContact { least_m: f64::INFINITY, ..ReportedContact::default() };
+        let mut reported = ReportedContact { least_m: f64::INFINITY, ..ReportedContact::default() };
         for (place, node) in own_nodes(a, i) {
-            if let Some(t) = b.foot(a.ball(node).centre, j).filter(|&t| speaks(a, node, b, (j, t))) {
-                self.tell(place, [(node - i) as f64, t], &mut told, into);
+            if let Some(t) =
+                b.foot(a.ball(node).centre, j).filter(|&t| is_own_place(a, node, b, StrandPoint { span: j, share: t }))
+            {
+                self.report(place, [(node - i) as f64, t], &mut reported, into);
             }
         }
         for (place, node) in own_nodes(b, j) {
-            if let Some(s) = a.foot(b.ball(node).centre, i).filter(|&s| speaks(b, node, a, (i, s))) {
-                self.tell(place + 1, [s, (node - j) as f64], &mut told, into);
+            if let Some(s) =
+                a.foot(b.ball(node).centre, i).filter(|&s| is_own_place(b, node, a, StrandPoint { span: i, share: s }))
+            {
+                self.report(place + 1, [s, (node - j) as f64], &mut reported, into);
             }
         }
         let inside = [s, t].iter().all(|&share| share > 0.0 && share < 1.0);
         let rigid = a.spans().min(b.spans()) == 1;
         let margin_m = if rigid { 0.0 } else { CROSSING_SHARE * (a.widest_m + b.widest_m) };
-        if inside && nearest.distance_m < told.least_m - margin_m {
-            self.tell(CROSSING, [s, t], &mut told, into);
+        if inside && nearest.distance_m < reported.least_m - margin_m {
+            self.report(CROSSING, [s, t], &mut reported, into);
         }
     }
 
     /// Adds a place, unless it is too far or already added.
-    fn tell(&self, place: u64, shares: [f64; 2], told: &mut ReportedContact, into: &mut Vec<Touch>) {
+    fn report(&self, place: u64, shares: [f64; 2], reported: &mut ReportedContact, into: &mut Vec<Touch>) {
         let ([a, b], [i, j], [s, t]) = (self.strands, self.spans, shares);
-        if told.shares[..told.count].contains(&shares) {
+        if reported.shares[..reported.count].contains(&shares) {
             return;
         }
-        told.shares[told.count] = shares;
-        told.count += 1;
+        reported.shares[reported.count] = shares;
+        reported.count += 1;
         let (ends_a, ends_b) = (a.ends(i), b.ends(j));
-        let (meeting, _) = facing(ends_a, ends_b, shares);
-        told.least_m = told.least_m.min(meeting.distance_m);
-        if meeting.distance_m <= self.reach_m {
+        let (touch, _) = facing(ends_a, ends_b, shares);
+        reported.least_m = reported.least_m.min(touch.distance_m);
+        if touch.distance_m <= self.reach_m {
             into.push(Touch {
                 key: (i as u64) << 28 | (j as u64) << 4 | place,
-                normal: meeting.normal,
-                gap_m: meeting.distance_m,
-                on_a: a.place(i, s, ends_a[0].toward(ends_a[1], s), meeting.normal),
-                on_b: b.place(j, t, ends_b[0].toward(ends_b[1], t), -meeting.normal),
+                normal: touch.normal,
+                gap_m: touch.distance_m,
+                on_a: a.place(i, s, ends_a[0].toward(ends_a[1], s), touch.normal),
+                on_b: b.place(j, t, ends_b[0].toward(ends_b[1], t), -touch.normal),
             });
         }
     }
@@ -196,9 +205,9 @@ fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u64, usi
 
 /// Whether a node over a span is a place of its own: past an end of the other strand that end is the place, if its own foot
 /// is at this node.
-fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, (span, share): (usize, f64)) -> bool {
-    let end = match share {
-        0.0 if span == 0 => 0,
+fn is_own_place(strand: &Strand<'_>, node: usize, other: &Strand<'_>, at: StrandPoint) -> bool {
+    let end = match at.share {
+        0.0 if at.span == 0 => 0,
         1.0 => other.count() - 1,
         _ => return true,
     };

@@ -3,7 +3,7 @@
 //! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the ends of the stretch where a span lies flat.
 //! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
 
-use super::primitives::{Block, Strand};
+use super::primitives::{Block, Strand, StrandPoint};
 use crate::Touch;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
@@ -21,18 +21,18 @@ const LOWEST: u64 = 8;
 /// Every place within `reach_m`, with normals from the block towards the strand.
 pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
     let Some(field) = block.field else { return };
-    let meeting = Meeting { strand, block, field, reach_m };
+    let pair = StrandOnBlock { strand, block, field, reach_m };
     let mut last = None;
     for span in 0..strand.spans() {
         if block.misses(strand.ends(span), reach_m) {
             continue;
         }
-        let left = last.filter(|&(node, _)| node == span).map_or_else(|| meeting.node(span, into), |(_, near)| near);
+        let left = last.filter(|&(node, _)| node == span).map_or_else(|| pair.node(span, into), |(_, near)| near);
         if strand.count() > 1 {
-            let right = meeting.node(span + 1, into);
+            let right = pair.node(span + 1, into);
             last = Some((span + 1, right));
-            if field.feels_spans() {
-                meeting.span(span, [left, right], into);
+            if field.needs_span_tests() {
+                pair.span(span, [left, right], into);
             }
         }
     }
@@ -56,14 +56,14 @@ pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Optio
 }
 
 /// A strand and a block that may touch.
-struct Meeting<'a> {
+struct StrandOnBlock<'a> {
     strand: &'a Strand<'a>,
     block: &'a Block<'a>,
     field: &'a Field,
     reach_m: f64,
 }
 
-impl Meeting<'_> {
+impl StrandOnBlock<'_> {
     /// Adds the places of a node; returns the nearest.
     fn node(&self, node: usize, into: &mut Vec<Touch>) -> Option<signed_distance::Touch> {
         let ball = self.block.inward(self.strand.ball(node));
@@ -73,11 +73,9 @@ impl Meeting<'_> {
             let deep = self.field.touches(ball.centre, 2.0 * self.block.around.radius_m).iter().next();
             deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
         }
-        let span = node.min(self.strand.spans() - 1);
-        let share = (node - span) as f64;
         for (place, touch) in (0..).zip(places.iter()) {
             let key = (node as u64) << 28 | place;
-            self.tell(key, (span, share), touch, into);
+            self.report(key, self.strand.node(node), touch, into);
         }
         places.iter().next()
     }
@@ -99,7 +97,7 @@ impl Meeting<'_> {
         });
         let key = (span as u64) << 28 | LOWEST;
         if let Some((share, touch)) = lowest {
-            self.tell(key, (span, share), touch, into);
+            self.report(key, StrandPoint { span, share }, touch, into);
         }
         let end_gap = |side: usize| near[side].map_or(f64::INFINITY, |near| near.distance_m - ends[side].radius_m);
         let (from, least_m) = match lowest {
@@ -108,15 +106,15 @@ impl Meeting<'_> {
             None => (1.0, end_gap(1)),
         };
         for (place, to) in [(1, 0.0), (2, 1.0)] {
-            if let Some((share, touch)) = self.edge(ends, (from, to), least_m) {
-                self.tell(key + place, (span, share), touch, into);
+            if let Some((share, touch)) = self.edge(ends, from, to, least_m) {
+                self.report(key + place, StrandPoint { span, share }, touch, into);
             }
         }
     }
 
     /// The edge of a flat stretch: where a span that is flat on the block at the share `from` leaves it towards `to`, if that place is
     /// apart from both.
-    fn edge(&self, ends: [Ball; 2], (from, to): (f64, f64), least_m: f64) -> Option<(f64, signed_distance::Touch)> {
+    fn edge(&self, ends: [Ball; 2], from: f64, to: f64, least_m: f64) -> Option<(f64, signed_distance::Touch)> {
         let length_m = ends[0].centre.distance(ends[1].centre);
         let radius_m = ends[0].radius_m.max(ends[1].radius_m);
         let apart = APART_RADII * radius_m / length_m;
@@ -145,7 +143,8 @@ impl Meeting<'_> {
     }
 
     /// Adds a place, unless it is too far.
-    fn tell(&self, key: u64, (span, share): (usize, f64), touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+    fn report(&self, key: u64, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+        let StrandPoint { span, share } = at;
         let [a, b] = self.strand.ends(span);
         let ball = if share == 1.0 { b } else { a.toward(b, share) };
         let gap_m = touch.distance_m - ball.radius_m;

@@ -5,7 +5,7 @@
 //! precision and relative to each other.
 
 use super::epa::Hull;
-use super::gjk::{Apart, Difference, Part};
+use super::gjk::{Difference, Part, Separation};
 use super::primitives::Block;
 use crate::{Place, Touch};
 use glam::{DQuat, DVec3};
@@ -39,7 +39,7 @@ impl ConvexScratch {
             let Some(apart) = Difference::new(first, second).apart(reach_m, hull) else { return };
             clip(manifold, first, second, &apart);
             let facing = Facing { first, second, apart, reach_m, size_m };
-            facing.tell(manifold, into);
+            facing.report(manifold, into);
         });
     }
 
@@ -93,7 +93,7 @@ fn relative(first: &Part<'_>, second: &Part<'_>) -> Pose {
 }
 
 /// The points where the features that face each other along the normal meet.
-fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<'_>, apart: &Apart) {
+fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<'_>, apart: &Separation) {
     manifold.points.clear();
     let maps = first.shape.as_polygonal_feature_map().zip(second.shape.as_polygonal_feature_map());
     let Some(((one, one_rim), (two, two_rim))) = maps else { return };
@@ -111,11 +111,19 @@ fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<
     }
 }
 
+/// A point where the facing features of two parts meet.
+struct ClippedPoint {
+    key: u64,
+    gap_m: f64,
+    /// On the first part, relative to its origin, in world axes, metres.
+    place: DVec3,
+}
+
 /// Two parts that face each other.
 struct Facing<'a> {
     first: &'a Part<'a>,
     second: &'a Part<'a>,
-    apart: Apart,
+    apart: Separation,
     reach_m: f64,
     size_m: f64,
 }
@@ -123,29 +131,33 @@ struct Facing<'a> {
 impl Facing<'_> {
     /// Adds the points of a manifold, the lowest of which gets the gap of double precision, and the nearest place if the manifold
     /// does not contain it.
-    fn tell(&self, manifold: &ContactManifold<(), ()>, into: &mut Vec<Touch>) {
+    fn report(&self, manifold: &ContactManifold<(), ()>, into: &mut Vec<Touch>) {
         let least_m = manifold.points.iter().map(|point| f64::from(point.dist)).fold(f64::INFINITY, f64::min);
         let shift_m = self.apart.gap_m - least_m;
         let is_there = shift_m.abs() < SAME_SHARE * self.size_m;
         let from = into.len();
         if !is_there {
             let key = self.key(PackedFeatureId::UNKNOWN, PackedFeatureId::UNKNOWN);
-            self.add((key, self.apart.gap_m), self.apart.on[0], from, into);
+            let nearest = ClippedPoint { key, gap_m: self.apart.gap_m, place: self.apart.on[0] };
+            self.add(nearest, from, into);
         }
         for point in &manifold.points {
             let gap_m = f64::from(point.dist) + if is_there { shift_m } else { 0.0 };
             let TrackedContact { fid1, fid2, local_p1, .. } = *point;
             let place = self.first.rotation * local_p1.as_dvec3();
-            self.add((self.key(fid1, fid2), gap_m.max(self.apart.gap_m)), place, from, into);
+            let key = self.key(fid1, fid2);
+            self.add(ClippedPoint { key, gap_m: gap_m.max(self.apart.gap_m), place }, from, into);
         }
     }
 
-    /// Adds a place of the first part, unless it is too far or already listed.
-    fn add(&self, (key, gap_m): (u64, f64), place: DVec3, from: usize, into: &mut Vec<Touch>) {
+    /// Adds a point, unless it is too far or already listed at or after `from`.
+    fn add(&self, point: ClippedPoint, from: usize, into: &mut Vec<Touch>) {
+        let ClippedPoint { key, gap_m, place } = point;
         let on_a = self.first.origin + place;
         let within_m = SAME_SHARE * self.size_m;
-        let is_same = |told: Place| matches!(told, Place::Point(told) if told.distance(on_a) < within_m);
-        if gap_m <= self.reach_m && !into[from..].iter().any(|told| is_same(told.on_a)) {
+        let is_same =
+            |reported: Place| matches!(reported, Place::Point(reported) if reported.distance(on_a) < within_m);
+        if gap_m <= self.reach_m && !into[from..].iter().any(|reported| is_same(reported.on_a)) {
             let normal = self.apart.normal;
             let on_b = Place::Point(on_a - normal * gap_m);
             into.push(Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b });

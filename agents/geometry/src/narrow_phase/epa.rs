@@ -3,7 +3,7 @@
 //! In: the difference as corners by direction. Out: the normal and the depth. Never here: parts that are apart.
 //! The hull grows from any tetrahedron: the face nearest to the origin first, and before all a face that has the origin in front of it.
 
-use super::gjk::{Apart, Corner, Difference};
+use super::gjk::{Corner, Difference, Separation};
 use glam::DVec3;
 
 /// Rounds of growing; the difference of two boxes is complete after thirty, that of round shapes is accurate to 1e-6 of its size.
@@ -32,10 +32,10 @@ struct Face {
 
 impl Hull {
     /// The shortest separation of two overlapping parts; `None` where the numbers are not finite.
-    pub fn way_out(&mut self, difference: &Difference<'_>) -> Option<Apart> {
+    pub fn way_out(&mut self, difference: &Difference<'_>) -> Option<Separation> {
         self.start(difference)?;
         let size_m = self.corners.iter().map(|c| c.way.length()).fold(0.0, f64::max);
-        let mut best: Option<Apart> = None;
+        let mut best: Option<Separation> = None;
         for _ in 0..ROUNDS {
             let face = *self.faces.iter().min_by(|p, q| p.depth_m.total_cmp(&q.depth_m))?;
             if !face.depth_m.is_finite() {
@@ -44,7 +44,7 @@ impl Hull {
             let corner = difference.support(face.normal);
             let depth_m = corner.way.dot(face.normal);
             if best.is_none_or(|best| -depth_m > best.gap_m) {
-                best = Some(Apart { normal: -face.normal, gap_m: -depth_m, on: self.facing(face) });
+                best = Some(Separation { normal: -face.normal, gap_m: -depth_m, on: self.facing(face) });
             }
             if depth_m - face.depth_m <= OWN_SHARE * size_m {
                 break;

@@ -22,7 +22,7 @@ pub(super) struct Part<'a> {
 
 /// Separation of two parts.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Apart {
+pub(super) struct Separation {
     /// Unit normal, from the second to the first.
     pub normal: DVec3,
     /// The widest slab between them, or the shortest way out where they overlap, metres: never more than the true gap.
@@ -87,10 +87,10 @@ impl<'a> Difference<'a> {
     }
 
     /// Separation of the parts; `None` farther than `reach_m` apart.
-    pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Apart> {
+    pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Separation> {
         let start = self.parts[0].origin - self.parts[1].origin;
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
-        let mut best: Option<Apart> = None;
+        let mut best: Option<Separation> = None;
         for _ in 0..ROUNDS {
             let near = simplex.nearest();
             let distance = near.way.length();
@@ -104,7 +104,7 @@ impl<'a> Difference<'a> {
                 return None;
             }
             if best.is_none_or(|best| floor_m > best.gap_m) {
-                best = Some(Apart { normal, gap_m: floor_m, on: near.on });
+                best = Some(Separation { normal, gap_m: floor_m, on: near.on });
             }
             let rounding = ROUNDING * simplex.size();
             if distance - floor_m <= GAP_SHARE * distance + rounding || !simplex.add(corner) {

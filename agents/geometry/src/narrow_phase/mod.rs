@@ -28,7 +28,7 @@ use chain_chain::ChainScratch;
 use convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
-use shape_cache::Known;
+use shape_cache::ShapeCache;
 use surface::SurfaceScratch;
 pub use voronoi_regions::VoronoiRegions;
 
@@ -38,7 +38,7 @@ pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
 /// Reusable storage for contact searches: one for each agent.
 #[derive(Default)]
 pub struct NarrowPhaseScratch {
-    known: Known,
+    known: ShapeCache,
     chains: ChainScratch,
     blocks: ConvexScratch,
     surfaces: SurfaceScratch,
@@ -52,12 +52,12 @@ pub fn touches(
     a: &PlacedShape<'_>,
     b: &PlacedShape<'_>,
     reach_m: f64,
-    room: &mut NarrowPhaseScratch,
+    scratch: &mut NarrowPhaseScratch,
     into: &mut Vec<Touch>,
 ) {
     into.clear();
-    let NarrowPhaseScratch { known, chains, blocks, surfaces } = room;
-    known.learn(a.form, b.form);
+    let NarrowPhaseScratch { known, chains, blocks, surfaces } = scratch;
+    known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
         for (j, other) in second.iter().filter(|(_, other)| piece.may_touch(other, reach_m)) {
@@ -111,10 +111,10 @@ pub fn gap(
     a: &PlacedShape<'_>,
     b: &PlacedShape<'_>,
     reach_m: f64,
-    room: &mut NarrowPhaseScratch,
+    scratch: &mut NarrowPhaseScratch,
 ) -> Option<(DVec3, f64)> {
-    let NarrowPhaseScratch { known, chains, blocks, .. } = room;
-    known.learn(a.form, b.form);
+    let NarrowPhaseScratch { known, chains, blocks, .. } = scratch;
+    known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;
     for (_, piece) in first.iter() {

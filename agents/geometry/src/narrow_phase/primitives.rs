@@ -2,12 +2,12 @@
 //!
 //! In: a form and its place. Out: at most [`PARTS`] pieces with bounds. Never here: contacts.
 
-use super::shape_cache::{Known, PARTS};
+use super::shape_cache::{PARTS, ShapeCache};
 use super::skin;
 use crate::Solid;
 use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
-use crate::{Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
+use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::SharedShape;
 
@@ -28,16 +28,25 @@ pub(super) struct Surface<'a> {
     /// Where its vertices are, metres.
     pub positions: &'a [DVec3],
     /// Lowest and highest coordinates of the vertices.
-    pub bounds: (DVec3, DVec3),
+    pub bounds: Aabb,
 }
 
 /// Balls joined by spans.
 pub(super) struct Strand<'a> {
     nodes: Nodes<'a>,
     /// Lowest and highest coordinates of the nodes.
-    pub bounds: (DVec3, DVec3),
+    pub bounds: Aabb,
     /// The largest radius, metres.
     pub widest_m: f64,
+}
+
+/// A point on the core line of a strand.
+#[derive(Clone, Copy)]
+pub(super) struct StrandPoint {
+    /// The span.
+    pub span: usize,
+    /// How far along the span, 0 … 1.
+    pub share: f64,
 }
 
 enum Nodes<'a> {
@@ -64,7 +73,7 @@ pub(super) struct Block<'a> {
 
 impl<'a> Pieces<'a> {
     /// Decomposes a form.
-    pub fn of(placed: &PlacedShape<'a>, known: &'a Known) -> Self {
+    pub fn of(placed: &PlacedShape<'a>, known: &'a ShapeCache) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
             (ShapeKind::Chain { .. }, ShapePose::Chain { positions, radii_m }) => {
@@ -99,7 +108,7 @@ impl<'a> Pieces<'a> {
                 }
             }
             (ShapeKind::Surface(form), ShapePose::Surface(positions)) if !positions.is_empty() => {
-                let bounds = crate::bounds(positions);
+                let bounds = Aabb::of(positions);
                 pieces.0[0] = Some(Piece::Surface(Surface { form, positions, bounds }));
             }
             _ => {}
@@ -119,8 +128,8 @@ fn tube<'a>(positions: &'a [DVec3], radii_m: &'a [f64]) -> Option<Piece<'a>> {
 }
 
 fn strand(nodes: Nodes<'_>) -> Piece<'_> {
-    let mut strand = Strand { nodes, bounds: (DVec3::ZERO, DVec3::ZERO), widest_m: 0.0 };
-    strand.bounds = crate::bounds(strand.positions());
+    let mut strand = Strand { nodes, bounds: Aabb { low: DVec3::ZERO, high: DVec3::ZERO }, widest_m: 0.0 };
+    strand.bounds = Aabb::of(strand.positions());
     strand.widest_m = match &strand.nodes {
         Nodes::Solid(_, _, radius_m) => *radius_m,
         Nodes::Tube(_, radii_m) => radii_m.iter().copied().fold(0.0, f64::max),
@@ -133,11 +142,11 @@ impl Piece<'_> {
     pub fn may_touch(&self, other: &Self, reach_m: f64) -> bool {
         match (self, other) {
             (Self::Strand(a), Self::Strand(b)) => {
-                let apart = (b.bounds.0 - a.bounds.1).max(a.bounds.0 - b.bounds.1).max(DVec3::ZERO).length();
+                let apart = (b.bounds.low - a.bounds.high).max(a.bounds.low - b.bounds.high).max(DVec3::ZERO).length();
                 apart <= a.widest_m + b.widest_m + reach_m
             }
             (Self::Strand(strand), Self::Block(block)) | (Self::Block(block), Self::Strand(strand)) => {
-                let (low, high) = strand.bounds;
+                let Aabb { low, high } = strand.bounds;
                 let apart = (low - block.around.centre).max(block.around.centre - high).max(DVec3::ZERO).length();
                 apart <= strand.widest_m + block.around.radius_m + reach_m
             }
@@ -146,21 +155,20 @@ impl Piece<'_> {
                 apart <= a.around.radius_m + b.around.radius_m + reach_m
             }
             (Self::Surface(surface), other) | (other, Self::Surface(surface)) => {
-                let ((low, high), (there_low, there_high)) = (surface.bounds, other.bounds());
-                let apart = (there_low - high).max(low - there_high).max(DVec3::ZERO).length();
+                let (here, there) = (surface.bounds, other.bounds());
+                let apart = (there.low - here.high).max(here.low - there.high).max(DVec3::ZERO).length();
                 apart <= surface.form.radius_m + reach_m
             }
         }
     }
 
     /// The box around it, including the thickness of a surface or strand.
-    pub fn bounds(&self) -> (DVec3, DVec3) {
-        let (low, high, radius_m) = match self {
-            Self::Strand(strand) => (strand.bounds.0, strand.bounds.1, strand.widest_m),
-            Self::Block(block) => (block.around.centre, block.around.centre, block.around.radius_m),
-            Self::Surface(surface) => (surface.bounds.0, surface.bounds.1, surface.form.radius_m),
-        };
-        (low - radius_m, high + radius_m)
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Strand(strand) => strand.bounds.grown(strand.widest_m),
+            Self::Block(block) => Aabb::about(block.around.centre, block.around.radius_m),
+            Self::Surface(surface) => surface.bounds.grown(surface.form.radius_m),
+        }
     }
 }
 
@@ -195,6 +203,12 @@ impl Strand<'_> {
     /// Both ends of a span.
     pub fn ends(&self, span: usize) -> [Ball; 2] {
         [self.ball(span), self.ball((span + 1).min(self.count() - 1))]
+    }
+
+    /// A node as a point of the span that begins there; the last node as the end of the last span.
+    pub fn node(&self, node: usize) -> StrandPoint {
+        let span = node.min(self.spans() - 1);
+        StrandPoint { span, share: (node - span) as f64 }
     }
 
     /// The share of a span at which a point has its foot, if this span reports it ([`foot`]).

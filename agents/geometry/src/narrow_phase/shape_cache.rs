@@ -3,7 +3,7 @@
 //! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
 
 use crate::signed_distance::{Ball, Field};
-use crate::{CollisionShape, ShapeKind, SolidShape};
+use crate::{Aabb, CollisionShape, ShapeKind, SolidShape};
 use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
@@ -16,7 +16,7 @@ const JAW_LEVEL: u8 = 2;
 
 /// The cached geometry of forms; it grows with the number of different ones.
 #[derive(Default)]
-pub(super) struct Known {
+pub(super) struct ShapeCache {
     fields: Vec<(Solid, Option<Field>)>,
     hulls: Vec<(Solid, Option<SharedShape>)>,
     tools: Vec<(ToolShape, Option<[ToolSolid; PARTS]>)>,
@@ -30,29 +30,29 @@ pub(super) struct ToolSolid {
     pub around: Ball,
 }
 
-impl Known {
+impl ShapeCache {
     /// Caches the data that a search between `a` and `b` needs.
-    pub fn learn(&mut self, a: &CollisionShape, b: &CollisionShape) {
+    pub fn prepare(&mut self, a: &CollisionShape, b: &CollisionShape) {
         for (form, other) in [(a, b), (b, a)] {
             match &form.kind {
-                ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.kind) => self.learn_solid(solid),
+                ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.kind) => self.prepare_solid(solid),
                 ShapeKind::Solid(SolidShape { solid, shape, .. }) if shape.as_trimesh().is_some() => {
-                    self.learn_hull(solid)
+                    self.prepare_hull(solid)
                 }
-                ShapeKind::Tool(shape) => self.learn_tool(shape),
+                ShapeKind::Tool(shape) => self.prepare_tool(shape),
                 _ => {}
             }
         }
     }
 
-    fn learn_solid(&mut self, solid: &Solid) {
+    fn prepare_solid(&mut self, solid: &Solid) {
         let is_new = !self.fields.iter().any(|(known, _)| is_same(known, solid));
         if is_new && !matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. }) {
             self.fields.push((solid.clone(), field(solid).ok()));
         }
     }
 
-    fn learn_hull(&mut self, solid: &Solid) {
+    fn prepare_hull(&mut self, solid: &Solid) {
         if let Solid::Mesh { points_m, .. } = solid
             && !self.hulls.iter().any(|(known, _)| is_same(known, solid))
         {
@@ -61,7 +61,7 @@ impl Known {
         }
     }
 
-    fn learn_tool(&mut self, shape: &ToolShape) {
+    fn prepare_tool(&mut self, shape: &ToolShape) {
         if !self.tools.iter().any(|(known, _)| known == shape) {
             let solids: Result<Vec<_>, _> = shape.parts(0.0).iter().map(ToolSolid::new).collect();
             self.tools.push((*shape, solids.ok().and_then(|solids| solids.try_into().ok())));
@@ -132,7 +132,7 @@ impl ToolSolid {
 fn around(solid: &Solid) -> Ball {
     match solid {
         Solid::Hull { points_m } => {
-            let (low, high) = crate::bounds(points_m);
+            let Aabb { low, high } = Aabb::of(points_m);
             let centre = (low + high) * 0.5;
             Ball { centre, radius_m: points_m.iter().map(|p| p.distance(centre)).fold(0.0, f64::max) }
         }

@@ -67,12 +67,12 @@ impl VoronoiRegions {
 
 /// A vertex or an edge of a skin, with its number and, for an edge, its ends.
 #[derive(Clone, Copy)]
-pub(super) enum Ridge {
+pub(super) enum Feature {
     Vertex(u32),
     Edge(u64, [DVec3; 2]),
 }
 
-impl Ridge {
+impl Feature {
     /// Calls `each` with every vector along the skin from here.
     fn along(self, surface: &Surface<'_>, mut each: impl FnMut(DVec3)) {
         let fans = &surface.form.fans;

@@ -20,7 +20,7 @@ const LENGTH_SHARE: f64 = 1e-4;
 
 /// A queued collapse: the bits of its cost (non-negative, so they sort like it), the position removed, the one it moves to, the evaluation
 /// count.
-type Waiting = Reverse<(u64, u32, u32, u32)>;
+type QueuedCollapse = Reverse<(u64, u32, u32, u32)>;
 
 struct Builder {
     surface: Surface,
@@ -37,9 +37,9 @@ struct Builder {
     gone: Vec<u32>,
     /// Positions in the order of removal.
     order: Vec<u32>,
-    heap: BinaryHeap<Waiting>,
+    heap: BinaryHeap<QueuedCollapse>,
     /// Evaluations of each position: a queued collapse of an earlier evaluation is void.
-    looks: Vec<u32>,
+    evaluations: Vec<u32>,
     neighbours: Vec<(u32, u8)>,
     prices: Vec<(f64, u32)>,
 }
@@ -71,7 +71,7 @@ impl Builder {
             gone: vec![0; surface.triangles.len()],
             order: Vec::with_capacity(count),
             heap: BinaryHeap::with_capacity(2 * count),
-            looks: vec![0; count],
+            evaluations: vec![0; count],
             neighbours: Vec::new(),
             prices: Vec::new(),
             surface,
@@ -80,27 +80,27 @@ impl Builder {
 
     /// Collapses until no valid collapse is left.
     fn collapse_all(&mut self, turn: f64) {
-        (0..self.looks.len() as u32).for_each(|p| self.look(p, turn));
-        while let Some(Reverse((_, u, v, look))) = self.heap.pop() {
-            if self.looks[u as usize] != look {
+        (0..self.evaluations.len() as u32).for_each(|p| self.queue_cheapest(p, turn));
+        while let Some(Reverse((_, u, v, evaluation))) = self.heap.pop() {
+            if self.evaluations[u as usize] != evaluation {
                 continue;
             }
             // positions two edges away may have changed since
             let mut of_u = std::mem::take(&mut self.neighbours);
             self.surface.neighbours(u, &mut of_u);
-            let sound = self.surface.verdict((u, &of_u), v, turn).is_some();
+            let sound = self.surface.verdict(u, &of_u, v, turn).is_some();
             self.neighbours = of_u;
             if sound {
                 self.collapse(u, v, turn);
             } else {
-                self.look(u, turn);
+                self.queue_cheapest(u, turn);
             }
         }
     }
 
     /// Finds the cheapest valid collapse of `p` and queues it.
-    fn look(&mut self, p: u32, turn: f64) {
-        self.looks[p as usize] += 1;
+    fn queue_cheapest(&mut self, p: u32, turn: f64) {
+        self.evaluations[p as usize] += 1;
         if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) {
             return;
         }
@@ -114,12 +114,12 @@ impl Builder {
             self.prices.push((self.quadrics[p as usize].at(at) + slide, to));
         }
         self.prices.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict((p, &neighbours), to, turn)?));
+        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict(p, &neighbours, to, turn)?));
         let found = self.prices.iter().find_map(judged);
         self.neighbours = neighbours;
         let Some((price, to, verdict)) = found else { return };
         let price = if verdict == Verdict::Vanishes { price + self.loss(p, to) } else { price };
-        self.heap.push(Reverse((price.to_bits(), p, to, self.looks[p as usize])));
+        self.heap.push(Reverse((price.to_bits(), p, to, self.evaluations[p as usize])));
     }
 
     /// Cost of the triangles that a small part loses: all of their area deviates by the collapse's length.
@@ -144,7 +144,7 @@ impl Builder {
         surface.collapse(u, v, |t| gone[t as usize] = step);
         let of_u = self.quadrics[u as usize];
         self.quadrics[v as usize] += of_u;
-        self.looks[u as usize] += 1;
+        self.evaluations[u as usize] += 1;
         let mut around: Vec<u32> = touched.iter().map(|(p, _)| *p).collect();
         // neighbours of a hub that are not neighbours of `u` see no change of the hub
         if !self.surface.is_hub(v) {
@@ -156,7 +156,7 @@ impl Builder {
             match self.surface.around[p as usize].is_empty() {
                 true if p == v => {}
                 true => self.strand(p, v),
-                false => self.look(p, turn),
+                false => self.queue_cheapest(p, turn),
             }
         }
         if self.surface.around[v as usize].is_empty() {
@@ -166,7 +166,7 @@ impl Builder {
 
     /// A position without triangles is removed immediately; the last of its part keeps its place.
     fn strand(&mut self, p: u32, v: u32) {
-        self.looks[p as usize] += 1;
+        self.evaluations[p as usize] += 1;
         self.order.push(p);
         for &w in &self.wedges[p as usize] {
             self.substitutes[w as usize] = if p == v { w } else { self.wedges[v as usize][0] };

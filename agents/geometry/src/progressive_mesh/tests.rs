@@ -245,7 +245,7 @@ fn many_parts_go_one_by_one_down_to_the_last() {
 }
 
 #[test]
-fn what_is_no_mesh_is_refused_with_its_reason() {
+fn an_invalid_mesh_is_refused_with_its_reason() {
     let vertex = |x: f32| PrimitiveVertex::bare(Vec3::new(x, 0.0, 0.0), Vec3::Z);
     let mesh = |vertices, triangles| PrimitiveMesh { vertices, triangles };
     assert_eq!(ProgressiveMesh::new(&PrimitiveMesh::default()), Err(ProgressiveMeshError::Empty { triangles: 0 }));
@@ -265,7 +265,7 @@ proptest! {
 
     /// Random triangles on few points: branches, fans that cross, faces twice, both ways round.
     #[test]
-    fn any_heap_of_triangles_is_ordered(triangles in proptest::collection::vec([0..12_u32, 0..12, 0..12], 1..40)) {
+    fn any_set_of_triangles_is_ordered(triangles in proptest::collection::vec([0..12_u32, 0..12, 0..12], 1..40)) {
         let place = |i: u32| Vec3::new((i % 3) as f32, (i / 3 % 2) as f32, (i / 6) as f32 + 0.1 * (i % 5) as f32);
         let vertices = (0..12).map(|i| PrimitiveVertex::bare(place(i), Vec3::Z)).collect();
         let mesh = PrimitiveMesh { vertices, triangles };

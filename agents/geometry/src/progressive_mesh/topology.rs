@@ -116,14 +116,14 @@ impl Surface {
         }
     }
 
-    /// Whether `u`, which is not a hub and has these neighbours, may collapse onto `v`; faces may turn until the cosine is `turn`.
-    pub fn verdict(&self, (u, of_u): (u32, &[(u32, u8)]), v: u32, turn: f64) -> Option<Verdict> {
+    /// Whether `u`, which is not a hub and has the neighbours `of_u`, may collapse onto `v`; faces may turn until the cosine is `turn`.
+    pub fn verdict(&self, u: u32, of_u: &[(u32, u8)], v: u32, turn: f64) -> Option<Verdict> {
         let shared = self.sharing(u, v);
         let tiny = self.is_tiny(u, v);
         if shared == 0 || tiny && self.left <= shared as usize {
             return None;
         }
-        let keeps = tiny || self.keeps_kind((u, of_u), v, shared);
+        let keeps = tiny || self.keeps_kind(u, of_u, v, shared);
         let sound = keeps && self.keeps_faces(u, v, if tiny { -2.0 } else { turn });
         sound.then_some(if tiny { Verdict::Vanishes } else { Verdict::Keeps })
     }
@@ -146,7 +146,7 @@ impl Surface {
         part.iter().all(|&p| !self.is_hub(p) && corners(p).all(|q| part.contains(&q)))
     }
 
-    fn keeps_kind(&self, (u, of_u): (u32, &[(u32, u8)]), v: u32, shared: u32) -> bool {
+    fn keeps_kind(&self, u: u32, of_u: &[(u32, u8)], v: u32, shared: u32) -> bool {
         let common = || of_u.iter().filter(|(p, _)| self.sharing(*p, v) > 0).count();
         match (self.standing(u), self.standing(v)) {
             (Standing::Branch, other) => other == Standing::Branch,

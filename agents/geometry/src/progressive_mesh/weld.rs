@@ -17,7 +17,7 @@ pub enum ProgressiveMeshError {
         vertex: usize,
     },
     /// A triangle refers to a vertex that does not exist.
-    #[error("triangle {triangle} names vertex {corner}, but there are only {vertices}")]
+    #[error("triangle {triangle} refers to vertex {corner}, but the mesh has only {vertices} vertices")]
     BadCorner {
         /// Index of the triangle, from 0.
         triangle: usize,
@@ -27,13 +27,13 @@ pub enum ProgressiveMeshError {
         vertices: usize,
     },
     /// No triangle has three corners at different positions.
-    #[error("none of the {triangles} triangles has three different corners")]
+    #[error("none of the {triangles} triangles of the mesh has three different corners")]
     Empty {
         /// Number of triangles.
         triangles: usize,
     },
     /// More vertices or triangles than can be indexed.
-    #[error("{count} vertices or triangles are too many: at most {} can be numbered", ProgressiveMeshError::MOST)]
+    #[error("the mesh has {count} vertices or triangles; at most {} are supported", ProgressiveMeshError::MOST)]
     TooLarge {
         /// Number of vertices or triangles, whichever is greater.
         count: usize,

@@ -1,6 +1,6 @@
 //! The rigid body agent: the sequence of one step.
 //!
-//! In: a span and the surroundings. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
+//! In: a span and the step context. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::borne::Borne;
 use super::company::Company;
@@ -173,7 +173,7 @@ impl RigidBody {
             sunk_m: None,
             drift_m: 0.0,
         };
-        body.put_down();
+        body.publish_initial_support();
         Ok(body)
     }
 
@@ -192,54 +192,58 @@ impl RigidBody {
         self.advance(h, if pulled.is_some() { DVec3::ZERO } else { self.gravity })
     }
 
-    /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `fellows`, by rising ids, are in the same island.
-    pub(super) fn begin(&mut self, around: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
-        self.receive(around, fellows, dt);
-        self.push_alone(around, dt);
-        self.ties.gather(around, &self.company);
+    /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `members`, by rising ids, are in the same island.
+    pub(super) fn begin(&mut self, context: &StepContext<'_>, members: &[AgentId], dt: f64) {
+        self.receive(context, members, dt);
+        self.apply_one_sided_laws(context, dt);
+        self.ties.gather(context, &self.company);
         self.grips.clear();
     }
 
     /// Applies springs and gravity for `h` seconds; returns their resistance to further changes in this part, if there are springs.
     pub(super) fn pull(&mut self, h: f64) -> Result<Option<Mat6>, &'static str> {
-        self.ties.aim(&self.company);
+        self.ties.update_targets(&self.company);
         let under = self.hold.under(h, self.gravity);
         let pulled = linear_spring::pull(&mut self.motion, &self.spread, &mut self.ties.all, &under, &mut self.grips);
         if let Some(pulled) = &pulled {
             self.hold.note(pulled, h);
             let after_s = self.company.after_s;
-            self.ties.give(&mut self.company, (after_s, h));
-            self.ties.go_on(h);
+            self.ties.apply_reactions(&mut self.company, after_s, h);
+            self.ties.advance(h);
             self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
         }
         let resistance = pulled.map(|pulled| pulled.resistance);
-        if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
+        if self.motion.is_sane(&self.spread) {
+            Ok(resistance)
+        } else {
+            Err("a spring moved the body out of the coordinate range")
+        }
     }
 
     /// Books the additional impulses of the springs and pressing tools in the last part, of `h` seconds, that follow from the `change` of
     /// the velocities by the island within it.
-    pub(super) fn give_way(&mut self, change: Twist, h: f64) {
-        linear_spring::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
+    pub(super) fn react_to_change(&mut self, change: Twist, h: f64) {
+        linear_spring::react_to_change(&self.motion, &self.spread, &mut self.ties.all, change, h);
         for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
             grip.force_n += tie.impulse / h;
         }
         let after_s = self.company.after_s;
-        self.ties.give(&mut self.company, (after_s, h));
+        self.ties.apply_reactions(&mut self.company, after_s, h);
         let pushed = leant::give(&self.leant, &mut self.company, change, (after_s, h));
         self.coupled += (self.ties.linked() + pushed) / self.spread.mass_kg;
     }
 
     /// Ends a step in which its island has moved it.
-    pub(super) fn led(&mut self, around: &StepContext<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
+    pub(super) fn finish_island_step(&mut self, context: &StepContext<'_>, dt: f64, touching: bool, sunk_m: f64) {
         (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
         // the island moves it by parts at the speed of their ends
-        self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
+        self.drift_m = drift_of_parts_m(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
         self.steps += 1;
         self.world.moved();
         self.hold.forget();
         self.borne.forget();
-        self.settle(around, dt);
+        self.settle(context, dt);
         self.lies = None; // other bodies of the island hold it too
     }
 
@@ -257,7 +261,7 @@ impl RigidBody {
     }
 
     /// Counts calm time, and stops a body that has been calm long enough.
-    fn rest(&mut self, dt: f64) -> bool {
+    fn update_rest(&mut self, dt: f64) -> bool {
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
         let still = self.motion.velocity == DVec3::ZERO && self.motion.angular == DVec3::ZERO;
         let held = self.touching && self.motion.velocity.length() + swing < CALM_M_S;
@@ -275,11 +279,11 @@ impl RigidBody {
 
     /// Estimates the error of a step of `dt` seconds in so many parts. Flight and impacts are exact; in lasting contact and
     /// under a spring a part's displacement is computed with the speed at its end.
-    fn doubt(&mut self, before: &Motion, touched: bool, (dt, parts): (f64, u32)) {
+    fn estimate_drift(&mut self, before: &Motion, touched: bool, dt: f64, parts: u32) {
         let pulled = !self.ties.is_empty();
         let part_s = dt / f64::from(parts) / if pulled { 1.0 } else { PASSES as f64 };
         self.drift_m = if pulled || (touched && self.touching) {
-            drifting(part_s, self.motion.velocity.distance(before.velocity), dt)
+            drift_of_parts_m(part_s, self.motion.velocity.distance(before.velocity), dt)
         } else {
             0.0
         };
@@ -288,7 +292,7 @@ impl RigidBody {
 
 /// The error over [`DRIFT_S`] of parts of this length that use the speed at their ends, where a step of `dt` seconds changed the
 /// velocity by `gain_m_s`: ½ h Δv each (docs/theory/control.md, eq. 33).
-fn drifting(part_s: f64, gain_m_s: f64, dt: f64) -> f64 {
+fn drift_of_parts_m(part_s: f64, gain_m_s: f64, dt: f64) -> f64 {
     0.5 * part_s * gain_m_s * DRIFT_S / dt
 }
 
@@ -298,16 +302,16 @@ impl Agent for RigidBody {
     }
 
     /// Advances the body by `dt`: parts of at most 1/240 s in contact or under springs, one part in free flight.
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        if self.is_jointed(around.me) {
-            return island::lead(self, dt, around, &mut [], &mut Vec::new());
+        if self.is_jointed(context.me) {
+            return island::lead(self, dt, context, &mut [], &mut Vec::new());
         }
         (self.island, self.sunk_m) = (None, None);
         let (before, touching) = (self.motion, self.touching);
-        self.begin(around, &[], dt_s);
+        self.begin(context, &[], dt_s);
         if !self.hold.is_known() {
-            self.tell(around, dt_s);
+            self.tell(context, dt_s);
         }
         let leans = self.hold.is_known() && !self.ties.is_empty();
         let parts = if leans { 1 } else { self.parts(dt_s) };
@@ -321,41 +325,41 @@ impl Agent for RigidBody {
             }
         }
         self.steps += 1;
-        self.note_borne(around, dt);
-        self.doubt(&before, touching, (dt_s, parts));
-        let at_rest = self.rest(dt_s);
-        self.tell(around, dt_s);
-        self.settle(around, dt_s);
+        self.note_borne(context, dt);
+        self.estimate_drift(&before, touching, dt_s, parts);
+        let at_rest = self.update_rest(dt_s);
+        self.tell(context, dt_s);
+        self.settle(context, dt_s);
         Ok(StepReport { work: 1.0, substeps: parts, at_rest })
     }
 
     /// Publishes how springs hold it before it has moved.
-    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
-        if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
-            self.company.gather(around, (&self.world.mover, &self.motion), &[]);
-            self.ties.gather(around, &self.company);
-            self.tell(around, dt_s);
+    fn observe(&mut self, dt: SimSpan, context: &StepContext<'_>) {
+        if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(context.me)) {
+            self.company.gather(context, (&self.world.mover, &self.motion), &[]);
+            self.ties.gather(context, &self.company);
+            self.tell(context, dt_s);
             self.company.dismiss();
         }
     }
 
     /// Shortens the step where predictions fail: neither a deformable nor this body can predict how the deformable squeezes it on a static
     /// solid. Nor can a rigid peer predict the ground's reaction to its impacts on this body, nor this body the effect of a tool's drive.
-    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
+    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         // a body caught in this step may fall in the next
         let soon_s = 2.0 * dt.as_secs_f64();
         let lands = || self.world.free_time(&self.motion, fall, soon_s) < soon_s;
-        let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
+        let owners = context.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
         let squeezes = |n: &Neighbour| bends(n) && (owners > 1 || (!self.stays() && lands()));
         let strikes = |n: &Neighbour| matches!(n.snapshot.body, Body::Rigid(_)) && lands();
-        let driven = |n: &Neighbour| is_driven(n, around);
+        let driven = |n: &Neighbour| is_driven(n, context);
         let wild = |n: &Neighbour| driven(n) || (!n.owned && (squeezes(n) || strikes(n)));
-        let part = beside::longest_step(dt, around, || self.bounds(), wild);
-        let part = beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S));
+        let part = beside::longest_step(dt, context, || self.bounds(), wild);
+        let part = beside::no_longer(part, context, || self.bounds(), |n| driven(n).then_some(PART_MAX_S));
         crowd::crowded(
             part,
-            around,
+            context,
             || self.bounds(),
             crowd::Member {
                 bends: false,
@@ -390,11 +394,11 @@ impl Agent for RigidBody {
     fn step_island(
         &mut self,
         dt: SimSpan,
-        around: &StepContext<'_>,
+        context: &StepContext<'_>,
         others: &mut [IslandMember<'_>],
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
-        island::lead(self, dt, around, others, apart)
+        island::lead(self, dt, context, others, apart)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {

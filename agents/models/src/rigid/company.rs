@@ -4,7 +4,7 @@
 //! advancement, MIR96, in the frame of the other); who touched whom for how long. Never here: what happens at a touch
 //! ([`super::meeting`]), fixed solids ([`crate::rigid::conservative_advancement`]).
 
-use super::conservative_advancement::{Ahead, Approach, Fall, MovingShape, first_root};
+use super::conservative_advancement::{Approach, Fall, ImpactTimes, MovingShape, first_root};
 use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
@@ -191,9 +191,9 @@ impl Company {
                 let motion = Motion { velocity, ..*motion };
                 let coarse = guest.approach_m_s(velocity) * step_s > COARSE_SHARE * mover.radius_m.min(guest.radius_m);
                 coarse && {
-                    let (free_s, closing) =
+                    let Approach { free_s, closing_m_s } =
                         guest.approach(&placed(form, &motion), (mover, &motion, fall), soon_s, room);
-                    free_s < soon_s && closing > 0.0
+                    free_s < soon_s && closing_m_s > 0.0
                 }
             };
             if stops.into_iter().any(|(stops, velocity)| stops && meets(velocity, room)) {
@@ -280,12 +280,12 @@ impl Company {
     /// Who lies ahead of a flight of `horizon` seconds.
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.
-    pub(super) fn ahead(&mut self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
+    pub(super) fn ahead(&mut self, mover: &MovingShape, motion: &Motion, fall: Fall, horizon: f64) -> ImpactTimes {
         let Self { guests, count, room, form, span, .. } = self;
-        let (me, mut ahead) = (placed(form, motion), Ahead::clear(horizon));
+        let (me, mut ahead) = (placed(form, motion), ImpactTimes::clear(horizon));
         for guest in guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain) {
             let approach = guest.approach(&me, (mover, motion, fall), horizon, room);
-            ahead.add(approach, guest.restitution_at(approach.1, span));
+            ahead.add(approach, guest.restitution_at(approach.closing_m_s, span));
         }
         ahead
     }
@@ -457,7 +457,7 @@ impl Guest {
         horizon: f64,
         room: &mut NarrowPhaseScratch,
     ) -> Approach {
-        let Some(it) = self.other.placed() else { return (horizon, 0.0) };
+        let Some(it) = self.other.placed() else { return Approach::none(horizon) };
         let slots = self.other.velocities();
         let (velocity, pull) = (motion.velocity - slots[0], fall.gravity - self.other.acceleration());
         let swing = fall.spin_max * mover.swing_m + slots[1].length() * self.swing_m;
@@ -465,15 +465,15 @@ impl Guest {
         if let ShapePose::Solid { position, .. } = it.view
             && position.distance(motion.position) > mover.radius_m + self.radius_m + reach + self.skin_m
         {
-            return (horizon, 0.0);
+            return Approach::none(horizon);
         }
-        let Some((normal, gap_m)) = gap(me, &it, reach + self.skin_m, room) else { return (horizon, 0.0) };
-        let closing = -normal.dot(velocity);
+        let Some((normal, gap_m)) = gap(me, &it, reach + self.skin_m, room) else { return Approach::none(horizon) };
+        let closing_m_s = -normal.dot(velocity);
         let (a, b) = if self.convex && mover.is_convex() {
-            (swing + closing, (-normal.dot(pull)).max(0.0))
+            (swing + closing_m_s, (-normal.dot(pull)).max(0.0))
         } else {
             (swing + velocity.length(), pull.length())
         };
-        (first_root(a, b, gap_m - self.skin_m).min(horizon), closing)
+        Approach { free_s: first_root(a, b, gap_m - self.skin_m).min(horizon), closing_m_s }
     }
 }

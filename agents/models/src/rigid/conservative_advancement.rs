@@ -40,27 +40,41 @@ pub(super) struct MovingShape {
 
 /// Contacts ahead of a flight: seconds of it that are certainly free.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ahead {
+pub(super) struct ImpactTimes {
     /// Time until contact with a solid that does not bounce, or that hardly approaches.
     pub near_s: f64,
     /// Time until contact with an approaching solid that bounces.
     pub coming_s: f64,
 }
 
-/// An approaching solid: seconds of free flight until it may be touched, and its approach speed along the normal, m/s.
-pub(super) type Approach = (f64, f64);
+/// An approaching solid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Approach {
+    /// Free flight until it may be touched, seconds.
+    pub free_s: f64,
+    /// Approach speed along the normal, m/s.
+    pub closing_m_s: f64,
+}
+
+impl Approach {
+    /// No contact for `horizon` seconds.
+    pub(super) const fn none(horizon: f64) -> Self {
+        Self { free_s: horizon, closing_m_s: 0.0 }
+    }
+}
 
 /// Contacts that approach more slowly than this do not bounce, m/s: off the ground the body would be back within 4 ms.
 const BOUNCE_M_S: f64 = 0.02;
 
-impl Ahead {
+impl ImpactTimes {
     /// No contact for `horizon` seconds.
     pub(super) const fn clear(horizon: f64) -> Self {
         Self { near_s: horizon, coming_s: horizon }
     }
 
     /// Adds a solid whose contact with the body has this restitution.
-    pub(super) fn add(&mut self, (free_s, closing_m_s): Approach, restitution: f64) {
+    pub(super) fn add(&mut self, approach: Approach, restitution: f64) {
+        let Approach { free_s, closing_m_s } = approach;
         let ahead = if restitution > 0.0 && closing_m_s > BOUNCE_M_S { &mut self.coming_s } else { &mut self.near_s };
         *ahead = ahead.min(free_s);
     }
@@ -168,16 +182,16 @@ impl Fixed {
         if self.bounds.is_some_and(|(low, high)| {
             motion.position.distance(motion.position.clamp(low, high)) > mover.radius_m + reach
         }) {
-            return (horizon, 0.0);
+            return Approach::none(horizon);
         }
-        let Some((normal, gap)) = self.gap(mover, motion, reach) else { return (horizon, 0.0) };
-        let (swing, closing) = (fall.spin_max * mover.swing_m, -normal.dot(motion.velocity));
+        let Some((normal, gap)) = self.gap(mover, motion, reach) else { return Approach::none(horizon) };
+        let (swing, closing_m_s) = (fall.spin_max * mover.swing_m, -normal.dot(motion.velocity));
         let (a, b) = if self.convex && mover.convex {
-            (swing + closing, (-normal.dot(fall.gravity)).max(0.0))
+            (swing + closing_m_s, (-normal.dot(fall.gravity)).max(0.0))
         } else {
             (swing + motion.velocity.length(), fall.gravity.length())
         };
-        (first_root(a, b, gap - mover.skin_m()).min(horizon), closing)
+        Approach { free_s: first_root(a, b, gap - mover.skin_m()).min(horizon), closing_m_s }
     }
 
     /// Height of the body's lowest point above this plane, metres.
@@ -288,7 +302,7 @@ mod tests {
             };
             motion.set_spin(&body, DVec3::new(libm::cos(seed), libm::sin(2.0 * seed), 1.0) * 8.0);
             let fall = Fall { gravity, spin_max: motion.spin_max(&body) };
-            let (t, _) = floor.approach(&mover, &motion, fall, 10.0);
+            let t = floor.approach(&mover, &motion, fall, 10.0).free_s;
             motion.fly(&body, gravity, t);
             let gap = floor.gap(&mover, &motion, 100.0).unwrap().1;
             assert!(gap > 0.0, "case {i}: {gap:e} m inside after {t} s"); // the skin is 4e-5 m

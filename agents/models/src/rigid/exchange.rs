@@ -30,19 +30,19 @@ impl RigidBody {
     /// Begins a step of `dt` seconds: takes the impulses of the owners of its contacts, and brings each agent that it meets to its
     /// own time.
     ///
-    /// `fellows`, by rising ids, are in the same island as this body: contacts between them are not coupled.
-    pub fn receive(&mut self, around: &StepContext<'_>, fellows: &[AgentId], dt: f64) {
+    /// `members`, by rising ids, are in the same island as this body: contacts between them are not coupled.
+    pub fn receive(&mut self, context: &StepContext<'_>, members: &[AgentId], dt: f64) {
         let before = [self.motion.velocity, self.motion.spin(&self.spread)];
-        self.company.exchange.open(around);
+        self.company.exchange.open(context);
         self.company.pairs.open();
-        if fellows.is_empty() {
+        if members.is_empty() {
             self.within = None;
         }
         self.late = None;
         if self.hold.is_known() {
-            self.follow(around, dt);
+            self.follow(context, dt);
         } else {
-            self.take(around, dt);
+            self.take_impulses(context, dt);
         }
         self.received_before = self.received[0];
         self.received = [self.motion.velocity - before[0], self.motion.spin(&self.spread) - before[1]];
@@ -50,18 +50,18 @@ impl RigidBody {
         let given = self.received[0] != DVec3::ZERO;
         let held = given || self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
         self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
-        self.company.gather(around, (&self.world.mover, &self.motion), fellows);
+        self.company.gather(context, (&self.world.mover, &self.motion), members);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
         self.begun_at = (self.motion.position, self.motion.angular);
-        self.held_up = !fellows.is_empty();
+        self.held_up = !members.is_empty();
     }
 
     /// Takes owners' impulses, including those that act in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
-    fn take(&mut self, around: &StepContext<'_>, dt: f64) {
-        let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
+    fn take_impulses(&mut self, context: &StepContext<'_>, dt: f64) {
+        let until = context.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
         let mut taken = None;
-        let unread_s = company.exchange.take(around, until, |_, _, sum, way| {
+        let unread_s = company.exchange.take(context, until, |_, _, sum, way| {
             motion.velocity += sum.linear / spread.mass_kg;
             motion.angular += sum.angular;
             let (given, carried) = taken.unwrap_or((Impulse::ZERO, Impulse::ZERO));
@@ -69,11 +69,11 @@ impl RigidBody {
         });
         if let Some((given, carried)) = taken {
             let since_s = carried.linear.length() / given.linear.length();
-            let [left, carried] = self.spare([given, carried], (around.time, unread_s));
+            let [left, carried] = self.replace_static_impulses([given, carried], (context.time, unread_s));
             // impulses that the ground carries displace nothing, and impulses still to act lift nothing off it
             let carried = match self.stand {
                 Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
-                Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
+                Some(stand) => self.lift_off(&stand, left, carried, since_s.min(self.stood_s)),
                 None => self.hold(carried),
             };
             if self.within.is_some() {
@@ -86,7 +86,7 @@ impl RigidBody {
     }
 
     /// Moves the body by a displacement that its island computed, metres and radians.
-    pub(super) fn go_by(&mut self, [way, turn]: Twist) {
+    pub(super) fn displace_by(&mut self, [way, turn]: Twist) {
         self.motion.position += way;
         self.motion.rotation = (DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
         self.world.moved();
@@ -94,7 +94,7 @@ impl RigidBody {
 
     /// Removes the weight that the ground carried from a body that was lifted off it `since_s` seconds ago by the remainder of an
     /// impulse, and the corresponding displacement (eq. 7f).
-    fn rise(&mut self, stand: &Stand, (left, carried): (Impulse, Impulse), since_s: f64) -> Impulse {
+    fn lift_off(&mut self, stand: &Stand, left: Impulse, carried: Impulse, since_s: f64) -> Impulse {
         let mass = self.spread.mass_kg;
         let all = [left.linear, carried.linear].map(|impulse| impulse / mass);
         let [change, way] = stand.lifted(all, if since_s.is_finite() { since_s } else { 0.0 });
@@ -104,7 +104,7 @@ impl RigidBody {
 
     /// Takes back the impulses that static solids gave in place of impulses that came late, and the corresponding displacement; returns the
     /// remainder of both. They acted at most so many seconds before now.
-    fn spare(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
+    fn replace_static_impulses(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
         let inverse = self.motion.inverse_inertia(&self.spread);
         let [back, way] = self.borne.in_place_of([given, carried], since, inverse);
         self.motion.velocity -= back.linear / self.spread.mass_kg;
@@ -113,13 +113,13 @@ impl RigidBody {
     }
 
     /// Applies contact laws that act on one side alone (penalty, wave variables), for a step of `dt` seconds.
-    pub fn push_alone(&mut self, around: &StepContext<'_>, dt: f64) {
+    pub fn apply_one_sided_laws(&mut self, context: &StepContext<'_>, dt: f64) {
         let Self { motion, spread, company, sided, gravity, stand, .. } = self;
         if company.guests().is_empty() {
             return;
         }
         let before = motion.velocity;
-        sided.act((motion, spread), company, around, (dt, *gravity, *stand));
+        sided.act((motion, spread), company, context, (dt, *gravity, *stand));
         if self.motion.velocity != before {
             self.coupled += self.motion.velocity - before;
             self.world.moved();
@@ -148,52 +148,52 @@ impl RigidBody {
     }
 
     /// Ends a step of `dt` seconds: books the impulses given and computes the acceleration to publish.
-    pub fn settle(&mut self, around: &StepContext<'_>, dt: f64) {
+    pub fn settle(&mut self, context: &StepContext<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
-        let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
+        let seen = context.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
         let stood = self.stand.is_some();
         (self.stand, self.tips) = if seen { self.footing() } else { (None, None) };
         self.lately.pass(self.tips.is_some(), dt);
         self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
-        self.bear();
-        self.lies = self.upheld(around);
+        self.remove_supported_acceleration();
+        self.lies = self.supporting_agent(context);
         if self.lies.is_some() {
-            let pressing = around.neighbours.iter().filter(|n| may_press(n));
+            let pressing = context.neighbours.iter().filter(|n| may_press(n));
             pressing.for_each(|n| self.company.exchange.expect(n.id));
         }
-        self.company.knock(around, &self.world.mover, &self.motion, dt);
+        self.company.knock(context, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received[0] != DVec3::ZERO;
-        let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
-        let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || told();
-        self.lands_s = if seen_rigid(around) && !self.held_up { self.land() } else { None };
+        let bonded = || context.neighbours.iter().any(|n| n.snapshot.bonds.contains(&context.me));
+        let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || bonded();
+        self.lands_s = if has_rigid_neighbour(context) && !self.held_up { self.landing_time_s() } else { None };
         let flight = (&self.world.mover, &self.motion);
         let company = Held { mass_kg: self.spread.mass_kg, now: held || stands, lands_s: self.lands_s };
         self.company.foresee(flight, (self.gravity, dt), &company);
-        self.company.settle(around, dt, (self.gravity, held));
+        self.company.settle(context, dt, (self.gravity, held));
     }
 
     /// Sets the published state of a body that has not stepped yet: it is supported where it was placed, and does not fall into
     /// the ground.
-    pub(super) fn put_down(&mut self) {
+    pub(super) fn publish_initial_support(&mut self) {
         (self.stand, self.tips) = self.footing();
-        self.bear();
+        self.remove_supported_acceleration();
     }
 
     /// Removes the acceleration into its support, also where it has only just come down on it.
-    fn bear(&mut self) {
+    fn remove_supported_acceleration(&mut self) {
         if let Some(Stand { normal, .. }) = self.stand {
             self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
         }
     }
 
     /// The agent that it rests on, where exactly one neighbour reports that it supports the body on something fixed (eq. 7l).
-    fn upheld(&self, around: &StepContext<'_>) -> Option<LiesOn> {
+    fn supporting_agent(&self, context: &StepContext<'_>) -> Option<LiesOn> {
         if self.hold.is_known() || !self.ties.is_empty() || self.island.is_some() {
             return None;
         }
-        let mut all = around.neighbours.iter().filter_map(|n| {
-            let upheld = n.snapshot.pairs.iter().find(|pair| pair.with == around.me)?.bears?;
+        let mut all = context.neighbours.iter().filter_map(|n| {
+            let upheld = n.snapshot.pairs.iter().find(|pair| pair.with == context.me)?.bears?;
             Some(LiesOn { on: n.id, at: n.snapshot.time, step_s: n.step_s, upheld })
         });
         let lies = all.next().filter(|_| all.next().is_none())?;
@@ -204,14 +204,14 @@ impl RigidBody {
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
         // two supporting agents divide the body between them (eq. 6c)
         let lifts = |n: &Neighbour| {
-            let given = n.snapshot.given.iter().find(|ledger| ledger.with == around.me);
+            let given = n.snapshot.given.iter().find(|ledger| ledger.with == context.me);
             n.id != lies.on && given.is_some_and(|ledger| ledger.force.linear.dot(stand.normal) > 0.0)
         };
-        (along.length() + swing < STANDING_M_S && !around.neighbours.iter().any(lifts)).then_some(lies)
+        (along.length() + swing < STANDING_M_S && !context.neighbours.iter().any(lifts)).then_some(lies)
     }
 
     /// Time of free flight until a static solid may be in its way, seconds, where that is soon.
-    fn land(&self) -> Option<f64> {
+    fn landing_time_s(&self) -> Option<f64> {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         let free_s = self.world.free_time(&self.motion, fall, LANDS_S);
         (free_s < LANDS_S).then_some(free_s)
@@ -260,7 +260,7 @@ impl RigidBody {
     }
 
     /// Keeps only a `share` of the displacement by late impulses since the state `before`.
-    pub(super) fn go_part(&mut self, before: &Motion, share: f64) {
+    pub(super) fn scale_displacement(&mut self, before: &Motion, share: f64) {
         let Self { motion, gravity, .. } = self;
         let way = motion.position - before.position;
         motion.position = before.position + way * share;
@@ -312,6 +312,6 @@ impl RigidBody {
 }
 
 /// Whether a rigid neighbour may touch this body.
-fn seen_rigid(around: &StepContext<'_>) -> bool {
-    around.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
+fn has_rigid_neighbour(context: &StepContext<'_>) -> bool {
+    context.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
 }

@@ -5,7 +5,8 @@
 //! Theory: docs/theory/coupling.md, eq. 4c and 7b–7d.
 
 use super::RigidBody;
-use super::linear_spring::{Pulled, Under, lean};
+use super::linear_spring::{PartLoads, SpringResult, spring_state};
+use super::motion::VelocityStep;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Law;
 use metachron_contact::StepContext;
@@ -41,13 +42,14 @@ impl Hold {
     }
 
     /// What acts over a part of `h` seconds beside gravity and springs.
-    pub(super) fn under(&self, h: f64, gravity: DVec3) -> Under {
+    pub(super) fn under(&self, h: f64, gravity: DVec3) -> PartLoads {
         let span_s = self.known.map_or(0.0, |(sprung, _)| sprung.span_s);
-        Under { h, gravity, lasting: self.lasting.map(|force| force * h), bent: (self.bent, span_s) }
+        let received = VelocityStep { change: self.bent, span_s };
+        PartLoads { h, gravity, lasting: self.lasting.map(|force| force * h), received }
     }
 
     /// Notes what springs, gravity and what lasts added to the velocities in `h` seconds, and what the last of these did.
-    pub(super) fn note(&mut self, Pulled { change, lasting, .. }: &Pulled, h: f64) {
+    pub(super) fn note(&mut self, SpringResult { change, lasting, .. }: &SpringResult, h: f64) {
         self.past = [0, 1].map(|i| (change[i] - lasting[i]) / h);
     }
 }
@@ -100,8 +102,8 @@ impl RigidBody {
         if !seen || self.touching || self.ties.is_empty() || self.ties.all.iter().any(|tie| tie.yields != DMat3::ZERO) {
             return self.hold.forget();
         }
-        self.ties.aim(&self.company);
-        let sprung = lean(&self.motion, &self.spread, &self.ties.all, self.gravity);
+        self.ties.update_targets(&self.company);
+        let sprung = spring_state(&self.motion, &self.spread, &self.ties.all, self.gravity);
         let sprung = Sprung { past: self.hold.past, span_s: dt, ..sprung };
         let (linear_per_kg, angular_per_kg_m2) = self.motion.inverse_inertia(&self.spread);
         let answer = sprung.response(InverseMass { linear_per_kg, angular_per_kg_m2 }, dt);

@@ -66,7 +66,7 @@ pub enum JointKind {
 #[non_exhaustive]
 pub enum JointError {
     /// A body cannot be jointed to itself.
-    #[error("a joint needs two bodies, but both its ends are the same one")]
+    #[error("a joint needs two different bodies; both of its ends are the same body")]
     SameBody,
     /// A number is outside its range.
     #[error("the joint's {what} is {value}; it must be {wanted}")]
@@ -79,13 +79,13 @@ pub enum JointError {
         wanted: &'static str,
     },
     /// A vector is not finite, or an axis has no direction.
-    #[error("the joint's {what} is not finite, or has no direction")]
+    #[error("the joint's {what} must be finite and of a length above zero")]
     BadVector {
         /// Which one.
         what: &'static str,
     },
     /// A range that ends before it starts.
-    #[error("the joint's range ends at {high}, before it starts at {low}")]
+    #[error("the joint's range is {low} to {high}; its upper limit must not be below its lower limit")]
     EmptyRange {
         /// Where it starts.
         low: f64,
@@ -93,7 +93,7 @@ pub enum JointError {
         high: f64,
     },
     /// The bodies start where the joint cannot hold them.
-    #[error("the bodies start {apart_m} m away from where the joint can hold them; at most {limit_m} m are taken")]
+    #[error("the bodies start with the joint violated by {apart_m} m; at most {limit_m} m is accepted")]
     Apart {
         /// How far, metres.
         apart_m: f64,
@@ -135,11 +135,11 @@ impl Joint {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
             JointKind::Revolute { axis, range_rad } => {
                 direction(axis)?;
-                range_rad.map_or(Ok(()), |r| range("range of turning", r, std::f64::consts::PI, "between −π and π rad"))
+                range_rad.map_or(Ok(()), |r| range("angle range", r, std::f64::consts::PI, "between −π and π rad"))
             }
             JointKind::Prismatic { axis, range_m } => {
                 direction(axis)?;
-                range_m.map_or(Ok(()), |r| range("range of sliding", r, NUMBER_MAX, "at most 1e9 m"))
+                range_m.map_or(Ok(()), |r| range("travel range", r, NUMBER_MAX, "at most 1e9 m"))
             }
             JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
                 number("stiffness", stiffness_n_m, 0.0)?;

@@ -9,7 +9,7 @@
 //! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
 
 use super::mass_properties::MassDistribution;
-use super::motion::Motion;
+use super::motion::{Motion, VelocityStep};
 use super::orientation_spring::OrientationSpring;
 use glam::{DMat3, DVec3};
 use metachron_contact::AnchorSpring;
@@ -33,7 +33,7 @@ pub(super) struct LinearSpring {
 
 impl LinearSpring {
     /// A spring whose other end is driven.
-    pub(super) const fn led(pull: AnchorSpring) -> Self {
+    pub(super) const fn driven(pull: AnchorSpring) -> Self {
         Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
     }
 
@@ -58,20 +58,19 @@ impl LinearSpring {
 
 /// A part of a step under springs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Under {
+pub(super) struct PartLoads {
     /// Its length, seconds.
     pub h: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// The impulse of other loads that act evenly over the part, N·s and N·m·s.
     pub lasting: Twist,
-    /// Velocity changes by impulses received at the part's start, to which the springs reacted over so many seconds: this
-    /// reaction is counted in the impulses of the springs.
-    pub bent: (Twist, f64),
+    /// The change by impulses received at the part's start: the reaction of the springs to it is counted in their impulses.
+    pub received: VelocityStep,
 }
 
 /// Result of the springs in a part.
-pub(super) struct Pulled {
+pub(super) struct SpringResult {
     /// The change of velocity and spin.
     pub change: Twist,
     /// The part of it that is due to the lasting loads.
@@ -88,9 +87,9 @@ pub(super) fn pull(
     motion: &mut Motion,
     body: &MassDistribution,
     ties: &mut [LinearSpring],
-    under: &Under,
+    under: &PartLoads,
     grips: &mut Vec<Grip>,
-) -> Option<Pulled> {
+) -> Option<SpringResult> {
     if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
         return None;
     }
@@ -101,7 +100,7 @@ pub(super) fn pull(
         let forces = (pass > 0).then_some(change);
         system = System::free(motion, body, under);
         for tie in ties.iter() {
-            system.add(tie, (motion, body), h, forces);
+            system.add(tie, motion, body, forces);
         }
         change = system.matrix.solve(system.right);
     }
@@ -109,9 +108,10 @@ pub(super) fn pull(
     let spin = motion.spin(body);
     for tie in ties.iter_mut() {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
-        tie.impulse = spring.after(change, r) - spring.bent(tie, r, under.bent);
+        tie.impulse = spring.after(change, r) - spring.reaction(tie, r, &under.received);
         if let Some(turn) = &mut tie.turn {
-            turn.give((motion.rotation, spin), (change[1], h), under.bent);
+            let steady = turn.impulse_at(motion.rotation, spin, h);
+            turn.store_impulse(steady, change[1], h, &under.received);
         }
         grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
@@ -120,11 +120,17 @@ pub(super) fn pull(
     let lasting = system.matrix.solve(under.lasting);
     let mut resistance = system.matrix;
     resistance.add(&System::free(motion, body, under).matrix, -1.0);
-    Some(Pulled { change, lasting, resistance })
+    Some(SpringResult { change, lasting, resistance })
 }
 
 /// Writes the change of each spring's impulse due to a further `change` of the velocities in a part of `h` seconds.
-pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [LinearSpring], (change, h): (Twist, f64)) {
+pub(super) fn react_to_change(
+    motion: &Motion,
+    body: &MassDistribution,
+    ties: &mut [LinearSpring],
+    change: Twist,
+    h: f64,
+) {
     for tie in ties {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
         tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
@@ -136,7 +142,7 @@ pub(super) fn give_way(motion: &Motion, body: &MassDistribution, ties: &mut [Lin
 
 /// The force on the body in this state of springs whose far ends are driven, and its derivatives as the body moves
 /// (docs/theory/coupling.md, eq. 7b).
-pub(super) fn lean(motion: &Motion, body: &MassDistribution, ties: &[LinearSpring], gravity: DVec3) -> Sprung {
+pub(super) fn spring_state(motion: &Motion, body: &MassDistribution, ties: &[LinearSpring], gravity: DVec3) -> Sprung {
     let mut all = Sprung {
         force: [gravity * body.mass_kg, DVec3::ZERO],
         rising: [DVec3::ZERO; 2],
@@ -162,7 +168,7 @@ pub(super) fn lean(motion: &Motion, body: &MassDistribution, ties: &[LinearSprin
         all.stiffness.add_turning(r, r.dot(force).max(0.0));
         all.damping.add_point(r, pass * tie.pull.damping_n_s_m);
         if let Some(turn) = &tie.turn {
-            turn.lean(motion.rotation, spin, &mut all);
+            turn.add_to(motion.rotation, spin, &mut all);
         }
     }
     all
@@ -203,31 +209,35 @@ impl Spring {
         self.impulse - self.resistance * (linear + angular.cross(r))
     }
 
-    /// The impulse by which a spring reacted over `span_s` seconds to a change of the body's velocities.
-    fn bent(&self, tie: &LinearSpring, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
+    /// The impulse by which a spring reacted to a sudden change of the body's velocities.
+    fn reaction(&self, tie: &LinearSpring, r: DVec3, step: &VelocityStep) -> DVec3 {
+        let VelocityStep { change: [linear, angular], span_s } = *step;
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
     }
 }
 
-/// A symmetric positive system for the change of (v, ω).
+/// A symmetric positive system for the change of (v, ω) over a part of a step.
 struct System {
+    /// Length of the part, seconds.
+    h: f64,
     matrix: Mat6,
     right: Twist,
 }
 
 impl System {
     /// A body without springs.
-    fn free(motion: &Motion, body: &MassDistribution, under: &Under) -> Self {
+    fn free(motion: &Motion, body: &MassDistribution, under: &PartLoads) -> Self {
         let columns = DVec3::AXES.map(|axis| motion.inertia_times(body, axis));
         let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
         let [linear, angular] = under.lasting;
         let right = [under.gravity * (under.h * body.mass_kg) + linear, angular];
-        Self { matrix: Mat6::mass(body.mass_kg, inertia), right }
+        Self { h: under.h, matrix: Mat6::mass(body.mass_kg, inertia), right }
     }
 
     /// Adds a spring; with the velocity change of a `first` pass also the stiffness of its force against rotation across its arm.
-    fn add(&mut self, tie: &LinearSpring, (motion, body): (&Motion, &MassDistribution), h: f64, first: Option<Twist>) {
+    fn add(&mut self, tie: &LinearSpring, motion: &Motion, body: &MassDistribution, first: Option<Twist>) {
+        let h = self.h;
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
         self.matrix.add_point(r, spring.resistance);
         self.right[0] += spring.impulse;

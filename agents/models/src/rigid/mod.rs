@@ -1,6 +1,6 @@
 //! Rigid body agents: exact flight in double precision, contacts in a rapier3d world per body.
 //!
-//! In: a [`RigidSpec`], steps, surroundings. Out: the body's motion about its centre of mass, and the impulses it gives.
+//! In: a [`RigidSpec`], steps with their context. Out: the body's motion about its centre of mass, and the impulses it gives.
 //! Never here: the state of another agent; a body meets peers as they were last published (docs/theory/coupling.md), except
 //! those in its island (`island/`).
 //!

@@ -8,6 +8,7 @@
 
 use super::mass_properties::MassDistribution;
 use glam::{DMat3, DQuat, DVec3};
+use metachron_core::Twist;
 
 /// Position and motion of a rigid body, about its centre of mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +21,15 @@ pub(super) struct Motion {
     pub velocity: DVec3,
     /// Angular momentum about the centre of mass, world axes, kg·m²/s.
     pub angular: DVec3,
+}
+
+/// A sudden change of the velocities, and for how long springs reacted to it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct VelocityStep {
+    /// The change of velocity and spin, m/s and rad/s.
+    pub change: Twist,
+    /// How long springs reacted to it, seconds.
+    pub span_s: f64,
 }
 
 /// A part of a flight turns the body by at most this, radians: fourth order then leaves about 1e-6 rad a turn.

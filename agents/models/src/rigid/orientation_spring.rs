@@ -4,10 +4,11 @@
 //! resists a change of the spin. Never here: the point that is held, and how the system is solved ([`crate::rigid::linear_spring`]).
 //! Theory: docs/theory/coupling.md, eq. 9b.
 
+use super::motion::VelocityStep;
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
+use metachron_core::Sprung;
 use metachron_core::{GraspOrientation, ToolState};
-use metachron_core::{Sprung, Twist};
 
 /// A torsional spring whose far end is driven.
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +27,7 @@ pub(super) struct OrientationSpring {
 
 impl OrientationSpring {
     /// The grasp of `tool`, whose state is `age_s` seconds old, on a body that it pulls by `pull`.
-    pub(super) fn of(tool: &ToolState, clasp: &GraspOrientation, (pull, age_s): (&AnchorSpring, f64)) -> Self {
+    pub(super) fn of(tool: &ToolState, clasp: &GraspOrientation, pull: &AnchorSpring, age_s: f64) -> Self {
         let square = clasp.arm_m * clasp.arm_m;
         let mut turn = Self {
             target: tool.rotation * clasp.rotation,
@@ -35,12 +36,12 @@ impl OrientationSpring {
             damping: pull.damping_n_s_m * square,
             impulse: DVec3::ZERO,
         };
-        turn.go_on(age_s);
+        turn.advance(age_s);
         turn
     }
 
     /// Advances the jaws by `h` seconds.
-    pub(super) fn go_on(&mut self, h: f64) {
+    pub(super) fn advance(&mut self, h: f64) {
         if self.spin != DVec3::ZERO {
             self.target = (DQuat::from_scaled_axis(self.spin * h) * self.target).normalize();
         }
@@ -62,16 +63,15 @@ impl OrientationSpring {
         h * (h * self.stiffness + self.damping)
     }
 
-    /// Stores its impulse over `h` seconds on a body in this state whose spin changes by `change`; `bent` holds the velocity changes by
-    /// impulses received at the start and the time over which springs reacted to them.
-    pub(super) fn give(&mut self, (rotation, spin): (DQuat, DVec3), (change, h): (DVec3, f64), bent: (Twist, f64)) {
-        let ([_, bent], span_s) = bent;
-        self.impulse =
-            self.impulse_at(rotation, spin, h) - change * self.resistance(h) - bent * self.resistance(span_s);
+    /// Stores its impulse over `h` seconds on a body whose spin changes by `change`: `steady` is the impulse without that change
+    /// ([`Self::impulse_at`]), `received` the change by impulses at the start.
+    pub(super) fn store_impulse(&mut self, steady: DVec3, change: DVec3, h: f64, received: &VelocityStep) {
+        let VelocityStep { change: [_, bent], span_s } = *received;
+        self.impulse = steady - change * self.resistance(h) - bent * self.resistance(span_s);
     }
 
     /// Adds its torque on a body in this state, and the derivatives of it, to the published sum of springs.
-    pub(super) fn lean(&self, rotation: DQuat, spin: DVec3, all: &mut Sprung) {
+    pub(super) fn add_to(&self, rotation: DQuat, spin: DVec3, all: &mut Sprung) {
         all.force[1] += self.away(rotation) * self.stiffness + (self.spin - spin) * self.damping;
         all.rising[1] += self.spin * self.stiffness;
         all.stiffness.add_turning(DVec3::ZERO, self.stiffness);

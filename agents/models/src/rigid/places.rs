@@ -13,7 +13,7 @@ use metachron_contact::tank::RESERVE_M_S;
 use metachron_contact::{Contact, PUSH_OUT_SHARE};
 use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{Place, Touch};
+use metachron_geometry::{ContactSide, Place, Touch};
 
 /// A contact farther than this from closing within the part is left out, metres.
 const SLACK_M: f64 = 1e-5;
@@ -130,9 +130,9 @@ impl Meeting {
         for touch in &self.touches {
             let mut slots = ContactJacobian::default();
             let (mine, theirs) = halfway(touch);
-            mine.join(&mut slots, 0, me.motion.position, (-touch.normal, 1.0));
+            mine.join(&mut slots, 0, me.motion.position, ContactSide::first(touch.normal));
             if let Some((i, guest)) = guest {
-                guest.other.join(&mut slots, self.bases[i], &theirs, (touch.normal, -1.0));
+                guest.other.join(&mut slots, self.bases[i], &theirs, ContactSide::second(touch.normal));
             }
             let approach_m_s = -slots.velocity(&self.velocities).dot(touch.normal);
             let rebound = restitution(approach_m_s) * approach_m_s.max(0.0);

@@ -14,7 +14,7 @@ use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, SimTime, Stand};
 use metachron_core::{ContactJacobian, Impulse, PairKind};
 use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{Place, Touch};
+use metachron_geometry::{ContactSide, Place, Touch};
 
 /// What a body keeps of the laws by which it acts on itself.
 #[derive(Default)]
@@ -156,7 +156,7 @@ impl Sided {
         }
         let normal = normal.try_normalize()?;
         let mut slots = ContactJacobian::default();
-        Place::Point(point).join(&mut slots, 0, motion.position, (-normal, 1.0));
+        Place::Point(point).join(&mut slots, 0, motion.position, ContactSide::first(normal));
         Some(Pressed { slots, normal, velocity, depth_m, places })
     }
 
@@ -254,13 +254,13 @@ impl Span {
 /// The velocities that a place joins: the body's slots, then the guest's.
 fn slots_of(touch: &Touch, motion: &Motion, guest: &Guest) -> ContactJacobian {
     let mut slots = only_mine(touch, motion);
-    guest.other.join(&mut slots, 2, &halfway(touch).1, (touch.normal, -1.0));
+    guest.other.join(&mut slots, 2, &halfway(touch).1, ContactSide::second(touch.normal));
     slots
 }
 
 fn only_mine(touch: &Touch, motion: &Motion) -> ContactJacobian {
     let mut slots = ContactJacobian::default();
-    halfway(touch).0.join(&mut slots, 0, motion.position, (-touch.normal, 1.0));
+    halfway(touch).0.join(&mut slots, 0, motion.position, ContactSide::first(touch.normal));
     slots
 }
 

@@ -39,10 +39,10 @@ pub struct RigidSpec {
 #[non_exhaustive]
 pub enum RigidError {
     /// The solid is invalid.
-    #[error("the body's shape is unusable: {0}")]
+    #[error("the shape of the rigid body is invalid: {0}")]
     Shape(#[from] ShapeError),
     /// An obstacle's solid is invalid.
-    #[error("the shape of obstacle `{name}` is unusable: {source}")]
+    #[error("the shape of the static solid `{name}` is invalid: {source}")]
     Obstacle {
         /// The obstacle's name.
         name: String,
@@ -53,7 +53,7 @@ pub enum RigidError {
     #[error(transparent)]
     Joint(#[from] JointError),
     /// A plane is unbounded, so it has no mass.
-    #[error("a plane cannot move: it must be a fixed obstacle")]
+    #[error("a plane cannot be a moving body; make it a static solid")]
     MovingPlane,
     /// A number is outside its range.
     #[error("{what} is {value}; it must be {wanted}")]
@@ -66,7 +66,7 @@ pub enum RigidError {
         wanted: &'static str,
     },
     /// A vector or rotation is not finite, too large, or a rotation is zero.
-    #[error("{what} is not finite, or too large for single precision")]
+    #[error("{what} must be finite and within the range of single precision")]
     BadVector {
         /// Which one.
         what: &'static str,

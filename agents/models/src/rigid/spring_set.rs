@@ -21,7 +21,7 @@ pub(super) struct SpringSet {
     /// The agent at the other end of each.
     ends: Vec<Option<End>>,
     /// Scratch storage for one response.
-    room: Vec<DVec3>,
+    scratch: Vec<DVec3>,
 }
 
 /// The other end of a spring.
@@ -46,24 +46,24 @@ impl SpringSet {
     }
 
     /// Gathers every spring of this step.
-    pub(super) fn gather(&mut self, around: &StepContext<'_>, company: &Company) {
+    pub(super) fn gather(&mut self, context: &StepContext<'_>, company: &Company) {
         self.all.clear();
         self.ends.clear();
-        for pull in around.anchor_springs() {
+        for pull in context.anchor_springs() {
             let by = pull.by.map(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
             if by == Some(None) {
                 continue; // a tool with a non-finite state holds nothing
             }
             let guest = by.flatten();
-            let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
-            self.all.push(LinearSpring { turn, ..LinearSpring::led(pull) });
+            let turn = guest.and_then(|guest| orientation_spring_of(&company.guests()[guest].other, &pull, context));
+            self.all.push(LinearSpring { turn, ..LinearSpring::driven(pull) });
             self.ends.push(guest.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
         }
-        for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
-            let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        for link in context.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
+            let owned = context.neighbours.iter().any(|n| n.id == link.other && n.owned);
             let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
             if let Some(guest) = guest.filter(|_| owned) {
-                self.all.push(LinearSpring { rest_m: link.rest_m, ..LinearSpring::led(spring_of(link)) });
+                self.all.push(LinearSpring { rest_m: link.rest_m, ..LinearSpring::driven(spring_of(link)) });
                 self.ends.push(Some(End { guest, anchor: link.there, kind: PairKind::Attachment }));
             }
         }
@@ -73,8 +73,8 @@ impl SpringSet {
     ///
     /// Where several springs pull at one agent, each sees its inverse mass times their number: together they never pull
     /// harder than it can follow.
-    pub(super) fn aim(&mut self, company: &Company) {
-        let Self { all, ends, room } = self;
+    pub(super) fn update_targets(&mut self, company: &Company) {
+        let Self { all, ends, scratch } = self;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
             // a tool's end moves on by itself, as a user spring's does
             let Some(End { guest: i, anchor, .. }) = end.filter(|end| end.kind != PairKind::Grasp) else { continue };
@@ -85,11 +85,11 @@ impl SpringSet {
             let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
             let column = |axis: DVec3| {
-                room.clear();
-                room.resize(other.velocities().len(), DVec3::ZERO);
-                slots.scatter(axis, room);
-                other.respond(room);
-                slots.velocity(room) * shared as f64
+                scratch.clear();
+                scratch.resize(other.velocities().len(), DVec3::ZERO);
+                slots.scatter(axis, scratch);
+                other.respond(scratch);
+                slots.velocity(scratch) * shared as f64
             };
             let [x, y, z] = DVec3::AXES.map(column);
             tie.yields = DMat3::from_cols(x, y, z);
@@ -97,30 +97,30 @@ impl SpringSet {
     }
 
     /// Advances the targets of user springs and tools by `h` seconds.
-    pub(super) fn go_on(&mut self, h: f64) {
+    pub(super) fn advance(&mut self, h: f64) {
         for tie in &mut self.all {
             tie.pull.target += tie.pull.target_velocity * h;
-            tie.turn.iter_mut().for_each(|turn| turn.go_on(h));
+            tie.turn.iter_mut().for_each(|turn| turn.advance(h));
         }
     }
 
     /// Gives the other ends the reactions to the springs' impulses in `h` seconds from `after_s` seconds into the step on.
-    pub(super) fn give(&mut self, company: &mut Company, (after_s, h): (f64, f64)) {
-        let Self { all, ends, room } = self;
+    pub(super) fn apply_reactions(&mut self, company: &mut Company, after_s: f64, h: f64) {
+        let Self { all, ends, scratch } = self;
         for (tie, end) in all.iter().zip(ends.iter()) {
             let Some(End { guest: i, anchor, kind }) = *end else { continue };
             let (guests, exchange, ..) = company.split();
             let other = &mut guests[i].other;
             let mut slots = ContactJacobian::default();
             other.hold(&mut slots, anchor);
-            room.clear();
-            room.resize(other.velocities().len(), DVec3::ZERO);
-            slots.scatter(-tie.impulse, room);
+            scratch.clear();
+            scratch.resize(other.velocities().len(), DVec3::ZERO);
+            slots.scatter(-tie.impulse, scratch);
             if let Some(turn) = &tie.turn {
-                room[1] -= turn.impulse;
+                scratch[1] -= turn.impulse;
             }
-            other.book(exchange, (after_s, h), room);
-            other.push(room, h);
+            other.book(exchange, (after_s, h), scratch);
+            other.push(scratch, h);
             if let Some(id) = other.id() {
                 let state = exchange.pair_mut(id);
                 state.kind = kind;
@@ -131,11 +131,11 @@ impl SpringSet {
 }
 
 /// The torsional spring by which a tool, brought to the body's own time, keeps the body that it pulls from turning.
-fn turn_of(tool: &Other, (pull, around): (&AnchorSpring, &StepContext<'_>)) -> Option<OrientationSpring> {
+fn orientation_spring_of(tool: &Other, pull: &AnchorSpring, context: &StepContext<'_>) -> Option<OrientationSpring> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
     let clasp = state.grasp.and_then(|grasp| grasp.orientation)?;
-    Some(OrientationSpring::of(state, &clasp, (pull, tool_extrapolation_s(around.time, seen.time))))
+    Some(OrientationSpring::of(state, &clasp, pull, tool_extrapolation_s(context.time, seen.time)))
 }
 
 /// A link as a spring; its target is set later.

@@ -29,7 +29,7 @@ pub(super) struct Standing {
     /// Half the slab's height, for a plane, metres.
     slab_m: Option<f64>,
     /// Storage for triangle contacts, for a mesh.
-    mesh: Option<MeshRoom>,
+    mesh: Option<MeshScratch>,
 }
 
 /// The body at its present place.
@@ -41,7 +41,7 @@ pub(super) struct Mine<'a> {
 
 /// Storage for the touches of one mesh.
 #[derive(Default)]
-struct MeshRoom {
+struct MeshScratch {
     manifolds: Vec<ContactManifold<(), ()>>,
     workspace: Option<ContactManifoldsWorkspace>,
 }
@@ -61,7 +61,7 @@ impl StaticShapes {
             let slab_m = matches!(obstacle.solid, Solid::Plane).then_some(SLAB_RADII * radius_m);
             let slab = slab_m.map(|half| Solid::Box { half_extents_m: DVec3::splat(half) });
             let solid = slab.unwrap_or_else(|| obstacle.solid.clone());
-            let mesh = matches!(solid, Solid::Mesh { .. }).then(MeshRoom::default);
+            let mesh = matches!(solid, Solid::Mesh { .. }).then(MeshScratch::default);
             let kind = ShapeKind::Solid(SolidShape::new(solid, DVec3::ZERO)?);
             let form = CollisionShape { kind, friction: obstacle.friction, restitution: obstacle.restitution };
             let rotation = obstacle.rotation.normalize();
@@ -82,7 +82,7 @@ impl Standing {
         &mut self,
         mine: &Mine<'_>,
         reach_m: f64,
-        room: &mut NarrowPhaseScratch,
+        scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) {
         if self.mesh.is_some() {
@@ -90,17 +90,17 @@ impl Standing {
             self.touch_triangles(mine, reach_m, into);
         } else {
             let view = ShapePose::Solid { position: self.place(mine.motion.position), rotation: self.rotation };
-            touches(&placed(mine.form, mine.motion), &PlacedShape { form: &self.form, view }, reach_m, room, into);
+            touches(&placed(mine.form, mine.motion), &PlacedShape { form: &self.form, view }, reach_m, scratch, into);
         }
     }
 
     /// The same for a mesh. Its inner edges are smoothed over: a body that slides across two coplanar triangles is not caught by their
     /// edge.
     fn touch_triangles(&mut self, mine: &Mine<'_>, reach_m: f64, into: &mut Vec<Touch>) {
-        let (ShapeKind::Solid(SolidShape { shape, .. }), Some(room)) = (&self.form.kind, &mut self.mesh) else {
+        let (ShapeKind::Solid(SolidShape { shape, .. }), Some(scratch)) = (&self.form.kind, &mut self.mesh) else {
             return;
         };
-        let MeshRoom { manifolds, workspace } = room;
+        let MeshScratch { manifolds, workspace } = scratch;
         // old points would be carried along instead of being recomputed
         manifolds.iter_mut().for_each(|manifold| manifold.points.clear());
         let Mine { mover, motion, .. } = mine;

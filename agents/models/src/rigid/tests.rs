@@ -222,7 +222,7 @@ fn a_spinning_body_keeps_its_angular_momentum() {
 }
 
 #[test]
-fn a_box_comes_to_rest_and_says_so() {
+fn a_box_comes_to_rest_and_reports_it() {
     let tilted = RigidSpec { rotation: DQuat::from_rotation_x(0.4), ..cube(0.1, UP * 0.5) };
     let mut body = RigidBody::new(RigidSpec { obstacles: [floor(0.5)].into(), ..tilted }).unwrap();
     let rested = (0..1000).find(|_| step(&mut body, 0.01).at_rest).expect("it rests within ten seconds");
@@ -234,14 +234,14 @@ fn a_box_comes_to_rest_and_says_so() {
 }
 
 #[test]
-fn a_body_that_may_not_sleep_never_says_it_rests() {
+fn a_body_that_may_not_sleep_never_reports_rest() {
     let awake = RigidSpec { sleep: false, obstacles: [floor(0.5)].into(), ..cube(0.1, UP * 0.1) };
     let mut body = RigidBody::new(awake).unwrap();
     assert!((0..500).all(|_| !step(&mut body, 0.01).at_rest));
 }
 
 #[test]
-fn a_hand_moves_the_body_to_itself_at_any_stiffness() {
+fn a_user_spring_moves_the_body_to_its_target_at_any_stiffness() {
     for stiffness in [10.0, 1e3, 1e6, 1e9] {
         for obstacles in [vec![], vec![floor(0.5)]] {
             let mut body = RigidBody::new(RigidSpec { obstacles: obstacles.into(), ..cube(0.1, UP * 0.1) }).unwrap();
@@ -260,7 +260,7 @@ fn a_hand_moves_the_body_to_itself_at_any_stiffness() {
 }
 
 #[test]
-fn a_stiff_hand_on_a_corner_does_not_throw_the_body() {
+fn a_stiff_user_spring_on_a_corner_does_not_throw_the_body() {
     let mut body = RigidBody::new(cube(0.1, DVec3::ZERO)).unwrap();
     let pull =
         AnchorSpring { anchor: Anchor::Local(DVec3::splat(0.1)), damping_n_s_m: 0.0, ..hand(DVec3::X * 2.0, 1e7) };
@@ -287,7 +287,7 @@ fn the_force_of_a_spring_is_what_moves_the_body() {
 }
 
 #[test]
-fn a_target_that_is_no_place_parks_the_body_with_a_finite_snapshot() {
+fn a_target_that_is_not_finite_parks_the_body_with_a_finite_snapshot() {
     for target in [DVec3::NAN, DVec3::splat(1e300), DVec3::splat(f64::INFINITY)] {
         let mut body = RigidBody::new(ball(1.0, 0.5)).unwrap();
         step(&mut body, 0.01);

@@ -5,7 +5,7 @@
 //!
 //! A pair's friction is the geometric mean of both coefficients, its restitution the larger of both.
 
-use super::conservative_advancement::{Ahead, Fall, Fixed, MovingShape, pose};
+use super::conservative_advancement::{Fall, Fixed, ImpactTimes, MovingShape, pose};
 use super::mass_properties::MassDistribution;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
@@ -74,12 +74,12 @@ impl World {
     /// Seconds of certainly free flight, at most `horizon`.
     pub(super) fn free_time(&self, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
         let all = self.fixed.iter().map(|(solid, _)| solid);
-        all.fold(horizon, |free, solid| free.min(solid.approach(&self.mover, motion, fall, free).0))
+        all.fold(horizon, |free, solid| free.min(solid.approach(&self.mover, motion, fall, free).free_s))
     }
 
     /// What of the fixed solids lies ahead of a flight of `horizon` seconds.
-    pub(super) fn ahead(&self, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
-        let mut ahead = Ahead::clear(horizon);
+    pub(super) fn ahead(&self, motion: &Motion, fall: Fall, horizon: f64) -> ImpactTimes {
+        let mut ahead = ImpactTimes::clear(horizon);
         for (solid, restitution) in &self.fixed {
             ahead.add(solid.approach(&self.mover, motion, fall, horizon), *restitution);
         }

@@ -13,7 +13,7 @@ use metachron_contact::{Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, SimTime};
 use metachron_core::{ContactJacobian, PairKind};
 use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{PlacedShape, ShapePose, Touch};
+use metachron_geometry::{ContactSide, PlacedShape, ShapePose, Touch};
 
 /// Below this slip friction grows in proportion to it, m/s.
 const STICK_M_S: f64 = 1e-3;
@@ -218,7 +218,7 @@ impl Sided {
 /// The tube's side of a place.
 fn mine(touch: &Touch) -> ContactJacobian {
     let mut slots = ContactJacobian::default();
-    touch.on_a.join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
+    touch.on_a.join(&mut slots, 0, DVec3::ZERO, ContactSide::first(touch.normal));
     slots
 }
 

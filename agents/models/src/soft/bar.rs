@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 /// A piece of a rope.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Strut {
+pub(super) struct Bar {
     /// Its ends.
     pub ends: [u32; 2],
     /// Length at rest, metres.
@@ -16,7 +16,7 @@ pub(super) struct Strut {
     pub ea_n: f64,
 }
 
-impl Strut {
+impl Bar {
     /// Adds its forces and stiffness at these positions.
     pub fn add(&self, positions: &[DVec3], system: &mut System) {
         let [a, b] = self.ends;

@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 /// One squared sum of positions.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Fold {
+pub(super) struct BendingElement {
     vertices: [u32; 5],
     /// Weight of each vertex in the curvature, 1/m²; zero for unused ones.
     weights: [f64; 5],
@@ -16,7 +16,7 @@ pub(super) struct Fold {
     stiffness: f64,
 }
 
-impl Fold {
+impl BendingElement {
     /// ½ `stiffness` |Σ w x|² over at most five vertices.
     pub fn new(terms: &[(u32, f64)], stiffness: f64) -> Self {
         let mut fold = Self { vertices: [terms[0].0; 5], weights: [0.0; 5], stiffness };

@@ -3,14 +3,14 @@
 //! In: a [`SoftSpec`], steps, pulls, neighbours. Out: snapshots ([`super::publish`]). Never here: how a step is solved
 //! ([`super::step`]), coupling to peers ([`super::company`]). Theory: docs/theory/soft.md.
 
-use super::anchor_springs::Tie;
+use super::anchor_springs::VertexSpring;
 use super::company::Company;
 use super::contact::Contacts;
 use super::fe_mesh::FeMesh;
 use super::footing::Footing;
 use super::foretold::Foretold;
 use super::spec::{SoftError, SoftSpec};
-use super::step::HASTE_MAX;
+use super::step::EDGE_CHANGE_MAX;
 use super::step_doubling::Doubling;
 use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
@@ -22,13 +22,13 @@ use metachron_contact::crowd::Lately;
 use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_contact::{Knock, Law, Link};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, height_j_kg};
+use metachron_geometry::{Aabb, CollisionShape, PlacedShape, ShapeKind, ShapePose, height_j_kg};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
 pub struct SoftBody {
     pub(super) spec: SoftSpec,
-    pub(super) lattice: FeMesh,
+    pub(super) mesh: FeMesh,
     pub(super) system: System,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
@@ -36,7 +36,7 @@ pub struct SoftBody {
     pub(super) free: Vec<DVec3>,
     /// Impulses of peers since the last step, N·s for each vertex, until they are applied; empty for none.
     pub(super) given: Vec<DVec3>,
-    pub(super) ties: Vec<Tie>,
+    pub(super) ties: Vec<VertexSpring>,
     pub(super) company: Company,
     /// Wake queries: the sleeping agents that it may hit.
     pub(super) knock: Knock,
@@ -64,24 +64,23 @@ impl SoftBody {
     /// [`SoftError`] for a number outside its range, a side it does not have, an invalid obstacle shape.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let lattice = FeMesh::new(&spec);
+        let mesh = FeMesh::new(&spec);
         let rotation = spec.rotation.normalize();
-        let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
-        let velocities: Vec<_> =
-            lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let held = lattice.held.contains(&true);
+        let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
+        let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
+        let held = mesh.held.contains(&true);
         let height_j_kg = height_j_kg(&positions, spec.gravity, held);
-        let surface = lattice.surface(height_j_kg);
+        let surface = mesh.surface(height_j_kg);
         let edge_m = surface.edge_m;
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
         Ok(Self {
-            system: lattice.system(),
+            system: mesh.system(),
             free: positions.clone(),
             before: velocities.clone(),
             positions,
             velocities,
-            lattice,
+            mesh,
             contacts,
             given: vec![],
             ties: vec![],
@@ -115,15 +114,15 @@ impl SoftBody {
     /// Kinetic, elastic and gravitational energy, J.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
-        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let moving = self.mesh.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
         let of =
             |((mass, v), x): ((&f64, &DVec3), &DVec3)| mass * (0.5 * v.length_squared() - self.spec.gravity.dot(*x));
-        moving.map(of).sum::<f64>() + self.lattice.energy_j(&self.positions)
+        moving.map(of).sum::<f64>() + self.mesh.energy_j(&self.positions)
     }
 
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
-        let (low, high) = metachron_geometry::bounds(&self.positions);
+        let Aabb { low, high } = Aabb::of(&self.positions);
         let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let radius_m = match &self.contacts.form.kind {
             ShapeKind::Surface(surface) => surface.radius_m,
@@ -133,17 +132,17 @@ impl SoftBody {
     }
 
     /// Lists this step's springs: user springs, tools that grasp it, and links whose pair it owns.
-    pub(super) fn take_ties(&mut self, around: &StepContext<'_>) {
+    pub(super) fn gather_springs(&mut self, context: &StepContext<'_>) {
         let count = self.positions.len();
         self.ties.clear();
-        self.ties.extend(around.anchor_springs().filter_map(|pull| Tie::of_pull(&pull, count)));
-        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
-        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
-        self.ties.extend(links.filter_map(|link| Tie::of_link(link, count)));
+        self.ties.extend(context.anchor_springs().filter_map(|pull| VertexSpring::of_pull(&pull, count)));
+        let owned = |link: &&Link| context.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        let links = context.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        self.ties.extend(links.filter_map(|link| VertexSpring::of_link(link, count)));
     }
 
     /// Counts quiet time; returns whether it has been quiet for long enough.
-    fn watch_rest(&mut self, dt: f64) -> bool {
+    fn update_rest(&mut self, dt: f64) -> bool {
         let Self { velocities, before, .. } = self;
         let pairs = velocities.iter().zip(before.iter());
         let limit = (QUIET_SPEED_M_S, QUIET_ACCELERATION_M_S2 * dt);
@@ -161,27 +160,27 @@ impl SoftBody {
     }
 
     /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, around: &StepContext<'_>, dt_s: f64) {
+    fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let bounds = self.bounds();
         let placed = PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) };
-        self.knock.find(&placed, &bounds, (around, dt_s));
+        self.knock.find(&placed, &bounds, (context, dt_s));
     }
 
     /// Ends a step of `dt` seconds: books impulses, grips and the published prediction; returns the additional substeps that this took.
-    fn settle(&mut self, around: &StepContext<'_>, dt: f64) -> u32 {
+    fn finish_step(&mut self, context: &StepContext<'_>, dt: f64) -> u32 {
         let mass_kg = self.mass_kg();
         let Self { company, system, .. } = self;
         company.mates_mut().weigh(system.vertices(), |impulses| system.respond(impulses));
-        self.company.close(around, (dt, mass_kg));
+        self.company.close(context, (dt, mass_kg));
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
-        self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
-        let told = self.foretell(dt);
+        self.acceleration = if self.mesh.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
+        let extra = self.foretell(dt);
         self.lately.pass(self.contacts.is_grounded(), dt);
         self.steps += 1;
-        self.at_rest = self.watch_rest(dt);
-        self.wake_others(around, dt);
-        told
+        self.at_rest = self.update_rest(dt);
+        self.wake_others(context, dt);
+        extra
     }
 }
 
@@ -191,17 +190,17 @@ impl Agent for SoftBody {
     }
 
     /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        let (substeps, doubled) = self.advance(around, dt_s)?;
-        let told = self.settle(around, dt_s);
-        Ok(StepReport { work: self.work() * f64::from(substeps + doubled + told), substeps, at_rest: self.at_rest })
+        let (substeps, doubled) = self.advance(context, dt_s)?;
+        let extra = self.finish_step(context, dt_s);
+        Ok(StepReport { work: self.work() * f64::from(substeps + doubled + extra), substeps, at_rest: self.at_rest })
     }
 
-    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
-        let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
-        let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately, &self.contacts.form));
-        beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
+    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
+        let dt = beside::longest_step(dt, context, || self.bounds(), |n| has_a_say(n, context));
+        let dt = crowd::crowded(dt, context, || self.bounds(), crowd::Member::bent(self.lately, &self.contacts.form));
+        beside::unhurried(dt, context, || self.bounds(), |n| self.approach_limit_m(n))
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -220,7 +219,7 @@ impl Agent for SoftBody {
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {
-        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let moving = self.mesh.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
         moving.fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), ((mass, v), x)| {
             let momentum = *v * *mass;
             (linear + momentum, angular + x.cross(momentum))
@@ -228,23 +227,23 @@ impl Agent for SoftBody {
     }
 
     fn mass_kg(&self) -> f64 {
-        self.lattice.mass_kg.iter().sum()
+        self.mesh.mass_kg.iter().sum()
     }
 }
 
 impl SoftBody {
     /// How far a neighbour may approach in a step, metres: beyond an edge length it would turn cells inside out before contact is detected.
-    /// Another soft body must stay predictable, which requires that neither has to divide its step ([`HASTE_MAX`]).
-    fn unhurried_m(&self, neighbour: &Neighbour) -> Option<f64> {
+    /// Another soft body must stay predictable, which requires that neither has to divide its step ([`EDGE_CHANGE_MAX`]).
+    fn approach_limit_m(&self, neighbour: &Neighbour) -> Option<f64> {
         let edge_m = self.contacts.edge_m();
         match neighbour.form.as_deref().map(|form| &form.kind) {
-            Some(ShapeKind::Surface(there)) => Some(HASTE_MAX * edge_m.min(there.edge_m)),
+            Some(ShapeKind::Surface(there)) => Some(EDGE_CHANGE_MAX * edge_m.min(there.edge_m)),
             _ => Some(edge_m).filter(|_| neighbour.owned),
         }
     }
 
     /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
     pub(super) fn work(&self) -> f64 {
-        1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64
+        1e-3 * self.system.work() as f64 + 0.5 * self.mesh.elements() as f64
     }
 }

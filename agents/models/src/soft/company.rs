@@ -4,7 +4,7 @@
 //! body's own solve, far ends of links, ledgers. Never here: the body's own state and its solve.
 //! Theory: docs/theory/coupling.md.
 
-use super::anchor_springs::Tie;
+use super::anchor_springs::VertexSpring;
 use super::system::System;
 use glam::DVec3;
 use metachron_contact::StepContext;
@@ -91,20 +91,20 @@ impl Company {
     }
 
     /// Tells links where their far ends are for a substep of `h` seconds.
-    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], h: f64) {
+    pub fn aim(&mut self, ties: &mut [VertexSpring], positions: &[DVec3], h: f64) {
         for i in 0..ties.len() {
             let Some(link) = ties[i].link else { continue };
             let shared = ties.iter().filter(|tie| tie.link.is_some_and(|l| l.other == link.other)).count();
             let Some(far) = self.mates.far(&link, h) else { continue };
-            ties[i].aim(&far, positions[ties[i].vertex], (h, shared));
+            ties[i].aim(&far, positions[ties[i].vertex], h, shared);
         }
     }
 
     /// Lets links to the same agent know of each other: what each gives moves the far ends of the rest, and so the free velocities
     /// `free` that `system` answers with (soft.md, eq. 4a, 4b).
-    pub fn share(&mut self, ties: &mut [Tie], free: &mut [DVec3], system: &System) {
-        let other = |tie: &Tie| tie.link.map(|link| link.other);
-        let lonely = |tie: &Tie| ties.iter().filter(|t| other(t) == other(tie)).count() < 2;
+    pub fn share(&mut self, ties: &mut [VertexSpring], free: &mut [DVec3], system: &System) {
+        let other = |tie: &VertexSpring| tie.link.map(|link| link.other);
+        let lonely = |tie: &VertexSpring| ties.iter().filter(|t| other(t) == other(tie)).count() < 2;
         if ties.iter().all(|tie| tie.link.is_none() || lonely(tie)) {
             return;
         }
@@ -120,7 +120,7 @@ impl Company {
             self.impulses.clear();
             self.impulses.resize(free.len(), DVec3::ZERO);
             for (tie, amiss) in ties.iter_mut().zip(&amiss) {
-                self.impulses[tie.vertex] += tie.spare(*amiss * share);
+                self.impulses[tie.vertex] += tie.add_prediction(*amiss * share);
             }
             system.respond(&mut self.impulses);
             free.iter_mut().zip(&self.impulses).for_each(|(v, dv)| *v += *dv);
@@ -130,20 +130,20 @@ impl Company {
     }
 
     /// Finds what is amiss with the expected velocity of each far end, m/s.
-    fn find_amiss(&mut self, ties: &[Tie], free: &[DVec3], into: &mut Vec<DVec3>) {
+    fn find_amiss(&mut self, ties: &[VertexSpring], free: &[DVec3], into: &mut Vec<DVec3>) {
         let mates = self.mates.all_mut();
         mates.iter_mut().for_each(Mate::ease);
         for tie in ties {
             let mate = mates.iter_mut().find(|mate| mate.other.id() == tie.link.map(|link| link.other));
             if let (Some(mate), Some(link)) = (mate, tie.link) {
-                mate.pull(link.there, -tie.gives(free[tie.vertex]));
+                mate.pull(link.there, -tie.impulse_at(free[tie.vertex]));
             }
         }
         mates.iter_mut().for_each(Mate::give_way);
-        let of = |tie: &Tie| {
+        let of = |tie: &VertexSpring| {
             let mate = mates.iter().find(|mate| mate.other.id() == tie.link.map(|link| link.other));
             let moved = tie.link.zip(mate).map(|(link, mate)| mate.yield_at(link.there));
-            moved.map_or(DVec3::ZERO, |moved| tie.amiss(moved, free[tie.vertex]))
+            moved.map_or(DVec3::ZERO, |moved| tie.prediction_error(moved, free[tie.vertex]))
         };
         into.clear();
         into.extend(ties.iter().map(of));
@@ -154,11 +154,11 @@ impl Company {
     pub fn accept<'a>(
         &mut self,
         contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>,
-        ties: &[Tie],
+        ties: &[VertexSpring],
         span: (usize, f64, f64),
     ) {
         if !(self.mates.is_empty() && ties.is_empty()) {
-            self.mates.accept(contacts, ties.iter().filter_map(Tie::pulled), span);
+            self.mates.accept(contacts, ties.iter().filter_map(VertexSpring::pulled), span);
         }
     }
 

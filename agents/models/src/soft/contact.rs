@@ -4,14 +4,14 @@
 //! Never here: where two forms touch ([`metachron_geometry::narrow_phase`]). Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::company::Company;
-use super::initial_overlap::Bores;
+use super::initial_overlap::PassingVertices;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Contact, Owner, Problem, Search, Settings, Solver};
 use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
-use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
+use metachron_geometry::{CollisionShape, ContactSide, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
 use std::sync::Arc;
 
 /// Solver settings: 10 µm/s, a tenth of the limit for rest.
@@ -37,8 +37,15 @@ pub(super) struct Contacts {
     touches: Vec<Touch>,
     /// Scale of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
-    room: NarrowPhaseScratch,
+    scratch: NarrowPhaseScratch,
     slack_m: f64,
+}
+
+/// A substep: where the vertices are at its start, metres, and its length.
+#[derive(Clone, Copy)]
+pub(super) struct Substep<'a> {
+    pub positions: &'a [DVec3],
+    pub h_s: f64,
 }
 
 /// A static solid at its place.
@@ -47,7 +54,7 @@ struct Wall {
     position: DVec3,
     rotation: DQuat,
     /// The vertices of the body that pass through it.
-    bores: Bores,
+    passing: PassingVertices,
 }
 
 impl Contacts {
@@ -61,7 +68,7 @@ impl Contacts {
                 .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
             let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
             let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
-            Ok(Wall { form, position, rotation, bores: Bores::default() })
+            Ok(Wall { form, position, rotation, passing: PassingVertices::default() })
         };
         let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
         Ok(Self {
@@ -71,26 +78,27 @@ impl Contacts {
             solver: Solver::forming(),
             touches: vec![],
             mobilities: vec![],
-            room: NarrowPhaseScratch::default(),
+            scratch: NarrowPhaseScratch::default(),
             slack_m: SLACK_SHARE * edge_m,
         })
     }
 
-    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; their number stays one for each vertex.
-    pub fn act(
+    /// Corrects the free `velocities` of a substep; their number stays one for each vertex.
+    pub fn solve(
         &mut self,
-        positions: &[DVec3],
+        substep: Substep<'_>,
         velocities: &mut Vec<DVec3>,
-        (system, company): (&mut System, &mut Company),
-        h: f64,
+        system: &mut System,
+        company: &mut Company,
     ) {
+        let h = substep.h_s;
         let own = velocities.len();
         self.list.clear();
         if (self.walls.is_empty() && company.mates().is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
             return;
         }
         company.mates_mut().extend(velocities, h);
-        let settings = self.find(positions, velocities, company, h);
+        let settings = self.find(substep, velocities, company);
         if self.list.is_empty() {
             self.solver.forget();
             velocities.truncate(own);
@@ -108,21 +116,22 @@ impl Contacts {
     }
 
     /// Finds the contacts that may close within the substep; returns the settings for their solve.
-    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
+    fn find(&mut self, substep: Substep<'_>, velocities: &[DVec3], company: &mut Company) -> Settings {
+        let Substep { positions, h_s: h } = substep;
         let deep_m = DEEP_SHARE * self.edge_m();
-        let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
+        let Self { form, walls, list, touches: places, scratch, slack_m, mobilities, .. } = self;
         let (mut stands, held) = (false, mobilities.contains(&0.0));
         let here = PlacedShape { form, view: ShapePose::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         for (wall, number) in walls.iter_mut().zip(0_u64..) {
             let view = ShapePose::Solid { position: wall.position, rotation: wall.rotation };
-            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, room, places);
-            wall.bores.follow(places, held, deep_m);
+            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, scratch, places);
+            wall.passing.update(places, held, deep_m);
             let friction = (form.friction * wall.form.friction).sqrt();
-            for place in places.iter().filter(|place| !wall.bores.pass(place)) {
+            for place in places.iter().filter(|place| !wall.passing.contains(place)) {
                 let mut slots = ContactJacobian::default();
-                place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
+                place.on_a.join(&mut slots, 0, DVec3::ZERO, ContactSide::first(place.normal));
                 let closing = slots.velocity(velocities).dot(place.normal);
                 if place.gap_m + closing * h > *slack_m {
                     continue;
@@ -147,7 +156,7 @@ impl Contacts {
         }
         let fixed = list.len();
         let search = Search { h_s: h, slack_m: *slack_m, speed_m_s: speed };
-        company.mates_mut().find(&here, search, velocities, (room, list));
+        company.mates_mut().find(&here, search, velocities, (scratch, list));
         if stands && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 

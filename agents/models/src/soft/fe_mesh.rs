@@ -2,10 +2,10 @@
 //!
 //! In: a shape and its material. Out: a [`FeMesh`], fixed for the body's life. Never here: where the vertices are now.
 
-use super::bar::Strut;
-use super::bending::Fold;
+use super::bar::Bar;
+use super::bending::BendingElement;
 use super::grid::Grid;
-use super::hexahedron::{Brick, BrickKind};
+use super::hexahedron::{Hexahedron, HexahedronKind};
 use super::membrane::Membrane;
 use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::system::System;
@@ -22,11 +22,11 @@ pub(super) struct FeMesh {
     pub mass_kg: Vec<f64>,
     /// Whether each vertex is fixed.
     pub held: Vec<bool>,
-    struts: Vec<Strut>,
+    bars: Vec<Bar>,
     membranes: Vec<Membrane>,
-    folds: Vec<Fold>,
-    bricks: Vec<Brick>,
-    kinds: Vec<BrickKind>,
+    bending: Vec<BendingElement>,
+    hexahedra: Vec<Hexahedron>,
+    kinds: Vec<HexahedronKind>,
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     rows: Vec<([u32; 3], f64)>,
     triangles: Vec<[u32; 3]>,
@@ -39,24 +39,24 @@ impl FeMesh {
     pub fn new(spec: &SoftSpec) -> Self {
         let grid = Grid::of(&spec.shape);
         let count = grid.count();
-        let mut lattice = Self {
+        let mut mesh = Self {
             rest: vec![DVec3::ZERO; count],
             mass_kg: vec![0.0; count],
             held: vec![false; count],
             ..Self::default()
         };
         for side in &spec.held {
-            grid.on(*side).for_each(|vertex| lattice.held[vertex as usize] = true);
+            grid.on(*side).for_each(|vertex| mesh.held[vertex as usize] = true);
         }
         match &spec.shape {
-            SoftShape::Sheet { size_m, thickness_m, .. } => lattice.sheet(&grid, *size_m, *thickness_m, &spec.matter),
-            SoftShape::Box { size_m, .. } => lattice.solid(&grid, &spec.matter, |share| *size_m * share),
-            SoftShape::Ball { radius_m, .. } => lattice.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
-            SoftShape::Rope { path_m, radius_m, .. } => lattice.rope(&grid, path_m, *radius_m, &spec.matter),
+            SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.matter),
+            SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
+            SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
+            SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.matter),
         }
         let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
-        lattice.rows = grid.rows().into_iter().map(|row| (row, sag(row, &lattice.rest))).collect();
-        lattice
+        mesh.rows = grid.rows().into_iter().map(|row| (row, sag(row, &mesh.rest))).collect();
+        mesh
     }
 
     fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, matter: &SoftMatter) {
@@ -66,13 +66,12 @@ impl FeMesh {
             let flat = DVec2::new(place[0] as f64, place[1] as f64) * step;
             self.rest[grid.at(place) as usize] = flat.extend(0.0);
         }
-        let elastic = (matter.young_pa, matter.poisson);
         for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
             let [a, b, c, d] = [[i, j, 0], [i + 1, j, 0], [i + 1, j + 1, 0], [i, j + 1, 0]].map(|place| grid.at(place));
             // alternating diagonals favour no direction
             let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             for corners in halves {
-                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, elastic);
+                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, matter);
                 let third = membrane.volume_m3() * matter.density_kg_m3 / 3.0;
                 corners.iter().for_each(|vertex| self.mass_kg[*vertex as usize] += third);
                 self.membranes.push(membrane);
@@ -80,7 +79,7 @@ impl FeMesh {
             }
         }
         let rigidity = matter.young_pa * thickness_m.powi(3) / (12.0 * (1.0 - matter.poisson * matter.poisson));
-        self.bend(grid, step, (rigidity, matter.poisson));
+        self.bend(grid, step, rigidity, matter.poisson);
         self.list_edges();
         self.radius_m = 0.5 * thickness_m;
     }
@@ -90,7 +89,7 @@ impl FeMesh {
     }
 
     /// Lists the bending elements of a flat grid of cells of `step` metres: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
-    fn bend(&mut self, grid: &Grid, step: DVec2, (rigidity_n_m, poisson): (f64, f64)) {
+    fn bend(&mut self, grid: &Grid, step: DVec2, rigidity_n_m: f64, poisson: f64) {
         let cell = step.x * step.y;
         let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
         for [i, j, _] in grid.places() {
@@ -103,19 +102,19 @@ impl FeMesh {
                 for (sign, share) in [(1.0, 0.5 * (1.0 + poisson)), (-1.0, 0.5 * (1.0 - poisson))] {
                     let (x, y) = (far[0], sign * far[1]);
                     let terms = [(a, x), (b, x), (c, y), (d, y), (here, -2.0 * (x + y))];
-                    self.folds.push(Fold::new(&terms, share * rigidity_n_m * cell));
+                    self.bending.push(BendingElement::new(&terms, share * rigidity_n_m * cell));
                 }
             } else if inner_x != inner_y {
                 // at a free edge the sheet bends freely across it
                 let ([a, b], w) = if inner_x { (along_x(), far[0]) } else { (along_y(), far[1]) };
                 let stiffness = 0.5 * (1.0 - poisson * poisson) * rigidity_n_m * cell;
-                self.folds.push(Fold::new(&[(a, w), (b, w), (here, -2.0 * w)], stiffness));
+                self.bending.push(BendingElement::new(&[(a, w), (b, w), (here, -2.0 * w)], stiffness));
             }
             if i < grid.cells[0] && j < grid.cells[1] {
                 let w = 1.0 / cell;
                 let square = [(here, w), (grid.at([i + 1, j, 0]), -w), (grid.at([i, j + 1, 0]), -w)];
                 let terms = [square[0], square[1], square[2], (grid.at([i + 1, j + 1, 0]), w)];
-                self.folds.push(Fold::new(&terms, 2.0 * (1.0 - poisson) * rigidity_n_m * cell));
+                self.bending.push(BendingElement::new(&terms, 2.0 * (1.0 - poisson) * rigidity_n_m * cell));
             }
         }
     }
@@ -135,23 +134,22 @@ impl FeMesh {
             let share = DVec3::new(place[0] as f64, place[1] as f64, place[2] as f64) / cells;
             self.rest[grid.at(place) as usize] = place_of(share);
         }
-        let elastic = (matter.young_pa, matter.poisson);
         for [i, j, k] in grid.places().filter(|place| (0..3).all(|axis| place[axis] < grid.cells[axis])) {
             let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
             let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
-            let kind = self.kind_of(corners, elastic);
+            let kind = self.kind_of(corners, matter);
             for (vertex, volume) in vertices.iter().zip(self.kinds[kind].volumes_m3) {
                 self.mass_kg[*vertex as usize] += volume * matter.density_kg_m3;
             }
-            self.bricks.push(Brick { vertices, kind, turn: DQuat::IDENTITY });
+            self.hexahedra.push(Hexahedron { vertices, kind, turn: DQuat::IDENTITY });
         }
         self.skin(grid);
         self.list_edges();
     }
 
     /// The kind of a cell with these corners: one for all of equal shape.
-    fn kind_of(&mut self, corners: [DVec3; 8], elastic: (f64, f64)) -> usize {
-        let kind = BrickKind::new(corners, elastic);
+    fn kind_of(&mut self, corners: [DVec3; 8], matter: &SoftMatter) -> usize {
+        let kind = HexahedronKind::new(corners, matter);
         let known = self.kinds.iter().position(|known| known.is_like(&kind));
         known.unwrap_or_else(|| {
             self.kinds.push(kind);
@@ -186,7 +184,7 @@ impl FeMesh {
         let rest_m = total / count as f64;
         self.rest = (0..=count).map(|i| along(path_m, rest_m * i as f64)).collect();
         for i in 0..count as u32 {
-            self.struts.push(Strut { ends: [i, i + 1], rest_m, ea_n: matter.young_pa * section });
+            self.bars.push(Bar { ends: [i, i + 1], rest_m, ea_n: matter.young_pa * section });
             self.edges.push([i, i + 1]);
             let half = 0.5 * rest_m * section * matter.density_kg_m3;
             self.mass_kg[i as usize] += half;
@@ -203,42 +201,42 @@ impl FeMesh {
             let lowest = moving().min().unwrap_or(0);
             moving().for_each(|v| first[v as usize] = first[v as usize].min(lowest));
         };
-        self.struts.iter().for_each(|strut| join(&strut.ends));
+        self.bars.iter().for_each(|bar| join(&bar.ends));
         self.triangles.iter().for_each(|corners| join(corners));
-        self.folds.iter().for_each(|fold| join(&fold.vertices()));
-        self.bricks.iter().for_each(|brick| join(&brick.vertices));
+        self.bending.iter().for_each(|element| join(&element.vertices()));
+        self.hexahedra.iter().for_each(|hexahedron| join(&hexahedron.vertices));
         System::new(&first, &self.held)
     }
 
     /// Adds the forces and stiffness of all elements at these positions; updates the cells' rotations.
     pub fn add(&mut self, positions: &[DVec3], system: &mut System) {
-        self.struts.iter().for_each(|strut| strut.add(positions, system));
+        self.bars.iter().for_each(|bar| bar.add(positions, system));
         self.membranes.iter().for_each(|membrane| membrane.add(positions, system));
-        self.folds.iter().for_each(|fold| fold.add(positions, system));
-        for brick in &mut self.bricks {
-            let kind = &self.kinds[brick.kind];
-            let firm = brick.follow(kind, positions);
-            brick.add(kind, positions, firm, system);
+        self.bending.iter().for_each(|element| element.add(positions, system));
+        for hexahedron in &mut self.hexahedra {
+            let kind = &self.kinds[hexahedron.kind];
+            let firm = hexahedron.follow(kind, positions);
+            hexahedron.add(kind, positions, firm, system);
         }
     }
 
     /// Elastic energy, J; uses updated rotations of the cells.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
-        let struts: f64 = self.struts.iter().map(|strut| strut.energy_j(positions)).sum();
+        let bars: f64 = self.bars.iter().map(|bar| bar.energy_j(positions)).sum();
         let membranes: f64 = self.membranes.iter().map(|membrane| membrane.energy_j(positions)).sum();
-        let folds: f64 = self.folds.iter().map(|fold| fold.energy_j(positions)).sum();
-        let bricks = self.bricks.iter().map(|brick| {
-            let mut brick = *brick;
-            brick.follow(&self.kinds[brick.kind], positions);
-            brick.energy_j(&self.kinds[brick.kind], positions)
+        let bending: f64 = self.bending.iter().map(|element| element.energy_j(positions)).sum();
+        let hexahedra = self.hexahedra.iter().map(|hexahedron| {
+            let mut hexahedron = *hexahedron;
+            hexahedron.follow(&self.kinds[hexahedron.kind], positions);
+            hexahedron.energy_j(&self.kinds[hexahedron.kind], positions)
         });
-        struts + membranes + folds + bricks.sum::<f64>()
+        bars + membranes + bending + hexahedra.sum::<f64>()
     }
 
     /// The largest change of sag of three vertices in a row against rest, metres: the error of straight pieces.
     pub fn residual_m(&self, positions: &[DVec3]) -> f64 {
         // a rope bends freely: the loss of a kink is no error
-        let slack = self.membranes.is_empty() && self.bricks.is_empty();
+        let slack = self.membranes.is_empty() && self.hexahedra.is_empty();
         let sag = |(row, rest): &([u32; 3], f64)| {
             let now = sagitta(*row, positions).length();
             let beyond = (now - rest).abs();
@@ -248,7 +246,7 @@ impl FeMesh {
     }
 
     /// The largest change of an edge within `h` seconds at these velocities, as a share of its rest length.
-    pub fn haste(&self, velocities: &[DVec3], h: f64) -> f64 {
+    pub fn edge_change(&self, velocities: &[DVec3], h: f64) -> f64 {
         let share = |&[a, b]: &[u32; 2]| {
             let [a, b] = [a as usize, b as usize];
             velocities[a].distance(velocities[b]) * h / self.rest[a].distance(self.rest[b])
@@ -269,7 +267,7 @@ impl FeMesh {
             triangles: self.triangles.clone().into(),
             radius_m: self.radius_m,
             height_j_kg,
-            closed: !self.bricks.is_empty(),
+            closed: !self.hexahedra.is_empty(),
             held: self.held.contains(&true),
             fans: VoronoiRegions::of(&self.edges, &self.triangles).into(),
         }
@@ -277,7 +275,7 @@ impl FeMesh {
 
     /// Number of elements.
     pub fn elements(&self) -> usize {
-        self.struts.len() + self.membranes.len() + self.bricks.len()
+        self.bars.len() + self.membranes.len() + self.hexahedra.len()
     }
 }
 

@@ -51,7 +51,7 @@ impl Footing {
             let across = DMat3::from_cols(*normal * normal.x, *normal * normal.y, *normal * normal.z) * *stiffness;
             for &(i, a) in slots.linear() {
                 for &(j, b) in slots.linear().iter().filter(|(j, _)| *j <= i) {
-                    system.join((i, j), across * (a * b));
+                    system.join(i, j, across * (a * b));
                 }
             }
         }

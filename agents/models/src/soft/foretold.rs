@@ -51,15 +51,15 @@ impl SoftBody {
             self.system.factor();
             self.foretold.span_s = dt;
         }
-        let Self { foretold, system, lattice, velocities, free: before, given, .. } = self;
+        let Self { foretold, system, mesh, velocities, free: before, given, .. } = self;
         let mut momenta = std::mem::take(&mut foretold.accelerations);
         let (last_s, span_s) = (foretold.last_s, foretold.span_s);
         let damped = 1.0 + last_s * self.spec.matter.damping_per_s;
-        let moves = velocities.iter().zip(&*before).zip(&lattice.mass_kg);
+        let moves = velocities.iter().zip(&*before).zip(&mesh.mass_kg);
         momenta.extend(moves.map(|((now, before), mass)| (*now * damped - *before) * *mass));
         momenta.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum -= *given);
         momenta.iter_mut().zip(foretold.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
-        let still = velocities.iter().zip(&lattice.mass_kg).map(|(now, mass)| *now * *mass);
+        let still = velocities.iter().zip(&mesh.mass_kg).map(|(now, mass)| *now * *mass);
         momenta.iter_mut().zip(still).for_each(|(momentum, still)| *momentum = still + *momentum * (span_s / last_s));
         let lies = !self.footing.stance.is_empty();
         foretold.standing.extend(momenta.iter().filter(|_| lies));

@@ -3,13 +3,14 @@
 //! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the incompatible modes of (TBW76)
 //! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
+use super::spec::SoftMatter;
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// Data common to all cells of one rest shape.
 #[derive(Debug, Clone)]
-pub(super) struct BrickKind {
+pub(super) struct HexahedronKind {
     /// Corners at rest relative to the first, metres.
     rest: [DVec3; 8],
     /// Mean gradient of each corner's share, 1/m.
@@ -22,7 +23,7 @@ pub(super) struct BrickKind {
 
 /// A cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Brick {
+pub(super) struct Hexahedron {
     /// Its corners: bit 0 of a corner's place says whether it is the far one in x, bit 1 in y, bit 2 in z.
     pub vertices: [u32; 8],
     /// Index of its kind.
@@ -57,9 +58,10 @@ fn slopes(at: DVec3) -> [DVec3; 8] {
     })
 }
 
-impl BrickKind {
+impl HexahedronKind {
     /// The kind of a cell with these corners at rest, metres.
-    pub fn new(corners: [DVec3; 8], (young_pa, poisson): (f64, f64)) -> Self {
+    pub fn new(corners: [DVec3; 8], matter: &SoftMatter) -> Self {
+        let SoftMatter { young_pa, poisson, .. } = *matter;
         let mu = 0.5 * young_pa / (1.0 + poisson);
         let lambda = young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
         let jacobian = |at: DVec3| slopes(at).iter().zip(&corners).fold(DMat3::ZERO, |j, (s, x)| j + outer(*x, *s));
@@ -140,10 +142,10 @@ struct Bent {
     force: [DVec3; 8],
 }
 
-impl Brick {
+impl Hexahedron {
     /// Updates the rotation of the cell, by Newton's method on the trace of RᵀF from the last rotation on (eq. 12); returns the matrix
     /// that maps a change of F to a further rotation.
-    pub fn follow(&mut self, kind: &BrickKind, positions: &[DVec3]) -> DMat3 {
+    pub fn follow(&mut self, kind: &HexahedronKind, positions: &[DVec3]) -> DMat3 {
         let mut f = DMat3::ZERO;
         for (vertex, gradient) in self.vertices.iter().zip(&kind.gradients) {
             f += outer(positions[*vertex as usize] - positions[self.vertices[0] as usize], *gradient);
@@ -166,7 +168,7 @@ impl Brick {
         firm
     }
 
-    fn bent(&self, kind: &BrickKind, positions: &[DVec3]) -> Bent {
+    fn bent(&self, kind: &HexahedronKind, positions: &[DVec3]) -> Bent {
         let turn = DMat3::from_quat(self.turn);
         let back = turn.transpose();
         let origin = positions[self.vertices[0] as usize];
@@ -177,7 +179,7 @@ impl Brick {
     }
 
     /// Adds its forces and stiffness at these positions; `firm` is the result of [`Self::follow`] (eq. 13, 14).
-    pub fn add(&self, kind: &BrickKind, positions: &[DVec3], firm: DMat3, system: &mut System) {
+    pub fn add(&self, kind: &HexahedronKind, positions: &[DVec3], firm: DMat3, system: &mut System) {
         let Bent { turn, force, .. } = self.bent(kind, positions);
         let origin = positions[self.vertices[0] as usize];
         let arms = self.vertices.map(|vertex| positions[vertex as usize] - origin);
@@ -192,7 +194,7 @@ impl Brick {
     }
 
     /// Elastic energy, J.
-    pub fn energy_j(&self, kind: &BrickKind, positions: &[DVec3]) -> f64 {
+    pub fn energy_j(&self, kind: &HexahedronKind, positions: &[DVec3]) -> f64 {
         let Bent { by, force, .. } = self.bent(kind, positions);
         0.5 * by.iter().zip(force).map(|(u, f)| u.dot(f)).sum::<f64>()
     }

@@ -66,12 +66,15 @@ impl ImpulseResponse for SoftInertia {
     }
 
     /// Elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
-    fn elastic_change(&self, supported: bool, changed: &mut [DVec3], room: &mut Vec<DVec3>) {
-        room.clear();
-        room.extend(changed.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
-        self.respond(room, supported);
+    fn elastic_change(&self, supported: bool, changed: &mut [DVec3], scratch: &mut Vec<DVec3>) {
+        scratch.clear();
+        scratch.extend(changed.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
+        self.respond(scratch, supported);
         let damped = 2.0 + self.span_s * self.damping_per_s;
-        changed.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
+        changed
+            .iter_mut()
+            .zip(scratch)
+            .for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
     }
 
     fn supports(&self) -> &[Foot] {

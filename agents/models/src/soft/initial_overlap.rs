@@ -8,16 +8,16 @@ use metachron_geometry::{Place, Touch};
 
 /// The vertices of a soft body that started inside one solid, pass through it and have not left it since, by rising number.
 #[derive(Debug, Default)]
-pub(super) struct Bores {
+pub(super) struct PassingVertices {
     /// Whether the first places have been examined.
     begun: bool,
     through: Vec<u32>,
 }
 
-impl Bores {
+impl PassingVertices {
     /// Processes all places where a body meets the solid. A held body that starts deeper inside than `deep_m`, at places whose
     /// ways out diverge, passes through.
-    pub fn follow(&mut self, places: &[Touch], held: bool, deep_m: f64) {
+    pub fn update(&mut self, places: &[Touch], held: bool, deep_m: f64) {
         let begins = !std::mem::replace(&mut self.begun, true);
         if begins && held && is_parted(places, deep_m) {
             self.through = inside(places);
@@ -28,7 +28,7 @@ impl Bores {
     }
 
     /// Whether a place passes through.
-    pub fn pass(&self, place: &Touch) -> bool {
+    pub fn contains(&self, place: &Touch) -> bool {
         !self.through.is_empty() && vertices(place).any(|vertex| self.through.binary_search(&vertex).is_ok())
     }
 }

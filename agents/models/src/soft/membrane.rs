@@ -3,6 +3,7 @@
 //! In: vertices. Out: forces and stiffness. Never here: bending ([`crate::soft::bending`]). Theory: docs/theory/soft.md, eq. 5, 6:
 //! St. Venant–Kirchhoff in the plane.
 
+use super::spec::SoftMatter;
 use super::system::System;
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
@@ -28,7 +29,8 @@ struct Strained {
 
 impl Membrane {
     /// A triangle whose flat corners are `flat`, metres, `thickness_m` thick.
-    pub fn new(vertices: [u32; 3], flat: [DVec2; 3], thickness_m: f64, (young_pa, poisson): (f64, f64)) -> Self {
+    pub fn new(vertices: [u32; 3], flat: [DVec2; 3], thickness_m: f64, matter: &SoftMatter) -> Self {
+        let SoftMatter { young_pa, poisson, .. } = *matter;
         let sides = DMat2::from_cols(flat[1] - flat[0], flat[2] - flat[0]);
         let inverse = sides.inverse();
         let (b, c) = (inverse.row(0), inverse.row(1));

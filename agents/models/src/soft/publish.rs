@@ -14,7 +14,7 @@ impl SoftBody {
         into.resolution = None;
         into.energy_j = self.energy_j();
         into.drift_m = self.doubling.watch.error_m();
-        into.residual_m = self.lattice.residual_m(&self.positions) + into.drift_m;
+        into.residual_m = self.mesh.residual_m(&self.positions) + into.drift_m;
         into.grips.clone_from(&self.grips);
         (into.at_rest, into.grounded) = (self.at_rest, self.lately.is_grounded());
         into.acceleration = self.acceleration;
@@ -29,7 +29,7 @@ impl SoftBody {
             inertia.stand(lies, &self.foretold.standing);
             inertia.accelerations.clone_from(&self.foretold.accelerations);
             inertia.span_s = self.foretold.span_s;
-            inertia.mass_kg.clone_from(&self.lattice.mass_kg);
+            inertia.mass_kg.clone_from(&self.mesh.mass_kg);
             inertia.damping_per_s = self.spec.matter.damping_per_s;
         } else {
             into.inertia = Inertia::Immovable;

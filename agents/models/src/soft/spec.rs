@@ -101,10 +101,10 @@ pub enum SoftError {
         what: &'static str,
     },
     /// A rope's path has no length.
-    #[error("the path of a rope needs two points that are apart")]
+    #[error("the path of a rope needs at least two different points")]
     NoPath,
     /// There are more vertices than a step can take.
-    #[error("it has {vertices} vertices; at most {VERTICES_MAX} can be stepped: give it fewer segments")]
+    #[error("the soft body has {vertices} vertices; at most {VERTICES_MAX} are supported: use fewer segments")]
     TooFine {
         /// How many it would have.
         vertices: u64,
@@ -118,7 +118,7 @@ pub enum SoftError {
         side: &'static str,
     },
     /// An obstacle's shape is invalid.
-    #[error("the shape of obstacle `{name}` is unusable: {source}")]
+    #[error("the shape of the static solid `{name}` is invalid: {source}")]
     Obstacle {
         /// The obstacle's name.
         name: String,
@@ -191,7 +191,12 @@ impl SoftSpec {
         let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s } = self.matter;
         self.shape.check()?;
         number("Young's modulus", young_pa, (1.0, 1e11), "between 1 and 1e11 Pa")?;
-        number("Poisson's ratio", poisson, (0.0, 0.49), "between 0 and 0.49: nearer to 0.5 nothing yields any more")?;
+        number(
+            "Poisson's ratio",
+            poisson,
+            (0.0, 0.49),
+            "between 0 and 0.49 (towards 0.5 the material becomes incompressible)",
+        )?;
         number("the density", density_kg_m3, (1.0, 1e5), "between 1 and 1e5 kg/m³")?;
         number("the damping", damping_per_s, (0.0, 1e4), "between 0 and 1e4 per second")?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;

@@ -1,15 +1,16 @@
 //! One substep of a soft body: linearly implicit Euler, contacts between solve and move.
 //!
-//! In: a state and its surroundings. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
+//! In: a state and its step context. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
+use super::contact::Substep;
 use glam::{DMat3, DVec3};
 use metachron_contact::StepContext;
 use metachron_core::StepError;
 use metachron_core::foot::press;
 
 /// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
-pub(super) const HASTE_MAX: f64 = 0.3;
+pub(super) const EDGE_CHANGE_MAX: f64 = 0.3;
 /// The largest coordinate or speed accepted, metres or m/s: its square would soon overflow.
 const REACH_MAX: f64 = 1e9;
 /// The most substeps of a step.
@@ -20,38 +21,38 @@ impl SoftBody {
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state stops being finite.
-    pub(super) fn advance(&mut self, around: &StepContext<'_>, dt: f64) -> Result<(u32, u32), StepError> {
-        self.receive(around, dt)?;
-        let doubled = self.rehearse(around.me, dt);
+    pub(super) fn advance(&mut self, context: &StepContext<'_>, dt: f64) -> Result<(u32, u32), StepError> {
+        self.receive(context, dt)?;
+        let doubled = self.repeat_step(context.me, dt);
         let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
         while left > 0 {
             let h = dt / f64::from(parts);
-            self.foresee(h).map_err(|what| self.lost(what, dt))?;
-            self.touch(h);
-            if self.lattice.haste(&self.free, h) > HASTE_MAX && parts < SUBSTEPS_MAX {
+            self.predict(h).map_err(|what| self.diverged(what, dt))?;
+            self.solve_contacts(h);
+            if self.mesh.edge_change(&self.free, h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
                 self.given.iter_mut().for_each(|given| *given *= 0.5); // the impulse acts evenly through the step
                 continue;
             }
             if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
-                return Err(self.lost("a vertex was thrown out of reach", dt));
+                return Err(self.diverged("a vertex left the coordinate range", dt));
             }
-            self.act(f64::from(parts - left) * h, h);
+            self.finish_substep(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
         }
-        self.judge(dt, done);
+        self.estimate_error(dt, done);
         Ok((done, doubled))
     }
 
     /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
-    pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
+    pub(super) fn predict(&mut self, h: f64) -> Result<(), &'static str> {
         self.assemble(h);
         if !self.system.factor() {
-            return Err("its stiffness has no inverse");
+            return Err("the stiffness matrix is not positive definite");
         }
-        let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
+        let Self { system, mesh, velocities, free, given, ties, company, .. } = self;
         free.clear();
-        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
+        let momenta = velocities.iter().zip(&mesh.mass_kg).map(|(v, mass)| *v * *mass);
         free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
         free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
         system.respond(free);
@@ -61,12 +62,12 @@ impl SoftBody {
 
     /// Assembles the system of a substep of `h` seconds at the present positions.
     pub(super) fn assemble(&mut self, h: f64) {
-        let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
+        let Self { system, mesh, positions, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let inertia = 1.0 + h * spec.matter.damping_per_s;
-        for (vertex, &mass) in lattice.mass_kg.iter().enumerate() {
+        for (vertex, &mass) in mesh.mass_kg.iter().enumerate() {
             system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
             system.push(vertex as u32, spec.gravity * mass);
         }
@@ -76,13 +77,13 @@ impl SoftBody {
     }
 
     /// Applies contact to the predicted velocities.
-    pub(super) fn touch(&mut self, h: f64) {
+    pub(super) fn solve_contacts(&mut self, h: f64) {
         let Self { system, positions, free, company, contacts, .. } = self;
-        contacts.act(positions, free, (system, company), h);
+        contacts.solve(Substep { positions, h_s: h }, free, system, company);
     }
 
     /// Moves with the predicted velocities, and gives the peers their impulses.
-    fn act(&mut self, start: f64, h: f64) {
+    fn finish_substep(&mut self, start: f64, h: f64) {
         let Self { positions, velocities, free, ties, company, contacts, foretold, .. } = self;
         std::mem::swap(velocities, free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
@@ -92,10 +93,10 @@ impl SoftBody {
     }
 
     /// Applies the impulses of peers since the last step, and collects the neighbours.
-    fn receive(&mut self, around: &StepContext<'_>, dt: f64) -> Result<(), StepError> {
+    fn receive(&mut self, context: &StepContext<'_>, dt: f64) -> Result<(), StepError> {
         let Self { system, positions, velocities, given, company, foretold, footing, .. } = self;
         given.clear();
-        company.open(around, positions.len(), dt);
+        company.open(context, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             // impulses that acted through the step before are applied as that step would have; the rest acts through this one (eq. 16b)
             let borne = footing.stance.bears(sums.iter().sum());
@@ -114,13 +115,13 @@ impl SoftBody {
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
             positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);
         }
-        self.take_ties(around);
+        self.gather_springs(context);
         let bounds = self.bounds();
-        self.company.gather(around, &bounds, (dt, self.spec.friction));
+        self.company.gather(context, &bounds, (dt, self.spec.friction));
         Ok(())
     }
 
-    fn lost(&self, what: &str, dt_s: f64) -> StepError {
+    fn diverged(&self, what: &str, dt_s: f64) -> StepError {
         StepError::Diverged { model: self.spec.shape.model(), dt_s, what: what.to_owned() }
     }
 }

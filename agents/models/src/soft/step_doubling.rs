@@ -3,7 +3,7 @@
 //! In: the body before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
 //! ([`crate::soft::fe_mesh`]), any change of its state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
 
-use super::anchor_springs::Tie;
+use super::anchor_springs::VertexSpring;
 use super::body::SoftBody;
 use glam::DVec3;
 use metachron_core::AgentId;
@@ -16,7 +16,7 @@ pub(super) struct Doubling {
     /// Positions and velocities with twice the substeps.
     finer: [Vec<DVec3>; 2],
     /// The springs of the step.
-    ties: Vec<Tie>,
+    ties: Vec<VertexSpring>,
     /// Number of substeps of the repeated step; `last` is that of the last ordinary step.
     parts: u32,
     last: u32,
@@ -26,7 +26,7 @@ impl SoftBody {
     /// Repeats the coming step of `dt` seconds with twice the substeps of the last one, in parallel to the state, where it is the turn
     /// of the body `me`; returns the number of substeps. Steps under contact or impulses of peers are made once, as their impulses are
     /// given once.
-    pub(super) fn rehearse(&mut self, me: AgentId, dt: f64) -> u32 {
+    pub(super) fn repeat_step(&mut self, me: AgentId, dt: f64) -> u32 {
         let Self { doubling, positions, velocities, ties, .. } = self;
         if doubling.watch.begins(self.steps, me) {
             doubling.finer[0].clone_from(positions);
@@ -60,10 +60,10 @@ impl SoftBody {
 
     /// One substep of the repetition, which is not published; returns whether it could be solved.
     fn half(&mut self, h: f64) -> bool {
-        if self.foresee(h).is_err() {
+        if self.predict(h).is_err() {
             return false;
         }
-        self.touch(h);
+        self.solve_contacts(h);
         let Self { positions, velocities, free, ties, .. } = self;
         velocities.clone_from(free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
@@ -72,7 +72,7 @@ impl SoftBody {
     }
 
     /// Ends a step of `dt` seconds in `done` substeps.
-    pub(super) fn judge(&mut self, dt: f64, done: u32) {
+    pub(super) fn estimate_error(&mut self, dt: f64, done: u32) {
         let Self { doubling, positions, .. } = self;
         doubling.last = done;
         if !doubling.watch.is_on() {

@@ -58,21 +58,21 @@ impl System {
     /// Adds the stiffness −∂fᵢ/∂xⱼ, N/m, where `i` is not below `j`: the matrix is symmetric.
     pub fn stiffen(&mut self, i: u32, j: u32, stiffness: DMat3) {
         if i >= j {
-            self.add((i as usize, j as usize), stiffness * self.square);
+            self.add(i as usize, j as usize, stiffness * self.square);
         }
     }
 
     /// Adds an inertia that couples the velocities of two vertices, `i` not below `j`, kg.
-    pub fn join(&mut self, (i, j): (u32, u32), inertia: DMat3) {
-        self.add((i as usize, j as usize), inertia);
+    pub fn join(&mut self, i: u32, j: u32, inertia: DMat3) {
+        self.add(i as usize, j as usize, inertia);
     }
 
     /// Adds an inertia to a vertex, kg.
     pub fn weigh(&mut self, vertex: usize, inertia: DMat3) {
-        self.add((vertex, vertex), inertia);
+        self.add(vertex, vertex, inertia);
     }
 
-    fn add(&mut self, (i, j): (usize, usize), block: DMat3) {
+    fn add(&mut self, i: usize, j: usize, block: DMat3) {
         let Factor { matrix, rows } = &mut self.matrix;
         if let (Some(row), Some(column)) = (rows[i], rows[j]) {
             matrix.add_block(

@@ -81,7 +81,7 @@ fn shaken(shape: SoftShape) -> SoftBody {
 }
 
 #[test]
-fn what_was_never_touched_stays_as_it_was() {
+fn a_body_at_rest_without_loads_stays_as_it_was() {
     for shape in all() {
         let mut body = SoftBody::new(SoftSpec { rotation: DQuat::from_rotation_y(0.4), ..spec(shape) }).unwrap();
         let before = state(&body);
@@ -131,9 +131,9 @@ fn the_forces_of_a_bent_body_have_no_sum_and_no_torque() {
     for shape in all() {
         let mut body = shaken(shape);
         run(&mut body, 0.005, 5);
-        let SoftBody { lattice, system, positions, .. } = &mut body;
+        let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let size: f64 = system.forces.iter().map(|f| f.length()).sum();
         let sum: DVec3 = system.forces.iter().sum();
         let torque: DVec3 = system.forces.iter().zip(&*positions).map(|(f, x)| x.cross(*f)).sum();
@@ -146,13 +146,13 @@ fn forces_are_minus_the_slope_of_the_energy() {
     for shape in all() {
         let mut body = shaken(shape);
         run(&mut body, 0.005, 5);
-        let SoftBody { lattice, system, positions, .. } = &mut body;
+        let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);
-        lattice.add(positions, system);
+        mesh.add(positions, system);
         let force = system.forces.clone();
         let way = |k: usize| DVec3::new(libm::sin(k as f64), libm::cos(3.0 * k as f64), libm::sin(5.0 * k as f64));
         let at = |by: f64| -> Vec<DVec3> { positions.iter().enumerate().map(|(k, x)| *x + way(k) * by).collect() };
-        let slope = (lattice.energy_j(&at(1e-7)) - lattice.energy_j(&at(-1e-7))) / 2e-7;
+        let slope = (mesh.energy_j(&at(1e-7)) - mesh.energy_j(&at(-1e-7))) / 2e-7;
         let wanted: f64 = force.iter().enumerate().map(|(k, f)| -f.dot(way(k))).sum();
         // central differences of second order in 1e-7, rounding of energies near 0.1 J
         assert!((slope - wanted).abs() < 1e-5 * force.iter().map(|f| f.length()).sum::<f64>(), "{slope} {wanted}");
@@ -160,7 +160,7 @@ fn forces_are_minus_the_slope_of_the_energy() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_limit() {
+fn an_invalid_spec_is_refused_with_its_limit() {
     let fails = |spec: SoftSpec| SoftBody::new(spec).err().expect("must be refused").to_string();
     let rubber = SoftMatter { poisson: 0.5, ..MATTER };
     assert!(fails(SoftSpec { matter: rubber, ..spec(solid()) }).contains("0.49"));
@@ -168,7 +168,7 @@ fn what_cannot_be_is_refused_with_its_limit() {
     let fine = SoftShape::Ball { radius_m: 0.1, segments: 40 };
     assert!(fails(spec(fine)).contains("68921 vertices; at most 2048"));
     let point = SoftShape::Rope { path_m: vec![DVec3::X; 3], radius_m: 0.01, segments: 4 };
-    assert!(fails(spec(point)).contains("two points that are apart"));
+    assert!(fails(spec(point)).contains("two different points"));
     let bad = SoftShape::Box { size_m: DVec3::new(1.0, f64::NAN, 1.0), segments: [1; 3] };
     assert!(fails(spec(bad)).contains("the size is NaN"));
 }

@@ -6,9 +6,9 @@
 //! like a critically damped spring, solved exactly, so that being taken, released or put off by lost time never makes it jump.
 //! Contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
 
-use super::drive::{Drive, Led};
-use super::force_sensor::Felt;
-use super::gripper::{Jaws, let_in, nearest};
+use super::drive::{Drive, PointMotion};
+use super::force_sensor::ContactForces;
+use super::gripper::{Jaws, nearest, open_for};
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
@@ -32,12 +32,12 @@ pub struct Tool {
     script: Script,
     tool: ToolState,
     /// The commanded point and its velocity: the tip is there if no contact pushes it.
-    led: Led,
+    commanded: PointMotion,
     drive: Drive,
     /// Distance of the tip from the target of the script or the user spring, metres.
     lag_m: f64,
     jaws: Jaws,
-    felt: Felt,
+    forces: ContactForces,
     knock: Knock,
     form: Arc<CollisionShape>,
     /// Speed of its fastest point in the last step, m/s.
@@ -56,7 +56,7 @@ impl fmt::Debug for Tool {
 const FRICTION: f64 = 0.2;
 
 /// Rate at which the tip closes up to a user spring, 1/s: nine tenths of the distance in 65 ms; the tremor of a mouse is filtered out.
-const HAND_RATE_PER_S: f64 = 60.0;
+const USER_RATE_PER_S: f64 = 60.0;
 /// Rate at which it returns to its script after a user spring, 1/s: nine tenths of the distance in a second.
 const RETURN_RATE_PER_S: f64 = 4.0;
 /// Rate at which jaws open and close where no script sets them, 1/s.
@@ -66,7 +66,7 @@ const CATCH_SHARE: f64 = 0.5;
 /// A tip closer than this to its script has arrived, metres (and m/s).
 const ARRIVED: f64 = 1e-7;
 /// A tool on which sleeping bodies rest keeps still below this speed, m/s.
-const LAIN_M_S: f64 = 2e-3;
+const SUPPORTING_MAX_M_S: f64 = 2e-3;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
@@ -84,17 +84,17 @@ impl Tool {
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
         let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
-        let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
-        let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
+        let (jaws, forces, knock) = (Jaws::new(), ContactForces::default(), Knock::default());
+        let (commanded, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
         Ok(Self {
             spec,
             script,
             tool,
-            led,
+            commanded,
             drive,
             lag_m: 0.0,
             jaws,
-            felt,
+            forces,
             knock,
             form,
             speed_m_s: 0.0,
@@ -103,29 +103,28 @@ impl Tool {
         })
     }
 
-    /// Target of the user spring for the tip, and its velocity.
-    fn hand_target(&self, hand: &AnchorSpring) -> (DVec3, DVec3) {
-        let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
-        (hand.target - self.tool.rotation * local, hand.target_velocity)
+    /// Target of the user spring for the tip.
+    fn user_target(&self, spring: &AnchorSpring) -> PointMotion {
+        let local = if let Anchor::Local(local) = spring.anchor { local } else { DVec3::ZERO };
+        PointMotion { position: spring.target - self.tool.rotation * local, velocity: spring.target_velocity }
     }
 
     /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
-    fn follow_hand(&self, hand: &AnchorSpring, dt: f64, around: &StepContext<'_>) -> ToolState {
-        let (target, target_velocity) = self.hand_target(hand);
-        let now = (self.led.0 - target, self.led.1 - target_velocity);
-        let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
-        let tip = target + target_velocity * dt + off;
-        let near =
-            nearest(&self.spec, self.tool.tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
+    fn follow_user_spring(&self, spring: &AnchorSpring, dt: f64, context: &StepContext<'_>) -> ToolState {
+        let target = self.user_target(spring);
+        let off = decay(self.commanded.relative_to(target), USER_RATE_PER_S, dt);
+        let tip = target.position + target.velocity * dt + off.position;
+        let near = nearest(&self.spec, self.tool.tip, context)
+            .is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
         let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
-        ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
+        ToolState { tip, velocity: target.velocity + off.velocity, jaw, ..self.tool }
     }
 
     /// Follows the script; the offset from it decays.
     fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
-        let now = (self.led.0 - from.tip, self.led.1 - from.velocity);
-        let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
+        let start = PointMotion { position: from.tip, velocity: from.velocity };
+        let off = decay(self.commanded.relative_to(start), RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
         let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         let turned_off = self.tool.rotation * from.rotation.conjugate();
@@ -136,8 +135,8 @@ impl Tool {
             (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
         };
         ToolState {
-            tip: to.tip + off,
-            velocity: to.velocity + off_velocity,
+            tip: to.tip + off.position,
+            velocity: to.velocity + off.velocity,
             rotation,
             jaw: jaw.clamp(0.0, 1.0),
             ..self.tool
@@ -145,49 +144,51 @@ impl Tool {
     }
 
     /// Whether the tool grasps a neighbour or is linked to it: such neighbours see it as driven, and it takes their impulses so.
-    fn is_held_by(&self, other: &Neighbour, around: &StepContext<'_>) -> bool {
+    fn is_held_by(&self, other: &Neighbour, context: &StepContext<'_>) -> bool {
         let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
-        held || around.links.iter().any(|link| link.other == other.id)
+        held || context.links.iter().any(|link| link.other == other.id)
     }
 
     /// Moves the tip by the drive, against the impulses it received in contact.
-    fn drive_on(&mut self, led: ToolState, around: &StepContext<'_>, dt_s: f64) -> ToolState {
-        let mut felt = std::mem::take(&mut self.felt);
-        let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
-        self.felt = felt;
-        let (tip, velocity);
-        [self.led, (tip, velocity)] = self.drive.go_on([self.led, (led.tip, led.velocity)], &given, dt_s);
-        ToolState { tip, velocity, ..led }
+    fn drive_on(&mut self, led: ToolState, context: &StepContext<'_>, dt_s: f64) -> ToolState {
+        let mut forces = std::mem::take(&mut self.forces);
+        let given = forces.read(context, |other| self.is_held_by(other, context), dt_s);
+        self.forces = forces;
+        let to = PointMotion { position: led.tip, velocity: led.velocity };
+        let [held_back, tip] = self.drive.advance([self.commanded, to], &given, dt_s);
+        self.commanded = held_back;
+        ToolState { tip: tip.position, velocity: tip.velocity, ..led }
     }
 
     /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
-    fn let_in(&self, around: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
+    fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let open = self.tool.jaw > GRASP_BELOW;
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
-        if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
+        if open { open_for(&self.spec, self.tool.tip, context, reach_m) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, around: &StepContext<'_>, dt_s: f64) {
+    fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
         let placed = PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } };
-        self.knock.find(&placed, &bounds, (around, dt_s));
+        self.knock.find(&placed, &bounds, (context, dt_s));
     }
 
     /// Whether the commanded point has reached the end of the script: an obstacle that saturates the drive holds it back.
-    fn has_led_to(&self, end: &Pose) -> bool {
-        (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED
+    fn has_reached(&self, end: &Pose) -> bool {
+        (self.commanded.position - end.tip).length() < ARRIVED && self.commanded.velocity.length() < ARRIVED
     }
 
     /// Whether the tool has come to the end of its script and waits there, empty.
-    fn rests(&mut self, end: &Pose) -> bool {
+    fn try_rest(&mut self, end: &Pose) -> bool {
         // a body that sleeps on it gives no more force: the tool keeps still as well, or it would rise into that body
-        let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
+        let still = self.drive.has_arrived()
+            || (self.forces.is_supporting() && self.tool.velocity.length() < SUPPORTING_MAX_M_S);
         let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
-            self.led = (end.tip, DVec3::ZERO);
-            self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
+            self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
+            self.tool.tip = if self.drive.has_arrived() { end.tip } else { self.tool.tip };
             self.tool.velocity = DVec3::ZERO;
         }
         rests
@@ -227,11 +228,14 @@ fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
     if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
 }
 
-/// A deviation and its rate after `t` seconds of critical damping: exact for any step.
-fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
-    let left = libm::exp(-damping_s * t);
-    let push = rate + off * damping_s;
-    ((off + push * t) * left, (rate - push * (damping_s * t)) * left)
+/// A deviation after `t` seconds of critical damping: exact for any step.
+fn decay(off: PointMotion, damping_per_s: f64, t: f64) -> PointMotion {
+    let left = libm::exp(-damping_per_s * t);
+    let push = off.velocity + off.position * damping_per_s;
+    PointMotion {
+        position: (off.position + push * t) * left,
+        velocity: (off.velocity - push * (damping_per_s * t)) * left,
+    }
 }
 
 impl Agent for Tool {
@@ -239,50 +243,51 @@ impl Agent for Tool {
         "tool"
     }
 
-    /// Moves the tip by `dt`, moves the jaws, reads the forces felt.
+    /// Moves the tip by `dt`, moves the jaws, reads the forces on it.
     ///
     /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
-    fn step(&mut self, dt: SimSpan, around: &StepContext<'_>) -> Result<StepReport, StepError> {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        let (start_s, end_s) = (around.time.as_secs_f64(), (around.time + dt).as_secs_f64());
+        let (start_s, end_s) = (context.time.as_secs_f64(), (context.time + dt).as_secs_f64());
         let end = self.script.at(end_s);
-        let hand = around.hands.first();
-        let led = match hand {
-            Some(hand) => self.follow_hand(hand, dt_s, around),
+        let spring = context.hands.first();
+        let led = match spring {
+            Some(spring) => self.follow_user_spring(spring, dt_s, context),
             None => self.follow_script(&self.script.at(start_s), &end, dt_s),
         };
         let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
         if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
-            let what = format!("the hand leads its tip to {}", led.tip);
+            let what = format!("the user spring moves the tip to {}", led.tip);
             return Err(StepError::Diverged { model: "tool", dt_s, what });
         }
         let was = self.tool.jaw;
-        let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).0);
-        let led = self.drive_on(led, around, dt_s);
+        let wanted = spring.map_or(end.tip, |spring| self.user_target(spring).position);
+        let led = self.drive_on(led, context, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        let is_idle = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
+        let is_idle = spring.is_none() && self.script.is_over(end_s) && self.has_reached(&end);
         self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_idle, ..led };
-        self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
+        self.jaws.age(dt_s);
+        self.jaws.move_to(&self.spec, was, &self.tool, context);
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.admits = self.let_in(around, dt_s);
-        self.wake_others(around, dt_s);
-        self.tool.force_n = self.felt.force_n();
+        self.tool.admits = self.open_for(context, dt_s);
+        self.wake_others(context, dt_s);
+        self.tool.force_n = self.forces.force_n();
         self.steps += 1;
-        self.at_rest = is_idle && self.rests(&end);
+        self.at_rest = is_idle && self.try_rest(&end);
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
     /// Shortens the step near agents that it may push: neither the tool nor such an agent can predict the joint effect of drive and body,
     /// and an impulse received once in several steps of a peer would go on through all of the tool's steps.
-    fn longest_step(&self, dt: SimSpan, around: &StepContext<'_>) -> SimSpan {
-        let spared = |n: &Neighbour| self.tool.admits == Some(n.id) || self.is_held_by(n, around);
+    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
+        let spared = |n: &Neighbour| self.tool.admits == Some(n.id) || self.is_held_by(n, context);
         let bounds = || bounds(&self.tool, self.speed_m_s);
-        let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
+        let part = beside::longest_step(dt, context, bounds, |n| !spared(n));
         // a body that it comes to grasp will be let in between the jaws
         let catches = |n: &Neighbour| self.tool.jaw > GRASP_BELOW && self.spec.graspable.contains(&n.id);
         let pushes = |n: &Neighbour| !(spared(n) || catches(n));
-        beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
+        beside::no_longer(part, context, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -294,8 +299,8 @@ impl Agent for Tool {
     }
 
     /// Publishes the length of a step before the first one: peers predict the drive over that span.
-    fn observe(&mut self, dt: SimSpan, around: &StepContext<'_>) {
-        self.drive.look(self.longest_step(dt, around).as_secs_f64());
+    fn observe(&mut self, dt: SimSpan, context: &StepContext<'_>) {
+        self.drive.set_step(self.longest_step(dt, context).as_secs_f64());
     }
 
     /// A tool has no nodes to redistribute: nothing changes.
@@ -313,9 +318,9 @@ impl Agent for Tool {
             .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
         into.at_rest = self.at_rest;
         into.inertia = self.drive.inertia();
-        into.sprung.set(Some(self.drive.sprung(self.led.1)));
+        into.sprung.set(Some(self.drive.sprung(self.commanded.velocity)));
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));
-        self.felt.write(into);
+        self.forces.write(into);
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

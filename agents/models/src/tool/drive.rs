@@ -9,12 +9,25 @@ use glam::{DMat3, DVec3};
 use metachron_core::Inertia;
 use metachron_core::{Mat6, Sprung};
 
-/// A point and its velocity, metres and m/s.
-pub(super) type Led = (DVec3, DVec3);
+/// A moving point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PointMotion {
+    /// Metres.
+    pub position: DVec3,
+    /// Metres per second.
+    pub velocity: DVec3,
+}
+
+impl PointMotion {
+    /// How it moves as seen from `other`.
+    pub(super) fn relative_to(self, other: Self) -> Self {
+        Self { position: self.position - other.position, velocity: self.velocity - other.velocity }
+    }
+}
 
 /// The impulses that the tip received in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Given {
+pub(super) struct ReceivedImpulses {
     /// The new impulse: dJ, and t dJ − dS.
     pub sum: DVec3,
     /// See [`Self::sum`].
@@ -32,7 +45,7 @@ pub(super) struct Drive {
     off: DVec3,
     rate: DVec3,
     /// The force, newtons, while the tip holds the commanded point back.
-    slips: Option<DVec3>,
+    saturated_force: Option<DVec3>,
     /// The tip's acceleration in the last step without the impulses it received, m/s².
     past: DVec3,
     /// Length of that step, seconds.
@@ -44,7 +57,7 @@ const GIVE_M: f64 = 5e-3;
 /// Frequency of tip and drive, rad/s, critically damped: with [`GIVE_M`] the full force accelerates the tip by 16 g and no more.
 const SWING_PER_S: f64 = 180.0;
 /// A tip closer than this to the commanded point, in metres and m/s, and without contact forces, counts as having reached it.
-const THERE: f64 = 1e-7;
+const REACHED: f64 = 1e-7;
 /// Contact torques do not turn a tool: its inverse inertia is this small, 1/(kg·m²).
 const TURNS_PER_KG_M2: f64 = 1e-9;
 
@@ -52,13 +65,13 @@ impl Drive {
     /// A drive with this force limit, newtons, whose tip is at the commanded point.
     pub(super) fn new(limit_n: f64) -> Self {
         let none = DVec3::ZERO;
-        Self { limit_n, off: none, rate: none, slips: None, past: none, span_s: 0.0 }
+        Self { limit_n, off: none, rate: none, saturated_force: None, past: none, span_s: 0.0 }
     }
 
     /// Stiffness, N/m, and damping, N·s/m, as published: a drive at its force limit still resists changes of its velocity
     /// within a step.
     fn spring(&self) -> [f64; 2] {
-        let stiffness_n_m = if self.slips.is_some() { 0.0 } else { self.stiffness_n_m() };
+        let stiffness_n_m = if self.saturated_force.is_some() { 0.0 } else { self.stiffness_n_m() };
         [stiffness_n_m, self.damping_n_s_m()]
     }
 
@@ -75,12 +88,12 @@ impl Drive {
     }
 
     /// Sets the length of the steps to come, seconds.
-    pub(super) const fn look(&mut self, dt: f64) {
+    pub(super) const fn set_step(&mut self, dt: f64) {
         self.span_s = dt;
     }
 
     /// Whether the tip is at the commanded point.
-    pub(super) fn is_there(&self) -> bool {
+    pub(super) fn has_arrived(&self) -> bool {
         self.off == DVec3::ZERO && self.rate == DVec3::ZERO
     }
 
@@ -88,24 +101,35 @@ impl Drive {
     ///
     /// The tip moves like a body on springs (eq. 7d). Where the spring force would exceed the limit, it equals the limit and the
     /// commanded point stays that far from the tip (eq. 9f).
-    pub(super) fn go_on(&mut self, [from, to]: [Led; 2], given: &Given, dt: f64) -> [Led; 2] {
+    pub(super) fn advance(
+        &mut self,
+        [from, to]: [PointMotion; 2],
+        given: &ReceivedImpulses,
+        dt: f64,
+    ) -> [PointMotion; 2] {
         let [k, c] = self.spring();
         let known = (self.mass_kg() + self.span_s * (c + self.span_s * k)).recip();
         self.off += given.carried * known;
         self.rate += given.sum * known;
         self.span_s = dt;
-        let idle = self.off.length() < THERE && self.rate.length() < THERE && *given == Given::default();
+        let idle = self.off.length() < REACHED && self.rate.length() < REACHED && *given == ReceivedImpulses::default();
         if idle {
-            (self.off, self.rate, self.past, self.slips) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, None);
+            (self.off, self.rate, self.past, self.saturated_force) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, None);
             return [to, to];
         }
-        let led = self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.slip(from, (force, given.lasting), dt));
-        [led, (led.0 + self.off, led.1 + self.rate)]
+        let led =
+            self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.saturate(from, force, given.lasting, dt));
+        [led, self.tip(led)]
+    }
+
+    /// The tip, for this commanded point.
+    fn tip(&self, commanded: PointMotion) -> PointMotion {
+        PointMotion { position: commanded.position + self.off, velocity: commanded.velocity + self.rate }
     }
 
     /// Moves the tip by the spring while the commanded point follows the path; the mean force needed, clamped to the limit, as an error
     /// where it is too much.
-    fn pull(&mut self, to: Led, lasting: DVec3, dt: f64) -> Result<Led, DVec3> {
+    fn pull(&mut self, to: PointMotion, lasting: DVec3, dt: f64) -> Result<PointMotion, DVec3> {
         let (m, k, c) = (self.mass_kg(), self.stiffness_n_m(), self.damping_n_s_m());
         let yields = (m + dt * (c + dt * k)).recip();
         let pull = -(self.off + self.rate * dt) * k - self.rate * c;
@@ -116,19 +140,19 @@ impl Drive {
         }
         self.off += self.rate * dt + change * (0.5 * dt);
         self.rate += change;
-        (self.past, self.slips) = ((change - lasting * yields) / dt, None);
+        (self.past, self.saturated_force) = ((change - lasting * yields) / dt, None);
         Ok(to)
     }
 
     /// The drive gives its full `force`; the commanded point is at the distance from the tip that this force stretches the spring to.
-    fn slip(&mut self, from: Led, (force, lasting): (DVec3, DVec3), dt: f64) -> Led {
+    fn saturate(&mut self, from: PointMotion, force: DVec3, lasting: DVec3, dt: f64) -> PointMotion {
         let yields = (self.mass_kg() + dt * self.damping_n_s_m()).recip();
         let change = (force * dt + lasting) * yields;
-        let (place, velocity) = (from.0 + self.off, from.1 + self.rate);
-        let tip = place + velocity * dt + change * (0.5 * dt);
+        let PointMotion { position, velocity } = self.tip(from);
+        let tip = position + velocity * dt + change * (0.5 * dt);
         (self.off, self.rate) = (-force / self.stiffness_n_m(), DVec3::ZERO);
-        (self.past, self.slips) = (force * yields, Some(force));
-        (tip - self.off, velocity + change)
+        (self.past, self.saturated_force) = (force * yields, Some(force));
+        PointMotion { position: tip - self.off, velocity: velocity + change }
     }
 
     /// The tip's response to impulses apart from its spring.
@@ -147,7 +171,7 @@ impl Drive {
             six.add_point(DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(x)));
             six
         };
-        let force = self.slips.unwrap_or(self.off * -k - self.rate * c);
+        let force = self.saturated_force.unwrap_or(self.off * -k - self.rate * c);
         Sprung {
             force: [force, DVec3::ZERO],
             rising: [velocity * k, DVec3::ZERO],

@@ -8,7 +8,9 @@
 use super::ToolSpec;
 use glam::{DQuat, DVec3};
 use metachron_contact::{Neighbour, StepContext};
-use metachron_core::{AgentId, Anchor, Body, CurveState, GRASP_BELOW, Grasp, GraspOrientation, RigidState, SoftState};
+use metachron_core::{
+    AgentId, Anchor, Body, CurveState, GRASP_BELOW, Grasp, GraspOrientation, RigidState, SoftState, ToolState,
+};
 use metachron_geometry::{ShapeKind, SolidShape};
 
 /// Jaws that open past this opening release.
@@ -21,23 +23,23 @@ const RAMP_START: f64 = 1e-3;
 /// Jaws and the grasped body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Jaws {
-    held: Option<Held>,
+    held: Option<ActiveGrasp>,
     /// The jaws were open, so that closing them can catch something.
     armed: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Held {
+struct ActiveGrasp {
     target: AgentId,
     anchor: Anchor,
     /// Rotation from a rigid body's axes to the tool's, when it was grasped.
     rotation: Option<DQuat>,
-    for_s: f64,
+    held_s: f64,
 }
 
 /// The nearest graspable point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Near {
+pub(super) struct GraspCandidate {
     target: AgentId,
     anchor: Anchor,
     /// From the tip to its skin, metres; a tube's is below zero inside.
@@ -57,24 +59,23 @@ impl Jaws {
         self.held.is_some()
     }
 
-    /// Opens and closes over a step of `dt` seconds: from opening `was` to `now`, the tip at `tip`, the tool turned by `rotation`.
-    pub(super) fn move_to(
-        &mut self,
-        spec: &ToolSpec,
-        (was, now): (f64, f64),
-        (tip, rotation): (DVec3, DQuat),
-        seen: (&StepContext<'_>, f64),
-    ) {
-        let (around, dt) = seen;
+    /// Lets `dt` seconds pass for a grasp that lasts.
+    pub(super) fn age(&mut self, dt: f64) {
+        if let Some(held) = &mut self.held {
+            held.held_s += dt;
+        }
+    }
+
+    /// Opens or closes from the opening `was` to that of `tool`, the tool as it is now: grasps and releases.
+    pub(super) fn move_to(&mut self, spec: &ToolSpec, was: f64, tool: &ToolState, context: &StepContext<'_>) {
+        let ToolState { tip, rotation, jaw: now, .. } = *tool;
         if now > RELEASE_ABOVE {
             *self = Self::new();
         }
-        if let Some(held) = &mut self.held {
-            held.for_s += dt;
-        } else if now < GRASP_BELOW && self.armed {
-            self.held = nearest(spec, tip, around).map(|Near { target, anchor, rotation: body, .. }| {
+        if self.held.is_none() && now < GRASP_BELOW && self.armed {
+            self.held = nearest(spec, tip, context).map(|GraspCandidate { target, anchor, rotation: body, .. }| {
                 let rotation = body.map(|body| (rotation.conjugate() * body).normalize());
-                Held { target, anchor, rotation, for_s: 0.0 }
+                ActiveGrasp { target, anchor, rotation, held_s: 0.0 }
             });
             // jaws that have come to a stop grasp nothing any more
             self.armed = self.held.is_none() && now < was;
@@ -84,7 +85,7 @@ impl Jaws {
     /// The grasp as published.
     pub(super) fn grasp(&self, spec: &ToolSpec) -> Option<Grasp> {
         let held = self.held?;
-        let u = (held.for_s / RAMP_S).min(1.0);
+        let u = (held.held_s / RAMP_S).min(1.0);
         let share = (u * u * (3.0 - 2.0 * u)).max(RAMP_START);
         Some(Grasp {
             target: held.target,
@@ -97,30 +98,31 @@ impl Jaws {
 }
 
 /// The nearest graspable point within reach.
-pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &StepContext<'_>) -> Option<Near> {
-    nearest_of(spec, tip, (around, spec.reach_m), |_| true)
+pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>) -> Option<GraspCandidate> {
+    nearest_of(spec, tip, context, spec.reach_m, |_| true)
 }
 
 /// The rigid body that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
-pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&StepContext<'_>, f64)) -> Option<AgentId> {
+pub(super) fn open_for(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>, reach_m: f64) -> Option<AgentId> {
     let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
-    nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
+    nearest_of(spec, tip, context, reach_m, rigid).map(|near| near.target)
 }
 
 /// The nearest point within `reach_m` on graspable agents that are `wanted`.
 fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
-    (around, reach_m): (&StepContext<'_>, f64),
+    context: &StepContext<'_>,
+    reach_m: f64,
     wanted: impl Fn(&Neighbour) -> bool,
-) -> Option<Near> {
-    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
+) -> Option<GraspCandidate> {
+    let graspable = context.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
     let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= reach_m);
     near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
 }
 
 /// The nearest point of an agent, if it can be held.
-fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
+fn point_of(other: &Neighbour, tip: DVec3) -> Option<GraspCandidate> {
     let ((anchor, gap_m), rotation) = match &other.snapshot.body {
         Body::Curve(curve) => (nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?, None),
         Body::Soft(soft) => (nearest_vertex(soft, tip)?, None),
@@ -130,7 +132,7 @@ fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
         }
         Body::Tool(_) | Body::Nothing => return None,
     };
-    Some(Near { target: other.id, anchor, gap_m, rotation })
+    Some(GraspCandidate { target: other.id, anchor, gap_m, rotation })
 }
 
 /// The nearest point of a solid, and its distance: zero inside.

@@ -48,7 +48,7 @@ pub enum ToolError {
     #[error("a tool needs at least one keyframe")]
     NoKeyframe,
     /// A keyframe is not later than the one before it.
-    #[error("keyframe {index} is at {at_s} s; it must be later than the one before, at {before_s} s")]
+    #[error("keyframe {index} is at {at_s} s; its time must be later than that of the keyframe before, {before_s} s")]
     NotRising {
         /// Number of the keyframe, from 0.
         index: usize,
@@ -103,10 +103,15 @@ impl ToolSpec {
         number("the stiffness", k, within(k, f64::MIN_POSITIVE, 1e9), "above zero and at most 1e9 N/m")?;
         let c = self.damping_n_s_m;
         let f = self.max_force_n;
-        number("the greatest force", f, within(f, 1e-6, FORCE_MAX_N), "between 1e-6 and 1000 N")?;
+        number("the maximum force", f, within(f, 1e-6, FORCE_MAX_N), "between 1e-6 and 1000 N")?;
         number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
         let off_m = self.starts_off_m.length();
-        number("the way from the first keyframe", off_m, within(off_m, 0.0, REACH_MAX_M), "finite, within 1e6 m")?;
+        number(
+            "the initial offset from the first keyframe",
+            off_m,
+            within(off_m, 0.0, REACH_MAX_M),
+            "finite, within 1e6 m",
+        )?;
         let mut before_s = f64::NEG_INFINITY;
         for (index, key) in self.keyframes.iter().enumerate() {
             key.check(index)?;

@@ -63,18 +63,18 @@ fn snapshot(tool: &Tool) -> Snapshot {
 struct Stage {
     tool: Tool,
     time: SimTime,
-    around: Vec<Neighbour>,
+    neighbours: Vec<Neighbour>,
 }
 
 impl Stage {
     fn new(spec: ToolSpec) -> Self {
-        Self { tool: Tool::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
+        Self { tool: Tool::new(spec).unwrap(), time: SimTime::ZERO, neighbours: vec![tube()] }
     }
 
     fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let around = StepContext { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
-        let report = self.tool.step(dt, &around)?;
+        let context = StepContext { me: ME, time: self.time, neighbours: &self.neighbours, hands, links: &[] };
+        let report = self.tool.step(dt, &context)?;
         self.time += dt;
         Ok(report)
     }
@@ -124,7 +124,7 @@ fn a_repeating_script_never_rests() {
 }
 
 #[test]
-fn one_keyframe_is_a_tool_that_waits_there() {
+fn a_tool_with_one_keyframe_waits_there() {
     let mut stage = Stage::new(ToolSpec { repeat: true, ..spec(vec![key(0.0, DVec3::Y, 0.7)]) });
     assert!(stage.step().at_rest);
     assert_eq!(state(&stage.tool).tip, DVec3::Y);
@@ -158,7 +158,7 @@ fn closing_jaws_hold_the_nearest_point_and_opening_jaws_let_go() {
 }
 
 #[test]
-fn a_hold_comes_on_smoothly_and_reaches_its_stiffness() {
+fn a_grasp_ramps_up_smoothly_to_its_stiffness() {
     let over = DVec3::new(0.3, 0.0, 0.02);
     let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
     let mut last = 0.0;
@@ -197,7 +197,7 @@ fn a_tube_out_of_reach_is_not_grasped() {
 }
 
 #[test]
-fn a_tool_feels_what_it_was_given_as_the_mean_force_since_it_last_read() {
+fn a_tool_reports_received_impulses_as_the_mean_force_since_its_last_read() {
     let over = DVec3::new(0.3, 0.0, 0.02);
     let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
     let account = |with, linear: DVec3| {
@@ -211,18 +211,18 @@ fn a_tool_feels_what_it_was_given_as_the_mean_force_since_it_last_read() {
         let snapshot = Snapshot { time, given, ..near.snapshot.as_ref().clone() };
         vec![Neighbour { snapshot: Arc::new(snapshot), ..near }]
     };
-    stage.around = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
+    stage.neighbours = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
     stage.step();
     assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12); // 0.5 N·s in 100 ms
     stage.step();
     assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12, "nothing new is known");
-    stage.around = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
+    stage.neighbours = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
     stage.step();
     assert_eq!(state(&stage.tool).force_n, 0.0, "nothing more was given");
 }
 
 #[test]
-fn a_hand_leads_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
+fn a_user_spring_moves_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
     let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
     let (mut before, target) = (state(&stage.tool), DVec3::new(0.5, 1.0, 0.5));
     let mut step = |stage: &mut Stage, hands: &[AnchorSpring]| {
@@ -241,7 +241,7 @@ fn a_hand_leads_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
 }
 
 #[test]
-fn in_the_hand_jaws_close_on_a_tube_that_is_near_and_open_when_let_go() {
+fn under_a_user_spring_jaws_close_on_a_near_tube_and_open_on_release() {
     let mut stage = Stage::new(spec(vec![key(0.0, DVec3::new(0.3, 0.0, 0.3), 0.7)]));
     let near = hand(DVec3::new(0.3, 0.0, 0.015)); // 5 mm from the skin
     (0..100).for_each(|_| drop(stage.step_with(&[near])));
@@ -266,7 +266,7 @@ fn lost_time_does_not_make_the_tip_jump() {
 }
 
 #[test]
-fn a_hand_that_is_nowhere_is_refused() {
+fn a_user_spring_without_a_finite_target_is_refused() {
     for target in [DVec3::NAN, DVec3::splat(1e300), DVec3::splat(f64::INFINITY)] {
         let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
         let before = state(&stage.tool);
@@ -277,7 +277,7 @@ fn a_hand_that_is_nowhere_is_refused() {
 }
 
 #[test]
-fn scripts_that_are_none_are_refused() {
+fn invalid_scripts_are_refused() {
     let refuse = |spec: ToolSpec| Tool::new(spec).expect_err("it is refused");
     assert_eq!(refuse(spec(vec![])), ToolError::NoKeyframe);
     let backwards = refuse(spec(vec![key(1.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0)]));
@@ -304,7 +304,7 @@ fn scripts_that_are_none_are_refused() {
 }
 
 #[test]
-fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
+fn a_tool_wakes_only_the_sleeping_agents_in_its_way() {
     let form = Arc::new(CollisionShape {
         kind: ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 },
         friction: 0.2,
@@ -325,7 +325,7 @@ fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
         let down = [key(0.0, DVec3::new(0.3, 0.0, 0.4), 0.0), key(1.0, DVec3::new(0.3, 0.0, end_m), 0.0)];
         let turned = down.map(|key| Keyframe { rotation: DQuat::from_rotation_x(std::f64::consts::PI), ..key });
         let mut stage = Stage::new(spec(turned.to_vec()));
-        stage.around = vec![asleep(tube())];
+        stage.neighbours = vec![asleep(tube())];
         let mut woke_at_m = None;
         for _ in 0..130 {
             stage.step();
@@ -336,6 +336,6 @@ fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
         assert_eq!(woke_at_m.is_some(), wakes, "down to {end_m} m");
         // the jaws reach a centimetre beyond the tip, the skin of the tube one more, two steps at most one more
         assert!(woke_at_m.is_none_or(|z| z > 0.01 && z < 0.06), "{woke_at_m:?}");
-        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool that stands wakes nobody");
+        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool at rest wakes no agent");
     }
 }

@@ -20,7 +20,7 @@ pub(super) struct Pose {
 
 /// A keyframe and the slope of the curve there.
 #[derive(Debug, Clone, Copy)]
-struct Knot {
+struct SplineKey {
     at_s: f64,
     /// Tip and jaw.
     value: DVec4,
@@ -31,7 +31,7 @@ struct Knot {
 /// A script ready to be read.
 #[derive(Debug, Clone)]
 pub(super) struct Script {
-    knots: Vec<Knot>,
+    keys: Vec<SplineKey>,
     repeat: bool,
     /// Time at which the script starts, seconds.
     begin_s: f64,
@@ -40,21 +40,21 @@ pub(super) struct Script {
 impl Script {
     /// A curve through `keyframes`: at least one, times rising.
     pub(super) fn new(keyframes: &[Keyframe], repeat: bool) -> Self {
-        let mut knots: Vec<Knot> = keyframes
+        let mut keys: Vec<SplineKey> = keyframes
             .iter()
-            .map(|key| Knot {
+            .map(|key| SplineKey {
                 at_s: key.at_s,
                 value: key.tip_m.extend(key.jaw),
                 slope: DVec4::ZERO,
                 rotation: key.rotation.normalize(),
             })
             .collect();
-        if repeat && knots.len() > 1 {
-            close(&mut knots);
+        if repeat && keys.len() > 1 {
+            close_loop(&mut keys);
         }
-        set_slopes(&mut knots, repeat);
-        let repeat = repeat && knots.len() > 1;
-        Self { knots, repeat, begin_s: 0.0 }
+        set_slopes(&mut keys, repeat);
+        let repeat = repeat && keys.len() > 1;
+        Self { keys, repeat, begin_s: 0.0 }
     }
 
     /// Shifts the start of the script by so many seconds, later if positive.
@@ -65,60 +65,71 @@ impl Script {
     /// The pose at `time_s`: before its first keyframe the script waits in it, after its last it waits in that.
     pub(super) fn at(&self, time_s: f64) -> Pose {
         let time_s = time_s - self.begin_s;
-        let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
+        let (first, last) = (self.keys[0], self.keys[self.keys.len() - 1]);
         let t = if self.repeat && time_s > first.at_s {
             first.at_s + (time_s - first.at_s) % (last.at_s - first.at_s)
         } else {
             time_s
         };
-        let right = self.knots.partition_point(|knot| knot.at_s <= t);
-        match (right.checked_sub(1), self.knots.get(right)) {
-            (None, _) => still(&first),
-            (Some(left), Some(next)) => between(&self.knots[left], next, t),
-            (Some(_), None) => still(&last),
+        let right = self.keys.partition_point(|key| key.at_s <= t);
+        match (right.checked_sub(1), self.keys.get(right)) {
+            (None, _) => pose_at(&first),
+            (Some(left), Some(next)) => between(&self.keys[left], next, t),
+            (Some(_), None) => pose_at(&last),
         }
     }
 
     /// Whether the script no longer moves from `time_s` on.
     pub(super) fn is_over(&self, time_s: f64) -> bool {
-        !self.repeat && time_s - self.begin_s >= self.knots[self.knots.len() - 1].at_s
+        !self.repeat && time_s - self.begin_s >= self.keys[self.keys.len() - 1].at_s
     }
 }
 
 /// Appends a keyframe that returns to the start, so that the script can repeat without a jump.
-fn close(knots: &mut Vec<Knot>) {
-    let (first, before, last) = (knots[0], knots[knots.len() - 2], knots[knots.len() - 1]);
+fn close_loop(keys: &mut Vec<SplineKey>) {
+    let (first, before, last) = (keys[0], keys[keys.len() - 2], keys[keys.len() - 1]);
     let same = first.value == last.value && first.rotation.dot(last.rotation).abs() >= 1.0 - 1e-12;
     if !same {
-        knots.push(Knot { at_s: last.at_s + (last.at_s - before.at_s), ..first });
+        keys.push(SplineKey { at_s: last.at_s + (last.at_s - before.at_s), ..first });
     }
 }
 
 /// The harmonic mean of both neighbouring slopes where they agree in sign, else zero (FB84); zero at open ends.
-fn set_slopes(knots: &mut [Knot], closed: bool) {
-    let last = knots.len() - 1;
-    let secant = |a: &Knot, b: &Knot| (b.at_s - a.at_s, (b.value - a.value) / (b.at_s - a.at_s));
+fn set_slopes(keys: &mut [SplineKey], closed: bool) {
+    let last = keys.len() - 1;
+    let secant = |a: &SplineKey, b: &SplineKey| Secant {
+        span_s: b.at_s - a.at_s,
+        slope: (b.value - a.value) / (b.at_s - a.at_s),
+    };
     for i in 1..last {
-        knots[i].slope = mean_slope(secant(&knots[i - 1], &knots[i]), secant(&knots[i], &knots[i + 1]));
+        keys[i].slope = mean_slope(secant(&keys[i - 1], &keys[i]), secant(&keys[i], &keys[i + 1]));
     }
     if closed && last > 1 {
-        let around = mean_slope(secant(&knots[last - 1], &knots[last]), secant(&knots[0], &knots[1]));
-        (knots[0].slope, knots[last].slope) = (around, around);
+        let wrapped = mean_slope(secant(&keys[last - 1], &keys[last]), secant(&keys[0], &keys[1]));
+        (keys[0].slope, keys[last].slope) = (wrapped, wrapped);
     }
 }
 
-fn mean_slope((h0, s0): (f64, DVec4), (h1, s1): (f64, DVec4)) -> DVec4 {
+/// The straight line between two keyframes: its duration, seconds, and its slope per second.
+#[derive(Clone, Copy)]
+struct Secant {
+    span_s: f64,
+    slope: DVec4,
+}
+
+fn mean_slope(before: Secant, after: Secant) -> DVec4 {
+    let (Secant { span_s: h0, slope: s0 }, Secant { span_s: h1, slope: s1 }) = (before, after);
     let (w0, w1) = (h0 + 2.0 * h1, 2.0 * h0 + h1);
     let mean = |a: f64, b: f64| if a * b > 0.0 { (w0 + w1) / (w0 / a + w1 / b) } else { 0.0 };
     DVec4::new(mean(s0.x, s1.x), mean(s0.y, s1.y), mean(s0.z, s1.z), mean(s0.w, s1.w))
 }
 
-fn still(knot: &Knot) -> Pose {
-    Pose { tip: knot.value.truncate(), velocity: DVec3::ZERO, rotation: knot.rotation, jaw: knot.value.w }
+fn pose_at(key: &SplineKey) -> Pose {
+    Pose { tip: key.value.truncate(), velocity: DVec3::ZERO, rotation: key.rotation, jaw: key.value.w }
 }
 
 /// The cubic Hermite curve between two knots.
-fn between(a: &Knot, b: &Knot, t: f64) -> Pose {
+fn between(a: &SplineKey, b: &SplineKey, t: f64) -> Pose {
     let h = b.at_s - a.at_s;
     let u = (t - a.at_s) / h;
     let (u2, u3) = (u * u, u * u * u);

@@ -6,7 +6,9 @@
 use super::bare;
 use super::cast::{Model, agent, spawn};
 use super::machine::{others_cpu, own_cpu, resident_bytes, switches};
-use metachron_runtime::{AgentStats, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads};
+use metachron_runtime::{
+    AgentStats, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads, TimelineCommand,
+};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -128,7 +130,7 @@ pub fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
         Executor::Pool => Box::new(Pool::start(spawns, clock, case.priority)?),
         Executor::Lockstep => Box::new(Lockstep::start(spawns, Machine::default())?),
     };
-    run.drive(Drive::Run);
+    run.drive(TimelineCommand::Run);
     let start_ms = millis(started.elapsed());
     let observed = observe(&mut *run, case.executor == Executor::Lockstep, span);
     let after = resident_bytes();

@@ -29,7 +29,7 @@ pub struct Timeline {
 
 /// A user's command to the timeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Drive {
+pub enum TimelineCommand {
     /// Simulated time stops.
     Pause,
     /// Simulated time runs on.
@@ -109,15 +109,15 @@ impl Timeline {
 
     /// The piece that follows when `drive` is requested at wall time `wall`.
     #[must_use]
-    pub fn after(&self, wall: Duration, drive: Drive) -> Self {
+    pub fn after(&self, wall: Duration, drive: TimelineCommand) -> Self {
         let sim = self.sim_at(wall);
         let mut next = Self { wall, sim, piece: self.piece + 1, ..*self };
         match drive {
-            Drive::Pause => next.until = Some(sim),
-            Drive::Run => next.until = None,
-            Drive::Speed(speed) if speed.is_nan() => return *self,
-            Drive::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
-            Drive::Step(span) => next.until = Some(self.until.unwrap_or(sim) + span),
+            TimelineCommand::Pause => next.until = Some(sim),
+            TimelineCommand::Run => next.until = None,
+            TimelineCommand::Speed(speed) if speed.is_nan() => return *self,
+            TimelineCommand::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
+            TimelineCommand::Step(span) => next.until = Some(self.until.unwrap_or(sim) + span),
         }
         next
     }
@@ -163,7 +163,7 @@ impl SharedTimeline {
     }
 
     /// Changes the timeline at wall time `wall`. Threads that sleep until a due time must be woken after it.
-    pub fn drive(&self, wall: Duration, drive: Drive) {
+    pub fn drive(&self, wall: Duration, drive: TimelineCommand) {
         let next = self.read().after(wall, drive);
         self.piece.store(Arc::new(next));
         self.number.store(next.piece, Release);
@@ -190,18 +190,18 @@ mod tests {
 
     #[test]
     fn pause_freezes_simulated_time_and_run_goes_on_from_there() {
-        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        let paused = Timeline::new().after(ms(100), TimelineCommand::Pause);
         assert_eq!(paused.sim_at(ms(5000)), sim_ms(100));
         assert!(!paused.runs_at(ms(5000)));
-        let running = paused.after(ms(5000), Drive::Run);
+        let running = paused.after(ms(5000), TimelineCommand::Run);
         assert_eq!(running.sim_at(ms(5010)), sim_ms(110));
     }
 
     #[test]
     fn a_single_step_advances_by_exactly_its_span() {
         let span = SimSpan::from_nanos(16_666_667);
-        let paused = Timeline::new().after(ms(100), Drive::Pause);
-        let stepping = paused.after(ms(200), Drive::Step(span));
+        let paused = Timeline::new().after(ms(100), TimelineCommand::Pause);
+        let stepping = paused.after(ms(200), TimelineCommand::Step(span));
         assert!(stepping.runs_at(ms(210)));
         assert_eq!(stepping.sim_at(ms(9000)), sim_ms(100) + span);
         assert!(!stepping.runs_at(ms(9000)));
@@ -210,23 +210,23 @@ mod tests {
     #[test]
     fn single_steps_asked_for_in_a_hurry_add_up() {
         let span = SimSpan::from_nanos(10_000_000);
-        let paused = Timeline::new().after(ms(100), Drive::Pause);
-        let twice = paused.after(ms(200), Drive::Step(span)).after(ms(201), Drive::Step(span));
+        let paused = Timeline::new().after(ms(100), TimelineCommand::Pause);
+        let twice = paused.after(ms(200), TimelineCommand::Step(span)).after(ms(201), TimelineCommand::Step(span));
         assert_eq!(twice.sim_at(ms(9000)), sim_ms(120));
     }
 
     #[test]
     fn a_change_of_speed_keeps_the_present() {
-        let slow = Timeline::new().after(ms(1000), Drive::Speed(0.25));
+        let slow = Timeline::new().after(ms(1000), TimelineCommand::Speed(0.25));
         assert_eq!(slow.sim_at(ms(1000)), sim_ms(1000));
         assert_eq!(slow.sim_at(ms(1400)), sim_ms(1100));
-        assert_eq!(slow.after(ms(1400), Drive::Speed(f64::NAN)), slow);
+        assert_eq!(slow.after(ms(1400), TimelineCommand::Speed(f64::NAN)), slow);
     }
 
     #[test]
     fn wall_of_is_the_first_moment_that_has_reached_the_time() {
         for speed in [0.001, 0.3, 1.0, 3.0, 7.7] {
-            let line = Timeline::new().after(ms(3), Drive::Speed(speed));
+            let line = Timeline::new().after(ms(3), TimelineCommand::Speed(speed));
             for nanos in [3_000_000_u64, 3_000_001, 4_567_891, 1_234_567_891] {
                 let sim = SimTime::from_nanos(nanos);
                 let wall = line.wall_of(sim).unwrap();
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn a_step_is_never_due_on_a_timeline_that_stands_still() {
-        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        let paused = Timeline::new().after(ms(100), TimelineCommand::Pause);
         assert_eq!(paused.wall_of(sim_ms(100)), None);
         assert_eq!(paused.wall_of(sim_ms(101)), None);
         assert_eq!(paused.wall_of(sim_ms(90)), Some(ms(90)));

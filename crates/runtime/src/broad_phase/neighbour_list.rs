@@ -1,29 +1,29 @@
 //! Candidates for contact of one agent.
 //!
-//! In: the agent's own box and time, the crowd. Out: the peers near enough, by rising numbers.
-//! Every peer has an appointment: the time before which the two cannot be near, from their distance and their published speeds (the kinetic
-//! form of a Verlet list). It is not checked earlier. The few earliest appointments are stored one by one; all other peers share one, the
-//! earliest of theirs, at which all agents are checked: memory per agent does not grow with the crowd. Never here: the purpose of the list.
+//! In: the agent's own box and time, the broad phase. Out: the peers near enough, by rising numbers.
+//! Every peer has a next check: the time before which the two cannot be near, from their distance and their published speeds (the kinetic
+//! form of a Verlet list). It is not checked earlier. The few earliest checks are stored one by one; all other peers share one, the
+//! earliest of theirs, at which all agents are checked: memory per agent does not grow with the number of agents. Never here: the purpose of the list.
 
 use super::super::fellows::{Fellows, World};
-use super::published_bounds::{Reach, Seen};
-use super::{BroadPhase, SPEED_LEAST_M_S};
+use super::published_bounds::{MovingBox, ReadBounds};
+use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 
 /// Knowledge of one agent about the boxes of the others.
 #[derive(Debug)]
 pub(in super::super) struct NeighbourList {
     me: AgentId,
-    mine: Option<Reach>,
+    mine: Option<MovingBox>,
     /// The speed at the end of the previous step, m/s: the motion to the newest state may have started with it.
     speed_before_m_s: f64,
-    /// Peers with appointments before the common one, by rising numbers.
-    listed: Vec<Other>,
-    /// No listed appointment is earlier.
+    /// Peers with checks before the common one, by rising numbers.
+    listed: Vec<ListedPeer>,
+    /// No listed next check is earlier.
     soonest: SimTime,
-    /// The common appointment of all peers that are not listed.
-    everybody: SimTime,
-    /// The step length for which appointments were made.
+    /// The common next check of all peers that are not listed.
+    common_check: SimTime,
+    /// The step length for which checks were made.
     dt: SimSpan,
     /// The first log entry that has not been read.
     unread: u64,
@@ -34,7 +34,7 @@ pub(in super::super) struct NeighbourList {
 
 /// A peer, and when it is checked again.
 #[derive(Debug, Clone, Copy)]
-struct Other {
+struct ListedPeer {
     id: AgentId,
     at: SimTime,
     near: bool,
@@ -58,7 +58,7 @@ const FAR_ROOM: f64 = 1.001;
 /// Number of peers listed in addition to the near ones.
 const LISTED: usize = 8;
 
-/// An appointment that is never due: both are at rest, apart.
+/// A check that is never due: both are at rest, apart.
 const NEVER: SimTime = SimTime::from_nanos(u64::MAX);
 
 impl NeighbourList {
@@ -70,7 +70,7 @@ impl NeighbourList {
             speed_before_m_s: 0.0,
             listed: Vec::new(),
             soonest: SimTime::ZERO,
-            everybody: SimTime::ZERO,
+            common_check: SimTime::ZERO,
             dt: SimSpan::ZERO,
             unread: 0,
             near: Vec::new(),
@@ -83,165 +83,174 @@ impl NeighbourList {
         &self.near
     }
 
-    /// Publishes to the crowd that this agent is inside `bounds` at its time `time` (`None`: without bounds).
-    pub fn stand(&mut self, crowd: &BroadPhase, bounds: Option<&Bounds>, time: SimTime) {
-        let said = self.mine.map_or(0.0, |mine| mine.speed_m_s);
+    /// Publishes to the broad phase that this agent is inside `bounds` at its time `time` (`None`: without bounds).
+    pub fn publish(&mut self, broad_phase: &BroadPhase, bounds: Option<&Bounds>, time: SimTime) {
+        let published = self.mine.map_or(0.0, |mine| mine.speed_m_s);
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
             let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
-            let said_m_s = crowd.stand(self.me, &Bounds { speed_m_s, ..*bounds }, time).max(SPEED_LEAST_M_S);
-            Reach::new(bounds, said_m_s, time)
+            let published_m_s =
+                broad_phase.publish(self.me, &Bounds { speed_m_s, ..*bounds }, time).max(SPEED_LEAST_M_S);
+            MovingBox::new(bounds, published_m_s, time)
         });
         self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
-        if self.mine.is_some_and(|mine| mine.speed_m_s > said) {
-            self.everybody = SimTime::ZERO;
+        if self.mine.is_some_and(|mine| mine.speed_m_s > published) {
+            self.common_check = SimTime::ZERO;
         }
     }
 
-    /// Checks the peers whose appointment is due, before a step of `dt` from `now`; returns how many were checked. Only peers that it
-    /// `may_touch` are near; members of its own island (`fellows`) are skipped.
-    pub fn look(
+    /// Checks the peers whose next check is due, before a `step`; returns how many were checked. Only peers that it `may_touch` are near;
+    /// members of its own island (`members`) are skipped.
+    pub fn update(
         &mut self,
-        crowd: &BroadPhase,
-        (now, dt): (SimTime, SimSpan),
-        fellows: &Fellows,
+        broad_phase: &BroadPhase,
+        step: PlannedStep,
+        members: &Fellows,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
-        if self.world != fellows.world() {
-            (self.world, self.everybody) = (fellows.world(), SimTime::ZERO);
+        let PlannedStep { start: now, dt } = step;
+        if self.world != members.world() {
+            (self.world, self.common_check) = (members.world(), SimTime::ZERO);
         }
-        self.read_notes(crowd, fellows);
-        // appointments leave time for two steps
+        self.read_log(broad_phase, members);
+        // checks leave time for two steps
         if dt.as_nanos() > 2 * self.dt.as_nanos() {
-            self.everybody = SimTime::ZERO;
+            self.common_check = SimTime::ZERO;
         }
-        if self.soonest.min(self.everybody) > now {
+        if self.soonest.min(self.common_check) > now {
             return 0;
         }
         let Some(mine) = self.mine else { return 0 };
-        let looks = if self.everybody <= now {
+        let checked = if self.common_check <= now {
             self.dt = dt;
-            self.survey(crowd, &mine, now, (fellows, may_touch))
+            self.check_all(broad_phase, now, members, may_touch)
         } else {
-            self.listed.retain(|other| !fellows.has(other.id));
-            self.keep_appointments(crowd, &mine, now, may_touch)
+            self.listed.retain(|other| !members.has(other.id));
+            self.check_due(broad_phase, &mine, now, may_touch)
         };
         self.soonest = self.listed.iter().map(|other| other.at).min().unwrap_or(NEVER);
         self.near.clear();
         self.near.extend(self.listed.iter().filter(|other| other.near).map(|other| other.id));
-        looks
+        checked
     }
 
-    /// Checks the listed peers whose appointment is due; a peer that is distant again falls back to the common appointment.
-    fn keep_appointments(
+    /// Checks the listed peers whose next check is due; a peer that is distant again falls back to the common next check.
+    fn check_due(
         &mut self,
-        crowd: &BroadPhase,
-        mine: &Reach,
+        broad_phase: &BroadPhase,
+        mine: &MovingBox,
         now: SimTime,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
-        let (mut looks, dt, everybody) = (0, self.dt, self.everybody);
+        let (mut checked, common_check) = (0, self.common_check);
+        let step = PlannedStep { start: now, dt: self.dt };
         self.listed.retain_mut(|other| {
             let is_new = other.at == SimTime::ZERO;
             if other.at <= now {
-                looks += 1;
-                (other.at, other.near) = appointment(mine, crowd.seen(other.id), other.near, (now, dt));
+                checked += 1;
+                (other.at, other.near) = next_check(mine, broad_phase.bounds_of(other.id), other.near, step);
             }
-            (other.near || other.at < everybody) && (!is_new || may_touch(other.id))
+            (other.near || other.at < common_check) && (!is_new || may_touch(other.id))
         });
-        looks
+        checked
     }
 
-    /// Checks all agents, and lists those with the earliest appointments.
-    fn survey(
+    /// Checks all agents, and lists those with the earliest checks.
+    fn check_all(
         &mut self,
-        crowd: &BroadPhase,
-        mine: &Reach,
+        broad_phase: &BroadPhase,
         now: SimTime,
-        (fellows, may_touch): (&Fellows, impl Fn(AgentId) -> bool),
+        members: &Fellows,
+        may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
-        let (mut room, mut looks) = (2 * LISTED, 0);
-        self.everybody = NEVER;
+        let Some(mine) = self.mine else { return 0 };
+        let step = PlannedStep { start: now, dt: self.dt };
+        let (mut limit, mut checked) = (2 * LISTED, 0);
+        self.common_check = NEVER;
         self.listed.clear();
         let me = self.me;
-        for (id, berth) in (0..).map(AgentId).zip(&crowd.berths).filter(|(id, _)| *id != me && !fellows.has(*id)) {
-            let seen = berth.read();
-            looks += 1;
-            if is_far(mine, &seen, self.everybody, (now, self.dt)) {
+        for (id, published) in
+            (0..).map(AgentId).zip(&broad_phase.bounds).filter(|(id, _)| *id != me && !members.has(*id))
+        {
+            let seen = published.read();
+            checked += 1;
+            if is_far(&mine, &seen, self.common_check, step) {
                 continue;
             }
             let was_near = self.near.binary_search(&id).is_ok();
-            let (at, near) = appointment(mine, seen, was_near, (now, self.dt));
-            if (!near && at >= self.everybody) || !may_touch(id) {
+            let (at, near) = next_check(&mine, seen, was_near, step);
+            if (!near && at >= self.common_check) || !may_touch(id) {
                 continue;
             }
-            self.listed.push(Other { id, at, near });
-            if self.listed.len() == room {
-                room = self.shorten();
+            self.listed.push(ListedPeer { id, at, near });
+            if self.listed.len() == limit {
+                limit = self.shorten();
             }
         }
         self.shorten();
         self.listed.sort_unstable_by_key(|other| other.id);
-        looks
+        checked
     }
 
-    /// Moves all but the earliest appointments and the near peers to the common one; returns the length of the list at which to do so
+    /// Moves all but the earliest checks and the near peers to the common one; returns the length of the list at which to do so
     /// again.
     fn shorten(&mut self) -> usize {
         let kept = LISTED + 2 * self.listed.iter().filter(|other| other.near).count();
         if self.listed.len() > kept {
-            let rank = |other: &Other| (!other.near, other.at, other.id);
+            let rank = |other: &ListedPeer| (!other.near, other.at, other.id);
             let (_, first_left, _) = self.listed.select_nth_unstable_by_key(kept, rank);
-            self.everybody = first_left.at;
+            self.common_check = first_left.at;
             self.listed.truncate(kept);
         }
         kept + LISTED
     }
 
     /// Makes the peers that became faster than their published speed due for a check.
-    fn read_notes(&mut self, crowd: &BroadPhase, fellows: &Fellows) {
-        let Self { me, listed, soonest, everybody, near, .. } = self;
+    fn read_log(&mut self, broad_phase: &BroadPhase, members: &Fellows) {
+        let Self { me, listed, soonest, common_check, near, .. } = self;
         let most = 2 * (LISTED + near.len());
-        let (next, whole) = crowd.notes(self.unread, |id| {
-            if id == *me || *everybody == SimTime::ZERO || fellows.has(id) {
+        let (next, whole) = broad_phase.read_log(self.unread, |id| {
+            if id == *me || *common_check == SimTime::ZERO || members.has(id) {
                 return;
             }
             *soonest = SimTime::ZERO;
             match listed.binary_search_by_key(&id, |other| other.id) {
                 Ok(at) => listed[at].at = SimTime::ZERO,
-                Err(at) if listed.len() < most => listed.insert(at, Other { id, at: SimTime::ZERO, near: false }),
-                Err(_) => *everybody = SimTime::ZERO,
+                Err(at) if listed.len() < most => listed.insert(at, ListedPeer { id, at: SimTime::ZERO, near: false }),
+                Err(_) => *common_check = SimTime::ZERO,
             }
         });
         self.unread = next;
         if whole.is_none() {
-            self.everybody = SimTime::ZERO;
+            self.common_check = SimTime::ZERO;
         }
     }
 }
 
-/// Whether a peer that is `seen` is certainly not near and its appointment not before `everybody`: without a square root or a division, as
-/// most peers in a crowd are distant. If in doubt it returns `false`.
-fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, (now, dt): (SimTime, SimSpan)) -> bool {
-    let Seen::There(theirs) = seen else { return false };
-    if everybody == NEVER {
+/// Whether a peer that is `seen` is certainly not near and its next check not before `common_check`: without a square root or a division, as
+/// most peers in a large scene are distant. If in doubt it returns `false`.
+fn is_far(mine: &MovingBox, seen: &ReadBounds, common_check: SimTime, step: PlannedStep) -> bool {
+    let PlannedStep { start: now, dt } = step;
+    let ReadBounds::Known(theirs) = seen else { return false };
+    if common_check == NEVER {
         return false;
     }
     let dt_s = dt.as_secs_f64();
-    // the common appointment, plus the steps ahead of contact at which a peer already counts as near
-    let until_s = (everybody.secs_after(now) + NEAR_STEPS * dt_s).max(FAR_STEPS * dt_s);
+    // the common next check, plus the steps ahead of contact at which a peer already counts as near
+    let until_s = (common_check.secs_after(now) + NEAR_STEPS * dt_s).max(FAR_STEPS * dt_s);
     let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s);
     let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + 0.5 * ACCELERATION_M_S2 * dt_s * dt_s);
     mine.gap_vector(theirs).length_squared() > least_m * least_m
 }
 
-/// When a peer that is `seen` is checked again, and whether it is near now, before a step of `dt` from `now`.
-fn appointment(mine: &Reach, seen: Seen, was_near: bool, (now, dt): (SimTime, SimSpan)) -> (SimTime, bool) {
+/// When a peer that is `seen` is checked again, and whether it is near now, before a `step`.
+fn next_check(mine: &MovingBox, seen: ReadBounds, was_near: bool, step: PlannedStep) -> (SimTime, bool) {
+    let PlannedStep { start: now, dt } = step;
     let next_turn = now + SimSpan::from_nanos(1);
     let theirs = match seen {
         // a log entry announces its first box
-        Seen::Nowhere => return (NEVER, false),
-        Seen::Unsure => return (next_turn, true),
-        Seen::There(reach) => reach,
+        ReadBounds::Unpublished => return (NEVER, false),
+        ReadBounds::Changing => return (next_turn, true),
+        ReadBounds::Known(reach) => reach,
     };
     let dt_s = dt.as_secs_f64();
     // own matter is where its box was last published, however long ago: time dropped or slept moves nothing
@@ -253,7 +262,7 @@ fn appointment(mine: &Reach, seen: Seen, was_near: bool, (now, dt): (SimTime, Si
 }
 
 /// How far matter may have moved out of its box by `now`, metres; zero for a box at rest.
-fn drift_m(reach: &Reach, now: SimTime) -> f64 {
+fn drift_m(reach: &MovingBox, now: SimTime) -> f64 {
     if reach.speed_m_s == 0.0 {
         return 0.0;
     }

@@ -4,13 +4,13 @@
 //! must then assume the worst case ([`Seqlock`]).
 //! Never here: which agents are near each other.
 
-use super::super::seqlock::{Glance, Seqlock};
+use super::super::seqlock::{ReadOutcome, Seqlock};
 use glam::DVec3;
 use metachron_core::{Bounds, SimTime};
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reach {
+pub(super) struct MovingBox {
     /// Least coordinates, metres.
     pub low: DVec3,
     /// Greatest coordinates, metres.
@@ -21,7 +21,7 @@ pub(super) struct Reach {
     pub time: SimTime,
 }
 
-impl Reach {
+impl MovingBox {
     pub fn new(bounds: &Bounds, speed_m_s: f64, time: SimTime) -> Self {
         Self { low: bounds.low, high: bounds.high, speed_m_s, time }
     }
@@ -39,13 +39,13 @@ impl Reach {
 
 /// Result of a read.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Seen {
+pub(super) enum ReadBounds {
     /// Nothing was ever written.
-    Nowhere,
+    Unpublished,
     /// The newest complete box.
-    There(Reach),
+    Known(MovingBox),
     /// A writer is in the middle of a write.
-    Unsure,
+    Changing,
 }
 
 /// One agent's box in shared memory: a cache line of its own, so that writers do not disturb each other's readers.
@@ -58,29 +58,29 @@ const TRIES: u32 = 8;
 
 impl PublishedBounds {
     /// The last written box, for its writer.
-    pub fn mine(&self) -> Option<Reach> {
-        if let Seen::There(reach) = self.read() { Some(reach) } else { None }
+    pub fn mine(&self) -> Option<MovingBox> {
+        if let ReadBounds::Known(reach) = self.read() { Some(reach) } else { None }
     }
 
     /// Writes `reach`; from one thread at a time. Numbers are rounded outwards to 24 bits.
-    pub fn write(&self, reach: &Reach) {
+    pub fn write(&self, reach: &MovingBox) {
         self.0.write(words(reach));
     }
 
     /// The last written box.
-    pub fn read(&self) -> Seen {
+    pub fn read(&self) -> ReadBounds {
         for _ in 0..TRIES {
             match self.0.read() {
-                Glance::Nothing => return Seen::Nowhere,
-                Glance::Whole(words) => return Seen::There(reach(words)),
-                Glance::Torn => {}
+                ReadOutcome::Empty => return ReadBounds::Unpublished,
+                ReadOutcome::Complete(words) => return ReadBounds::Known(reach(words)),
+                ReadOutcome::Torn => {}
             }
         }
-        Seen::Unsure
+        ReadBounds::Changing
     }
 }
 
-fn words(reach: &Reach) -> [u64; 5] {
+fn words(reach: &MovingBox) -> [u64; 5] {
     let (low, high) = (reach.low, reach.high);
     [
         pair(down(low.x), down(low.y)),
@@ -91,10 +91,10 @@ fn words(reach: &Reach) -> [u64; 5] {
     ]
 }
 
-fn reach([a, b, c, speed, time]: [u64; 5]) -> Reach {
+fn reach([a, b, c, speed, time]: [u64; 5]) -> MovingBox {
     let first = |word: u64| f64::from(f32::from_bits((word >> 32) as u32));
     let second = |word: u64| f64::from(f32::from_bits(word as u32));
-    Reach {
+    MovingBox {
         low: DVec3::new(first(a), second(a), first(b)),
         high: DVec3::new(second(b), first(c), second(c)),
         speed_m_s: second(speed),
@@ -124,14 +124,14 @@ mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
-    fn what_is_read_holds_what_was_written() {
-        let berth = PublishedBounds::default();
-        assert_eq!(berth.read(), Seen::Nowhere);
+    fn a_box_read_contains_the_box_written() {
+        let published = PublishedBounds::default();
+        assert_eq!(published.read(), ReadBounds::Unpublished);
         let third = DVec3::new(1.0 / 3.0, -1.0 / 3.0, 1e-9);
         let time = SimTime::from_nanos(u64::MAX - 1);
-        let written = Reach { low: -third, high: third * 2.0, speed_m_s: 0.1, time };
-        berth.write(&written);
-        let read = berth.mine().unwrap();
+        let written = MovingBox { low: -third, high: third * 2.0, speed_m_s: 0.1, time };
+        published.write(&written);
+        let read = published.mine().unwrap();
         assert!(read.low.cmple(written.low).all() && read.high.cmpge(written.high).all());
         assert!(read.speed_m_s >= 0.1 && read.time == time);
         // 24 bits: half a unit in the last place of 1/3 and of 0.1
@@ -140,13 +140,13 @@ mod tests {
 
     #[test]
     fn a_reader_never_sees_half_of_a_writing() {
-        let berth = PublishedBounds::default();
+        let published = PublishedBounds::default();
         let done = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let reader = scope.spawn(|| {
                 let (mut last, mut reads) = (0.0, 0);
                 while !done.load(Ordering::Acquire) || reads == 0 {
-                    let Some(seen) = berth.mine() else { continue };
+                    let Some(seen) = published.mine() else { continue };
                     let value = seen.low.x;
                     assert_eq!((seen.low, seen.high), (DVec3::splat(value), DVec3::splat(value)), "torn");
                     assert_eq!((seen.speed_m_s, seen.time), (value, SimTime::from_nanos(value as u64)), "torn");
@@ -158,7 +158,7 @@ mod tests {
             for k in 1..=200_000_u32 {
                 let at = DVec3::splat(f64::from(k));
                 let time = SimTime::from_nanos(u64::from(k));
-                berth.write(&Reach { low: at, high: at, speed_m_s: f64::from(k), time });
+                published.write(&MovingBox { low: at, high: at, speed_m_s: f64::from(k), time });
             }
             done.store(true, Ordering::Release);
             reader.join().unwrap();

@@ -3,7 +3,6 @@
 use super::super::fellows::Fellows;
 use super::*;
 use glam::DVec3;
-use metachron_core::SimSpan;
 use proptest::prelude::*;
 
 /// A ball that flies straight through each of its steps.
@@ -39,25 +38,30 @@ impl Flyer {
     }
 }
 
-/// Everybody's turns in the order of their times; `check` is told who has just looked, before each step.
+/// All turns in the order of their times; `check` gets the agent that has just updated its list, before each step.
 fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &NeighbourList)) {
-    let crowd = BroadPhase::new(flyers.len());
+    let broad_phase = BroadPhase::new(flyers.len());
     let ids = || (0..flyers.len() as u32).map(AgentId);
-    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
-    for (flyer, sight) in flyers.iter().zip(&mut sights) {
-        sight.stand(&crowd, Some(&flyer.bounds()), flyer.time);
+    let mut lists: Vec<_> = ids().map(NeighbourList::new).collect();
+    for (flyer, list) in flyers.iter().zip(&mut lists) {
+        list.publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
     }
     let mut turn = 0;
-    while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
-        sights[who].look(&crowd, (flyers[who].time, flyers[who].dt), &Fellows::default(), |_| true);
-        check(who, flyers, &sights[who]);
-        let flyer = &mut flyers[who];
+    while let Some(at) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
+        lists[at].update(
+            &broad_phase,
+            PlannedStep { start: flyers[at].time, dt: flyers[at].dt },
+            &Fellows::default(),
+            |_| true,
+        );
+        check(at, flyers, &lists[at]);
+        let flyer = &mut flyers[at];
         flyer.at = flyer.position_at(flyer.time + flyer.dt);
         flyer.time += flyer.dt;
         flyer.came_with = flyer.velocity;
         let news = flyer.plan[turn % flyer.plan.len()];
         flyer.velocity = news.map_or(flyer.velocity, DVec3::from_array);
-        sights[who].stand(&crowd, Some(&flyer.bounds()), flyer.time);
+        lists[at].publish(&broad_phase, Some(&flyer.bounds()), flyer.time);
         turn += 1;
     }
 }
@@ -81,57 +85,57 @@ fn flyer() -> impl Strategy<Value = Flyer> {
 }
 
 /// Lets `flyers` fly for a while, each looking at the others as one does, and looks at all pairs beside it.
-fn nobody_is_missed(mut flyers: Vec<Flyer>) {
+fn no_near_agent_is_missed(mut flyers: Vec<Flyer>) {
     let mut seen = 0;
-    fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
-        let me = &all[who];
-        for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != who) {
+    fly(&mut flyers, SimTime::from_nanos(400_000_000), |at, all, list| {
+        let me = &all[at];
+        for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != at) {
             let times = (0..=4).map(|q| me.time + SimSpan::from_nanos(me.dt.as_nanos() * q / 4));
             let near = times.clone().any(|time| me.gap_m(other, time) <= 0.0);
-            let listed = sight.near().contains(&AgentId(k as u32));
-            assert!(listed || !near, "{who} misses {k} at {:?}", me.time);
+            let listed = list.near().contains(&AgentId(k as u32));
+            assert!(listed || !near, "{at} misses {k} at {:?}", me.time);
             seen += u32::from(listed);
         }
-        assert!(sight.near().is_sorted());
+        assert!(list.near().is_sorted());
     });
 }
 
 proptest! {
     #[test]
-    fn nobody_who_could_be_touched_within_a_step_is_missed(flyers in prop::collection::vec(flyer(), 2..9)) {
-        nobody_is_missed(flyers);
+    fn every_agent_that_could_touch_within_a_step_is_listed(flyers in prop::collection::vec(flyer(), 2..9)) {
+        no_near_agent_is_missed(flyers);
     }
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(8))]
     #[test]
-    fn nobody_is_missed_among_more_than_one_remembers(flyers in prop::collection::vec(flyer(), 50..70)) {
-        nobody_is_missed(flyers);
+    fn every_near_agent_is_listed_among_more_than_the_list_holds(flyers in prop::collection::vec(flyer(), 50..70)) {
+        no_near_agent_is_missed(flyers);
     }
 }
 
 #[test]
-fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
+fn memory_per_agent_does_not_grow_with_the_number_of_agents() {
     let dt = SimSpan::from_nanos(4_000_000);
     let held = |count: u32| {
-        let crowd = BroadPhase::new(count as usize);
-        let mut sights: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
+        let broad_phase = BroadPhase::new(count as usize);
+        let mut lists: Vec<_> = (0..count).map(AgentId).map(NeighbourList::new).collect();
         let measured = allocation_counter::measure(|| {
             for turn in 0..3_u64 {
                 let now = SimTime::from_nanos(turn * dt.as_nanos());
-                for (k, sight) in sights.iter_mut().enumerate() {
+                for (k, list) in lists.iter_mut().enumerate() {
                     // a square of balls that fly at different speeds, six of them near each
                     let at = DVec3::new((k % 40) as f64, (k / 40) as f64, 0.0);
                     let speed_m_s = 1.0 + (k % 7) as f64;
-                    sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
+                    list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
                 }
-                for sight in &mut sights {
-                    sight.look(&crowd, (now, dt), &Fellows::default(), |_| true);
+                for list in &mut lists {
+                    list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
                 }
             }
         });
-        assert!(sights.iter().all(|sight| (3..=8).contains(&sight.near().len())));
+        assert!(lists.iter().all(|list| (3..=8).contains(&list.near().len())));
         measured.bytes_current / i64::from(count)
     };
     let [few, many] = [200, 1600].map(held);
@@ -139,124 +143,126 @@ fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
 }
 
 #[test]
-fn a_longer_step_is_looked_ahead_for_at_once() {
-    let crowd = BroadPhase::new(2);
+fn a_longer_step_is_checked_ahead_at_once() {
+    let broad_phase = BroadPhase::new(2);
     let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
-    let mut sight = NeighbourList::new(AgentId(0));
-    sight.stand(&crowd, Some(&ball(0.0)), SimTime::ZERO);
-    crowd.stand(AgentId(1), &ball(2.0), SimTime::ZERO);
+    let mut list = NeighbourList::new(AgentId(0));
+    list.publish(&broad_phase, Some(&ball(0.0)), SimTime::ZERO);
+    broad_phase.publish(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
-    sight.look(&crowd, (SimTime::ZERO, SimSpan::from_nanos(4_000_000)), &Fellows::default(), |_| true);
-    assert!(sight.near().is_empty());
-    sight.look(&crowd, (SimTime::from_nanos(4_000_000), SimSpan::from_nanos(250_000_000)), &Fellows::default(), |_| {
-        true
-    });
-    assert_eq!(sight.near(), [AgentId(1)]);
+    let step = |start_ns, dt_ns| PlannedStep { start: SimTime::from_nanos(start_ns), dt: SimSpan::from_nanos(dt_ns) };
+    list.update(&broad_phase, step(0, 4_000_000), &Fellows::default(), |_| true);
+    assert!(list.near().is_empty());
+    list.update(&broad_phase, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
+    assert_eq!(list.near(), [AgentId(1)]);
 }
 
 #[test]
-fn who_is_far_is_never_looked_at_and_who_comes_is() {
+fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
     let count = 1000;
-    let crowd = BroadPhase::new(count);
+    let broad_phase = BroadPhase::new(count);
     let ids = || (0..count as u32).map(AgentId);
     let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
-    let mut sights: Vec<_> = ids().map(NeighbourList::new).collect();
+    let mut lists: Vec<_> = ids().map(NeighbourList::new).collect();
     let dt = SimSpan::from_nanos(4_000_000);
-    for (k, sight) in sights.iter_mut().enumerate() {
-        sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
+    for (k, list) in lists.iter_mut().enumerate() {
+        list.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
-    let looks = |sights: &mut [NeighbourList], now: SimTime| -> usize {
-        sights.iter_mut().map(|sight| sight.look(&crowd, (now, dt), &Fellows::default(), |_| true)).sum()
+    let checks = |lists: &mut [NeighbourList], now: SimTime| -> usize {
+        lists
+            .iter_mut()
+            .map(|list| list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
+            .sum()
     };
-    assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
+    assert_eq!(checks(&mut lists, SimTime::ZERO), count * (count - 1), "all agents at first");
     // 8 m at 2 · 0.0625 m/s is a minute
     for turn in 1..=250_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
-        for (k, sight) in sights.iter_mut().enumerate() {
-            sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), now);
+        for (k, list) in lists.iter_mut().enumerate() {
+            list.publish(&broad_phase, Some(&bounds(lattice(k as u32), 0.04)), now);
         }
-        assert_eq!(looks(&mut sights, now), 0, "turn {turn}");
+        assert_eq!(checks(&mut lists, now), 0, "turn {turn}");
     }
     let now = SimTime::from_nanos(1_004_000_000);
-    sights[0].stand(&crowd, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
-    // everybody looks at the one who has become fast, and he at everybody
-    assert_eq!(looks(&mut sights, now), 2 * (count - 1));
-    assert_eq!((sights[1].near(), sights[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
+    lists[0].publish(&broad_phase, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
+    // all agents check the one that has become fast, and it checks all agents
+    assert_eq!(checks(&mut lists, now), 2 * (count - 1));
+    assert_eq!((lists[1].near(), lists[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
 }
 
 #[test]
-fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
+fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
     let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
-    let crowd = BroadPhase::new(count);
-    let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
+    let broad_phase = BroadPhase::new(count);
+    let mut lists: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
     let half = DVec3::splat(0.25);
     // a floor of them, half a metre apart, a metre below those that swing
-    for (k, sight) in sights.iter_mut().enumerate().skip(10) {
+    for (k, list) in lists.iter_mut().enumerate().skip(10) {
         let at = DVec3::new(0.5 * (k % 40) as f64, 0.5 * (k / 40) as f64, -1.5) - half;
-        sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
-        crowd.stay(AgentId(k as u32));
+        list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
+        broad_phase.publish_rest(AgentId(k as u32));
     }
-    let mut looks = 0;
+    let mut checks = 0;
     for turn in 0..2000_u64 {
         let now = SimTime::from_nanos(turn * dt.as_nanos());
-        for (k, sight) in sights[..10].iter_mut().enumerate() {
+        for (k, list) in lists[..10].iter_mut().enumerate() {
             // a second to and fro, at 2 m/s in the middle
             let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
             let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
             let speed_m_s = 2.0 * libm::cos(phase).abs();
-            sight.stand(&crowd, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
-            looks += sight.look(&crowd, (now, dt), &Fellows::default(), |_| true);
+            list.publish(&broad_phase, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
+            checks += list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
         }
     }
-    // everybody once in 33 turns
-    let each = looks as f64 / 20_000.0;
+    // each agent once in 33 turns
+    let each = checks as f64 / 20_000.0;
     assert!(each < 40.0, "{each} looks a turn");
 }
 
 #[test]
-fn a_log_that_has_run_over_means_everybody() {
-    let crowd = BroadPhase::new(3);
-    let mut sight = NeighbourList::new(AgentId(0));
+fn an_overrun_log_makes_all_agents_be_checked() {
+    let broad_phase = BroadPhase::new(3);
+    let mut list = NeighbourList::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
     let dt = SimSpan::from_nanos(1_000_000);
-    sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
-    crowd.stand(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    sight.look(&crowd, (SimTime::ZERO, dt), &Fellows::default(), |_| true);
-    assert!(sight.near().is_empty());
-    crowd.stand(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
+    list.publish(&broad_phase, Some(&at(0.0, 0.0)), SimTime::ZERO);
+    broad_phase.publish(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    assert!(list.near().is_empty());
+    broad_phase.publish(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
-        crowd.stand(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
+        broad_phase.publish(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    sight.look(&crowd, (SimTime::ZERO, dt), &Fellows::default(), |_| true);
-    assert_eq!(sight.near(), [AgentId(1)]);
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    assert_eq!(list.near(), [AgentId(1)]);
 }
 
 #[test]
-fn a_call_is_heard_once_by_the_one_it_is_for() {
-    let crowd = BroadPhase::new(200);
-    [130, 3, 64, 3].into_iter().for_each(|from| crowd.call(AgentId(7), AgentId(from)));
-    let heard = |id| {
-        let mut heard = Vec::new();
-        crowd.answer(AgentId(id), |caller| heard.push(caller.0));
-        heard
+fn a_reported_impulse_is_delivered_once() {
+    let broad_phase = BroadPhase::new(200);
+    [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.report_impulse(AgentId(7), AgentId(from)));
+    let visited = |id| {
+        let mut visited = Vec::new();
+        broad_phase.take_givers(AgentId(id), |caller| visited.push(caller.0));
+        visited
     };
-    assert!(heard(8).is_empty());
-    assert_eq!(heard(7), [3, 64, 130]);
-    assert!(heard(7).is_empty());
+    assert!(visited(8).is_empty());
+    assert_eq!(visited(7), [3, 64, 130]);
+    assert!(visited(7).is_empty());
 }
 
 #[test]
-fn what_is_said_of_a_speed_is_never_too_little_and_seldom_changes() {
-    let (mut said, mut changes) = (0.0, 0);
+fn a_published_speed_is_never_too_small_and_seldom_changes() {
+    let (mut published, mut changes) = (0.0, 0);
     // up to 20 m/s and back in small steps
     for k in 0..4000_u32 {
         let speed = f64::from(k.min(4000 - k)) * 0.01;
-        let now = promise(speed, said);
+        let now = published_speed(speed, published);
         assert!(now >= speed && now <= 10.0 * speed.max(SPEED_LEAST_M_S), "{now} for {speed}");
-        changes += u32::from(now != said);
-        said = now;
+        changes += u32::from(now != published);
+        published = now;
     }
     assert!(changes <= 20, "{changes}");
 }

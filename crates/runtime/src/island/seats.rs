@@ -167,8 +167,8 @@ impl AgentRunner {
     }
 
     fn admit(&mut self, actor: Box<AgentRunner>) {
-        let (me, board) = (self.id(), Arc::clone(&self.shared.board));
-        std::iter::once(actor.id()).chain(actor.company.ids()).for_each(|id| board.follow(id, Some(me)));
+        let (me, sleep) = (self.id(), Arc::clone(&self.shared.sleep));
+        std::iter::once(actor.id()).chain(actor.company.ids()).for_each(|id| sleep.follow(id, Some(me)));
         self.company.admit(actor);
     }
 
@@ -196,21 +196,21 @@ impl AgentRunner {
 
     /// Takes nobody in any more.
     pub fn shut_door(&self) {
-        self.shared.board.close(self.id());
+        self.shared.sleep.close(self.id());
         empty_door(&self.shared);
     }
 
     /// Makes its own turns again, and those of all it leads.
     fn go_home(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
-        self.company.ids().for_each(|led| shared.board.follow(led, Some(id)));
-        shared.board.follow(id, None);
+        self.company.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
+        shared.sleep.follow(id, None);
         self.settle(1.0);
         if let Some(seating) = &shared.seating {
             // its place is free: there is only one of it
             drop(seating.home.swap(Some(self)));
         }
-        shared.board.summon(id);
+        shared.sleep.notify(id);
     }
 
     /// Whom it should hand its turns to: the leader with the lowest number of those that it, or one it leads, is bonded with. Who is at
@@ -224,13 +224,13 @@ impl AgentRunner {
 
     /// The leader with the lowest number of those this agent is bonded with, whichever side says so.
     fn bonded_leader(&self) -> Option<AgentId> {
-        let (me, board) = (self.id(), &self.shared.board);
+        let (me, sleep) = (self.id(), &self.shared.sleep);
         let newest = self.shared.slot.latest();
         let said = newest.bonds.iter().copied();
-        let heard = self.eyes.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
+        let heard = self.observer.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
         let open =
-            |id: &AgentId| !board.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.seating.is_some());
-        said.chain(heard).map(|id| board.leader(id)).filter(open).min()
+            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.seating.is_some());
+        said.chain(heard).map(|id| sleep.leader(id)).filter(open).min()
     }
 }
 
@@ -247,18 +247,18 @@ fn send_home(leaving: Vec<Seat>) {
 
 /// Hands `actor`, and all it leads, over to `leader`; gives it back if that takes nobody in now.
 pub(in super::super) fn move_in(actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
-    let (id, board, peers) = (actor.id(), Arc::clone(&actor.shared.board), Arc::clone(&actor.peers));
+    let (id, sleep, peers) = (actor.id(), Arc::clone(&actor.shared.sleep), Arc::clone(&actor.peers));
     let Some(seating) = peers.get(leader).and_then(|peer| peer.shared.seating.as_ref()) else { return Err(actor) };
-    board.follow(id, Some(leader));
+    sleep.follow(id, Some(leader));
     if let Err(actor) = seating.wait(actor) {
-        board.follow(id, None);
+        sleep.follow(id, None);
         return Err(actor);
     }
     // the door may have been shut just before: one of the two sides sees who is left outside
-    if board.is_closed(leader) {
+    if sleep.is_closed(leader) {
         seating.clear().into_iter().for_each(AgentRunner::go_home);
     }
-    board.wake(leader);
+    sleep.wake(leader);
     Ok(())
 }
 

@@ -1,8 +1,8 @@
 //! Agents that are led lose no step and make none twice, wherever they are.
 
 use super::super::lockstep::Lockstep;
-use super::super::testing::{Bond, Dummy, Fault, Log, Made, eventually, on_every_executor, system};
-use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, Watch, state_hash};
+use super::super::testing::{Bond, Dummy, Fault, Log, RecordedStep, eventually, on_every_executor, system};
+use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};
@@ -31,11 +31,11 @@ fn now_and_then(a: u32, b: u32, time: SimTime) -> bool {
 const RATES: [f64; 6] = [240.0, 1000.0, 60.0, 240.0, 37.0, 500.0];
 
 fn mates(bond: Bond, log: &Log) -> Vec<AgentSpawn> {
-    RATES.iter().map(|hz| named(Dummy::mate(20.0, bond, log).at(*hz), *hz)).collect()
+    RATES.iter().map(|hz| named(Dummy::bonded(20.0, bond, log).at(*hz), *hz)).collect()
 }
 
 fn named(mut spawn: AgentSpawn, hz: f64) -> AgentSpawn {
-    spawn.watches = vec![Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) }];
+    spawn.watches = vec![WatchedPoint { at: 0.0, every: SimSpan::from_nanos(10_000_000) }];
     spawn.name = format!("mate at {hz}");
     spawn
 }
@@ -44,7 +44,7 @@ fn lockstep(spawns: Vec<AgentSpawn>, machine: Machine) -> Box<Lockstep> {
     Box::new(Lockstep::start(spawns, machine).unwrap())
 }
 
-fn steps_of(log: &Log, id: u32) -> Vec<Made> {
+fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
     log.lock().unwrap_or_else(PoisonError::into_inner).iter().filter(|made| made.id == AgentId(id)).cloned().collect()
 }
 
@@ -133,7 +133,7 @@ fn those_who_hang_together_step_at_their_leaders_times() {
 fn a_led_step_costs_what_its_members_cost() {
     let log = Log::default();
     // 3 ms each: six of them need 18 ms of each 4.17, alone on two cores 4.5
-    let spawns = (0..6).map(|_| Dummy::mate(3000.0, always, &log).at(240.0)).collect();
+    let spawns = (0..6).map(|_| Dummy::bonded(3000.0, always, &log).at(240.0)).collect();
     let mut run = lockstep(spawns, Machine::two_cores_software());
     run.wait_until(ms(10_000));
     let steps = run.shutdown()[0].steps;
@@ -159,7 +159,7 @@ fn who_belongs_together_is_led_before_the_first_step() {
 #[test]
 fn an_island_rests_as_one_and_wakes_as_one() {
     let log = Log::default();
-    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::bonded(20.0, always, &log) }.at(hz);
     let mut run = lockstep([250.0, 250.0, 125.0].map(sleepy).into(), Machine::two_cores_software());
     run.wait_until(ms(1000));
     assert!(run.agents().iter().all(|a| a.state() == AgentState::Resting && a.latest().at_rest));
@@ -181,7 +181,7 @@ fn an_island_rests_as_one_and_wakes_as_one() {
 #[test]
 fn a_touch_of_one_that_is_led_wakes_the_island() {
     let log = Log::default();
-    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::bonded(20.0, always, &log) }.at(hz);
     let toucher = Dummy { touches: Some((101, AgentId(1))), ..Dummy::new(20.0) };
     let spawns = vec![sleepy(250.0), sleepy(250.0), toucher.at(100.0)];
     let mut run = lockstep(spawns, Machine::two_cores_software());
@@ -197,8 +197,9 @@ fn a_broken_member_is_parked_alone_and_the_others_go_on() {
     for fault in [Fault::NotFinite, Fault::Diverged, Fault::Panic] {
         for broken in 0..3_u32 {
             let log = Log::default();
-            let mate = |id| Dummy { fault: (id == broken).then_some((60, fault)), ..Dummy::mate(20.0, always, &log) };
-            let mut run = lockstep((0..3).map(|id| mate(id).at(250.0)).collect(), Machine::two_cores_software());
+            let bonded =
+                |id| Dummy { fault: (id == broken).then_some((60, fault)), ..Dummy::bonded(20.0, always, &log) };
+            let mut run = lockstep((0..3).map(|id| bonded(id).at(250.0)).collect(), Machine::two_cores_software());
             run.wait_until(ms(2000));
             let states: Vec<_> = run.agents().iter().map(AgentHandle::state).collect();
             let parked = states.iter().filter(|s| matches!(s, AgentState::Parked(_))).count();
@@ -267,9 +268,9 @@ fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
 fn a_panic_in_a_led_turn_stops_nobody_else() {
     on_every_executor(|start| {
         let log = Log::default();
-        let mate = |id| Dummy { fault: (id == 1).then_some((50, Fault::Panic)), ..Dummy::mate(20.0, always, &log) };
-        let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
-        spawns.push(Dummy::mate(20.0, never, &log).at(500.0));
+        let bonded = |id| Dummy { fault: (id == 1).then_some((50, Fault::Panic)), ..Dummy::bonded(20.0, always, &log) };
+        let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
+        spawns.push(Dummy::bonded(20.0, never, &log).at(500.0));
         let run = start(spawns, system());
         eventually("the panic", || matches!(run.agents()[1].state(), AgentState::Parked(_)));
         let before = run.agents()[2].stats().steps;
@@ -284,7 +285,7 @@ fn a_panic_in_a_led_turn_stops_nobody_else() {
 fn an_island_rests_and_wakes_as_one_in_real_time() {
     on_every_executor(|start| {
         let log = Log::default();
-        let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+        let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::bonded(20.0, always, &log) }.at(hz);
         let run = start([500.0, 250.0, 125.0].map(sleepy).into(), system());
         let all_rest = || run.agents().iter().all(|a| a.state() == AgentState::Resting && a.latest().at_rest);
         for round in 1..=20_u8 {

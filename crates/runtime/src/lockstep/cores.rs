@@ -28,9 +28,9 @@ impl Cores {
         Self { cores: u128::from(cores.max(1)), served: 0, jobs: BinaryHeap::new() }
     }
 
-    /// Starts the job of `whose`, which takes `work` on a core of its own.
-    pub fn start(&mut self, whose: u32, work: Duration) {
-        self.jobs.push(Reverse((self.served + work.as_nanos() * PICOS_PER_NANO, whose)));
+    /// Starts the job of `owner`, which takes `work` on a core of its own.
+    pub fn start(&mut self, owner: u32, work: Duration) {
+        self.jobs.push(Reverse((self.served + work.as_nanos() * PICOS_PER_NANO, owner)));
     }
 
     /// Time until a job ends, if none is added; `None` without jobs.
@@ -49,10 +49,10 @@ impl Cores {
 
     /// Takes a job that has ended: the one with the earliest end, at equal ends the lowest number.
     pub fn take_ended(&mut self) -> Option<u32> {
-        let &Reverse((end, whose)) = self.jobs.peek()?;
+        let &Reverse((end, owner)) = self.jobs.peek()?;
         (end <= self.served).then(|| {
             self.jobs.pop();
-            whose
+            owner
         })
     }
 
@@ -77,8 +77,8 @@ mod tests {
         while let Some(span) = cores.until_end() {
             cores.pass(span);
             now += span;
-            while let Some(whose) = cores.take_ended() {
-                ends.push((whose, now));
+            while let Some(owner) = cores.take_ended() {
+                ends.push((owner, now));
             }
         }
         ends
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn three_jobs_on_two_cores_share_them_evenly() {
         let mut cores = Cores::new(2);
-        (0..3).for_each(|whose| cores.start(whose, us(100)));
+        (0..3).for_each(|owner| cores.start(owner, us(100)));
         // 300 µs of work on two cores; ceil to the nanosecond
         assert_eq!(run(&mut cores), [(0, us(150)), (1, us(150)), (2, us(150))]);
     }

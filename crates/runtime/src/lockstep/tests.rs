@@ -24,7 +24,7 @@ fn noisy(seed: u64) -> Machine {
 }
 
 /// Four agents of 240 Hz that need 0.5 ms each, and one more whose step costs `work` µs.
-fn company(work: f64, machine: Machine) -> Vec<AgentStats> {
+fn five_agents(work: f64, machine: Machine) -> Vec<AgentStats> {
     let mut spawns: Vec<_> = (0..4).map(|_| Dummy::new(500.0).at(240.0)).collect();
     spawns.push(Dummy::new(work).at(240.0));
     let mut run = Box::new(Lockstep::start(spawns, machine).unwrap());
@@ -36,7 +36,7 @@ fn company(work: f64, machine: Machine) -> Vec<AgentStats> {
 fn an_overloaded_agent_leaves_the_others_their_rates() {
     for machine in [Machine::two_cores_software(), noisy(5)] {
         // 4 ms of 4.17 is a full load; ten times that cannot be kept
-        let (before, after) = (company(4_000.0, machine.clone()), company(40_000.0, machine));
+        let (before, after) = (five_agents(4_000.0, machine.clone()), five_agents(40_000.0, machine));
         for (b, a) in before.iter().zip(&after).take(4) {
             let change = a.steps as f64 / b.steps as f64 - 1.0;
             assert!(change.abs() < 0.01, "{} -> {} steps", b.steps, a.steps);
@@ -67,7 +67,7 @@ fn an_overloaded_agent_lags_no_more_than_the_cap_however_long_it_runs() {
 
 #[test]
 fn a_load_that_fits_keeps_its_rate_under_noise() {
-    let stats = company(1_000.0, noisy(3));
+    let stats = five_agents(1_000.0, noisy(3));
     for agent in stats {
         // 240 Hz in whole nanoseconds over 10 s, and the step under way
         assert!((2399..=2401).contains(&agent.steps), "{} steps", agent.steps);
@@ -125,17 +125,17 @@ fn a_state_is_seen_when_its_cost_has_passed() {
 fn pause_freezes_and_a_single_step_advances_exactly_one_frame_span() {
     let mut run = lockstep(vec![Dummy::new(100.0).at(250.0), Dummy::new(100.0).at(125.0)]);
     run.wait_until(ms(402));
-    run.drive(Drive::Pause);
+    run.drive(TimelineCommand::Pause);
     let times = |run: &Lockstep| run.agents().iter().map(|a| a.latest().time).collect::<Vec<_>>();
     assert_eq!(times(&run), [sim_ms(404), sim_ms(408)]);
     run.wait_until(ms(2000));
     assert_eq!(run.sim_now(), sim_ms(402));
     assert_eq!(times(&run), [sim_ms(404), sim_ms(408)]);
-    run.drive(Drive::Step(SimSpan::from_nanos(16_000_000)));
+    run.drive(TimelineCommand::Step(SimSpan::from_nanos(16_000_000)));
     run.wait_until(ms(3000));
     assert_eq!(run.sim_now(), sim_ms(418));
     assert_eq!(times(&run), [sim_ms(420), sim_ms(424)], "four steps of 4 ms, two of 8 ms");
-    run.drive(Drive::Run);
+    run.drive(TimelineCommand::Run);
     run.wait_until(ms(3084));
     assert_eq!(times(&run), [sim_ms(504), sim_ms(504)]);
     assert!(run.shutdown().iter().all(|s| s.dropped == SimSpan::ZERO), "a pause is no lateness");
@@ -144,7 +144,7 @@ fn pause_freezes_and_a_single_step_advances_exactly_one_frame_span() {
 #[test]
 fn half_speed_makes_half_the_steps() {
     let mut run = lockstep(vec![Dummy::new(100.0).at(250.0)]);
-    run.drive(Drive::Speed(0.5));
+    run.drive(TimelineCommand::Speed(0.5));
     run.wait_until(ms(2000));
     assert_eq!(run.agents()[0].latest().time, sim_ms(1000));
     let stats = run.shutdown().remove(0);
@@ -162,7 +162,7 @@ fn rest_stops_the_steps_and_a_command_wakes() {
     agent.send(Command::Retune(Resolution { eps_m: 0.05, n: 1 })).unwrap();
     run.wait_until(ms(2000));
     let stats = agent.stats();
-    assert_eq!((stats.steps, stats.state), (11, AgentState::Resting), "it obeyed and lay down again");
+    assert_eq!((stats.steps, stats.state), (11, AgentState::Resting), "it obeyed and rests again");
     assert_eq!(stats.resolution.unwrap().eps_m, 0.05);
     assert_eq!(agent.latest().time, sim_ms(1004));
     assert_eq!(stats.dropped, SimSpan::ZERO);
@@ -184,7 +184,7 @@ fn a_touched_agent_wakes_and_stays_awake_while_it_is_touched() {
 }
 
 #[test]
-fn a_hand_pulls_until_it_lets_go_and_keeps_the_agent_awake() {
+fn a_user_spring_pulls_until_its_release_and_keeps_the_agent_awake() {
     let sleepy = Dummy { rest_from: Some(1), ..Dummy::new(100.0) };
     let mut run = lockstep(vec![sleepy.at(250.0)]);
     run.wait_until(ms(100));
@@ -208,7 +208,7 @@ fn a_hand_pulls_until_it_lets_go_and_keeps_the_agent_awake() {
 }
 
 #[test]
-fn a_command_to_nobody_is_an_error() {
+fn a_command_to_an_unknown_agent_is_an_error() {
     let run = lockstep(vec![Dummy::new(1.0).at(60.0)]);
     assert_eq!(run.send(AgentId(9), Command::Wake), Err(SendError::NoAgent(AgentId(9))));
 }
@@ -288,7 +288,7 @@ fn a_governors_demand_is_obeyed_within_the_range() {
 }
 
 #[test]
-fn an_agent_may_step_shorter_than_is_wanted_and_says_so() {
+fn an_agent_may_step_shorter_than_requested_and_reports_it() {
     let dummy = Dummy { short: Some((40, SimSpan::from_nanos(2_000_000))), ..Dummy::new(100.0) };
     let mut run = lockstep(vec![dummy.at(100.0)]);
     run.wait_until(ms(70));
@@ -325,7 +325,7 @@ fn a_governor_cannot_lengthen_the_steps_of_an_agent_that_wants_short_ones() {
 }
 
 #[test]
-fn what_cannot_run_is_refused_with_its_name() {
+fn an_invalid_agent_is_refused_with_its_name() {
     let refuse = |change: fn(&mut AgentSpawn)| {
         let mut spawn = Dummy::new(1.0).at(60.0);
         change(&mut spawn);
@@ -339,7 +339,7 @@ fn what_cannot_run_is_refused_with_its_name() {
 
 #[test]
 fn cpu_time_is_measured_in_virtual_time_too() {
-    let stats = company(100.0, Machine::default());
+    let stats = five_agents(100.0, Machine::default());
     let cpu_s: f64 = stats.iter().map(|s| s.cpu_s).sum();
     // 12,000 turns were really made, in far less than the 10 s of virtual time of two cores
     assert!(cpu_s > 0.0 && cpu_s < 10.0, "{cpu_s}");

@@ -3,11 +3,11 @@
 use super::super::faults::Faults;
 use super::super::lockstep::Lockstep;
 use super::super::spawn::{AgentSpawn, assemble};
-use super::super::testing::{Dummy, Log, Made, eventually, on_every_executor, system};
+use super::super::testing::{Dummy, Log, RecordedStep, eventually, on_every_executor, system};
 use super::super::{AgentState, Machine, Run};
 use super::*;
 use metachron_contact::Link;
-use metachron_core::Anchor;
+use metachron_core::{Anchor, SimSpan, SimTime};
 use std::time::Duration;
 
 const fn ms(n: u64) -> Duration {
@@ -23,17 +23,17 @@ fn ball(z: f64, speed_m_s: f64, log: &Log) -> Dummy {
     Dummy { ball: Some((0.1, speed_m_s)), z, log: Some(Arc::clone(log)), ..Dummy::new(20.0) }
 }
 
-fn steps_of(log: &Log, id: u32) -> Vec<Made> {
+fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
     log.lock().unwrap().iter().filter(|made| made.id == AgentId(id)).cloned().collect()
 }
 
 fn crowded(spawns: Vec<AgentSpawn>) -> bool {
-    let company = assemble(spawns).unwrap();
-    company.actors[0].as_ref().unwrap().peers.crowd.is_some()
+    let run = assemble(spawns).unwrap();
+    run.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
 }
 
 #[test]
-fn a_run_in_which_nobody_could_touch_has_no_crowd() {
+fn a_run_without_possible_contact_has_no_broad_phase() {
     let log = Log::default();
     let two = || vec![ball(0.0, 0.0, &log).at(240.0), ball(0.0, 0.0, &log).at(240.0)];
     assert!(crowded(two()));
@@ -44,14 +44,14 @@ fn a_run_in_which_nobody_could_touch_has_no_crowd() {
 }
 
 #[test]
-fn who_flies_past_is_seen_by_both_while_it_is_near_and_the_faster_owns() {
+fn passing_agents_see_each_other_while_near_and_the_faster_owns() {
     let log = Log::default();
     let mut run = lockstep(vec![ball(0.0, 0.0, &log).at(240.0), ball(-5.0, 5.0, &log).at(1000.0)]);
     run.wait_until(ms(2000));
     for (me, other, owned) in [(0, AgentId(1), false), (1, AgentId(0), true)] {
         let steps = steps_of(&log, me);
         // the flyer is 5 m/s · t − 5 m high; the skins are 0.2 m nearer
-        let gap_m = |made: &Made| (5.0 * made.from.as_secs_f64() - 5.0).abs() - 0.2;
+        let gap_m = |made: &RecordedStep| (5.0 * made.from.as_secs_f64() - 5.0).abs() - 0.2;
         for made in &steps {
             assert!(made.saw.is_empty() || made.saw == [(other, owned)], "{made:?}");
             let seen = !made.saw.is_empty();
@@ -64,11 +64,11 @@ fn who_flies_past_is_seen_by_both_while_it_is_near_and_the_faster_owns() {
 }
 
 #[test]
-fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
+fn an_impulse_of_a_bullet_reaches_a_slow_agent_it_has_long_passed() {
     for faults in [Faults::default(), Faults { jitter: 0.2, loss: 0.5, seed: 4 }] {
         let log = Log::default();
         // 20 m/s are 2 m in one step of the slow one; it gives until it has passed, 0.2 m beyond
-        let bullet = Dummy { gifts: 460, ..ball(-9.0, 20.0, &log) };
+        let bullet = Dummy { impulses: 460, ..ball(-9.0, 20.0, &log) };
         let mut spawns = vec![ball(0.0, 0.0, &log).at(10.0), bullet.at(1000.0)];
         spawns.iter_mut().for_each(|spawn| spawn.faults = faults);
         let mut run = lockstep(spawns);
@@ -82,10 +82,10 @@ fn what_a_bullet_gave_reaches_the_slow_one_it_has_long_passed() {
 }
 
 #[test]
-fn a_gift_wakes_the_one_it_is_for() {
+fn an_impulse_wakes_its_receiver() {
     let log = Log::default();
     let sleepy = Dummy { rest_from: Some(5), ..ball(0.0, 0.0, &log) };
-    let giver = Dummy { gifts: 260, ..ball(-2.5, 5.0, &log) };
+    let giver = Dummy { impulses: 260, ..ball(-2.5, 5.0, &log) };
     let mut run = lockstep(vec![sleepy.at(240.0), giver.at(500.0)]);
     run.wait_until(ms(300));
     assert_eq!(run.agents()[0].state(), AgentState::Resting);
@@ -112,11 +112,11 @@ fn laws_and_attachments_are_known_on_both_sides() {
         law: Law::Ledger,
     };
     spawns[1].attached = vec![link];
-    let mut company = assemble(spawns).unwrap();
+    let mut run = assemble(spawns).unwrap();
     let mut seen = |id: usize| {
-        let actor = company.actors[id].as_mut().unwrap();
+        let actor = run.actors[id].as_mut().unwrap();
         actor.step(SimSpan::from_nanos(4_000_000)).unwrap();
-        let met = actor.eyes.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
+        let met = actor.observer.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
         (met.collect::<Vec<_>>(), actor.links.clone())
     };
     let ledger = Law::Ledger;
@@ -133,7 +133,7 @@ fn spans(log: &Log) -> Vec<u64> {
 }
 
 #[test]
-fn jitter_spreads_the_steps_of_every_executor_alike() {
+fn jitter_spreads_the_steps_equally_on_every_executor() {
     let faults = Faults { jitter: 0.2, loss: 0.3, seed: 11 };
     let disturbed = |log: &Log| AgentSpawn { faults, ..ball(0.0, 0.0, log).at(250.0) };
     let virtually = Log::default();
@@ -154,7 +154,7 @@ fn jitter_spreads_the_steps_of_every_executor_alike() {
 }
 
 #[test]
-fn a_lost_state_is_never_seen_and_the_last_one_always() {
+fn a_lost_state_is_never_visible_and_the_last_one_always() {
     let log = Log::default();
     let mut spawn = ball(0.0, 0.0, &log).at(250.0);
     spawn.faults = Faults { jitter: 0.0, loss: 0.5, seed: 2 };
@@ -172,7 +172,7 @@ fn a_lost_state_is_never_seen_and_the_last_one_always() {
 }
 
 #[test]
-fn faults_that_are_none_and_others_that_do_not_exist_are_refused() {
+fn invalid_faults_and_unknown_peers_are_refused() {
     let refuse = |change: fn(&mut AgentSpawn)| {
         let mut spawn = Dummy::new(1.0).at(60.0);
         change(&mut spawn);
@@ -185,12 +185,12 @@ fn faults_that_are_none_and_others_that_do_not_exist_are_refused() {
 }
 
 #[test]
-fn nothing_is_allocated_by_those_who_touch_and_those_who_are_led() {
+fn touching_and_led_agents_allocate_nothing() {
     fn first_four(a: u32, b: u32, _: SimTime) -> bool {
         a < 4 && b < 4
     }
     let log = Log::default();
-    let quiet = |dummy: Dummy| Dummy { log: None, bond: Some(first_four), gifts: u64::MAX, ..dummy };
+    let quiet = |dummy: Dummy| Dummy { log: None, bond: Some(first_four), impulses: u64::MAX, ..dummy };
     let mut spawns: Vec<_> = (0..4).map(|k| quiet(ball(0.3 * f64::from(k), 0.0, &log)).at(240.0)).collect();
     spawns.extend([1000.0, 37.0].map(|hz| quiet(ball(1.3, 0.0, &log)).at(hz)));
     let mut run = lockstep(spawns);

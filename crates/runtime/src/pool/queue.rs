@@ -61,7 +61,7 @@ struct Waiter {
 
 impl Queue {
     /// Switches to `timeline`, if it is newer than the present one.
-    pub fn keep_time(&mut self, timeline: &Timeline, now: Duration) {
+    pub fn set_timeline(&mut self, timeline: &Timeline, now: Duration) {
         if timeline.piece() <= self.timeline.piece() {
             return;
         }
@@ -102,12 +102,12 @@ impl Queue {
         Some(actor)
     }
 
-    /// Moves a ready agent to another worker's queue, `thief`, with its claim to service unchanged.
-    pub fn give(&mut self, thief: &mut Self, now: Duration) -> bool {
+    /// Moves a ready agent to another worker's queue, `other`, with its claim to service unchanged.
+    pub fn give_ready(&mut self, other: &mut Self, now: Duration) -> bool {
         let Some(Place { rank, of: mut given }) = self.ready.pop() else { return false };
         // service that it lacks relative to the new queue is owed to it there
-        given.actor.owed = thief.served.since(given.served);
-        thief.make_ready(rank, given, now);
+        given.actor.owed = other.served.since(given.served);
+        other.make_ready(rank, given, now);
         true
     }
 
@@ -172,7 +172,7 @@ impl<T> Ord for Place<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::agent_clock::Drive;
+    use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::spawn::{AgentSpawn, assemble};
     use super::super::super::testing::Dummy;
     use super::*;
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn with_room_for_all_everybody_keeps_its_rate_and_short_deadlines_go_first() {
+    fn without_overload_every_agent_keeps_its_rate_and_short_deadlines_go_first() {
         // 100 + 50 + 4 · 10 turns of 1 ms a second: a load of 0.19
         let rates = [100.0, 50.0, 10.0, 10.0, 10.0, 10.0];
         let mut queue = queue(rates.map(|hz| Dummy::new(1.0).at(hz)).into());
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn who_was_away_saves_nothing_up() {
+    fn an_absent_agent_accumulates_no_claim() {
         let mut queue = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
         let away = take(&mut queue, Duration::ZERO).unwrap();
         let (came_back, end) = (Duration::from_secs(4), Duration::from_secs(6));
@@ -277,14 +277,14 @@ mod tests {
     }
 
     #[test]
-    fn a_stopped_timeline_releases_nobody_and_a_running_one_all() {
+    fn a_stopped_timeline_releases_no_agent_and_a_running_one_all() {
         let mut queue = queue(vec![Dummy::new(1.0).at(100.0), Dummy::new(1.0).at(10.0)]);
-        let paused = Timeline::new().after(Duration::ZERO, Drive::Pause);
-        queue.keep_time(&paused, Duration::ZERO);
+        let paused = Timeline::new().after(Duration::ZERO, TimelineCommand::Pause);
+        queue.set_timeline(&paused, Duration::ZERO);
         assert!(queue.take(Duration::from_secs(9)).is_none());
         assert_eq!((queue.due(), queue.frontier()), (NEVER, NEVER));
-        let running = paused.after(Duration::from_secs(9), Drive::Run);
-        queue.keep_time(&running, Duration::from_secs(9));
+        let running = paused.after(Duration::from_secs(9), TimelineCommand::Run);
+        queue.set_timeline(&running, Duration::from_secs(9));
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 0, "the earlier deadline");
         assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 1);
     }
@@ -294,7 +294,7 @@ mod tests {
         let mut mine = queue([1000.0; 4].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut theirs = Queue::default();
         let taken = take(&mut mine, Duration::ZERO).unwrap();
-        assert!(mine.give(&mut theirs, COST));
+        assert!(mine.give_ready(&mut theirs, COST));
         assert_eq!(theirs.due(), 1_000_000);
         assert_eq!((theirs.frontier(), mine.frontier()), (0, 0));
         assert_eq!(taken.served, SimTime::from_nanos(1_000_000));
@@ -302,14 +302,14 @@ mod tests {
     }
 
     #[test]
-    fn who_was_served_worse_makes_it_up_where_it_is_taken_to() {
+    fn an_agent_served_worse_is_compensated_by_its_new_worker() {
         // two agents with steps of 1 ms in a queue served up to 100 ms, and one from a queue served up to 70 ms
         let mut theirs = queue([1000.0; 2].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut mine = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
         let late = Duration::from_secs(1);
         work(&mut theirs, Duration::ZERO, Duration::from_millis(200), |_| ());
         work(&mut mine, Duration::ZERO, Duration::from_millis(210), |_| ());
-        assert!(mine.give(&mut theirs, late));
+        assert!(mine.give_ready(&mut theirs, late));
         let mut turns = 0;
         loop {
             let actor = take(&mut theirs, late).unwrap();

@@ -1,9 +1,9 @@
 //! Shared state of a pool's workers.
 //!
-//! In: agents between their turns, summons. Out: for each worker its next turn, or how long it may sleep.
+//! In: agents between their turns, notifications. Out: for each worker its next turn, or how long it may sleep.
 //! Every worker has its own queue, with a lock that is normally uncontended. A worker without work helps one whose turn is overdue, and
 //! takes the agent over; at intervals a worker with work checks whether agents of other workers are served worse.
-//! Agents at rest are stored in one slot each until they are summoned. Never here: threads, turns.
+//! Agents at rest are stored in one slot each until they are notified. Never here: threads, turns.
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::AgentRunner;
@@ -23,19 +23,19 @@ use std::time::Duration;
 const OVERDUE: Duration = Duration::from_millis(1);
 
 /// An agent of another worker is taken over if it has been served this much less, served nanoseconds.
-const UNJUST: u64 = 5_000_000;
+const IMBALANCE_NS: u64 = 5_000_000;
 
 /// Agents taken over in one go.
-const HAUL: usize = 8;
+const STEAL_MAX: usize = 8;
 
 /// State shared by all workers.
 pub(super) struct PoolState {
     pub clock: Arc<dyn Clock>,
     pub timeline: SharedTimeline,
-    pub board: Arc<SleepRegistry>,
+    pub sleep: Arc<SleepRegistry>,
     pub handles: Vec<AgentHandle>,
-    shelves: Vec<CachePadded<WorkerQueue>>,
-    beds: Vec<AtomicCell<Option<Box<AgentRunner>>>>,
+    queues: Vec<CachePadded<WorkerQueue>>,
+    resting: Vec<AtomicCell<Option<Box<AgentRunner>>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
@@ -49,70 +49,70 @@ struct WorkerQueue {
 impl PoolState {
     pub fn new(
         clock: Arc<dyn Clock>,
-        board: Arc<SleepRegistry>,
+        sleep: Arc<SleepRegistry>,
         handles: Vec<AgentHandle>,
         actors: Vec<Option<Box<AgentRunner>>>,
         workers: usize,
     ) -> Self {
-        let beds = handles.iter().map(|_| AtomicCell::new(None)).collect();
-        let shelves = std::iter::repeat_with(CachePadded::default).take(workers).collect();
-        let hall = Self { clock, timeline: SharedTimeline::new(), board, handles, shelves, beds };
+        let resting = handles.iter().map(|_| AtomicCell::new(None)).collect();
+        let queues = std::iter::repeat_with(CachePadded::default).take(workers).collect();
+        let state = Self { clock, timeline: SharedTimeline::new(), sleep, handles, queues, resting };
         // neighbours in the scene share a worker, and still every worker gets agents of each kind
         let block = (actors.len() / (8 * workers)).clamp(1, 64);
         for (at, actor) in actors.into_iter().enumerate() {
             if let Some(actor) = actor.filter(|actor| !actor.is_parked()) {
-                hall.shelves[at / block % workers].with(|queue| queue.put(actor, Duration::ZERO));
+                state.queues[at / block % workers].with(|queue| queue.put(actor, Duration::ZERO));
             }
         }
-        hall
+        state
     }
 
     /// The next turn of worker `at`, which returns the agent of the last one as `back`; `None` if none is due.
-    pub fn exchange(
+    pub fn next_turn(
         &self,
         at: usize,
         back: Option<Box<AgentRunner>>,
         timeline: &Timeline,
         now: Duration,
     ) -> Option<Box<AgentRunner>> {
-        let taken = self.shelves[at].with(|queue| {
-            queue.keep_time(timeline, now);
+        let taken = self.queues[at].with(|queue| {
+            queue.set_timeline(timeline, now);
             back.into_iter().for_each(|actor| queue.put_back(actor, now));
             queue.take(now)
         });
-        taken.or_else(|| self.help(at, timeline, now))
+        taken.or_else(|| self.steal_overdue(at, timeline, now))
     }
 
     /// Adds `actor` to the queue of worker `at`.
     pub fn put(&self, at: usize, actor: Box<AgentRunner>, now: Duration) {
-        self.shelves[at].with(|queue| queue.put(actor, now));
+        self.queues[at].with(|queue| queue.put(actor, now));
     }
 
     /// Stores `actor` at rest; returns it if it has been woken meanwhile.
-    pub fn lay(&self, actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
+    pub fn store_resting(&self, actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let id = actor.id();
-        let bed = self.beds.get(id.0 as usize)?;
-        // a summons before this found the slot empty: then its mark is seen here; a later one finds the agent
-        drop(bed.swap(Some(actor)));
-        if self.board.is_woken(id) { bed.take() } else { None }
+        let slot = self.resting.get(id.0 as usize)?;
+        // a notification before this found the slot empty: then its mark is seen here; a later one finds the agent
+        drop(slot.swap(Some(actor)));
+        if self.sleep.is_woken(id) { slot.take() } else { None }
     }
 
     /// Takes the agent out of its resting slot.
-    pub fn lift(&self, id: AgentId) -> Option<Box<AgentRunner>> {
-        self.beds.get(id.0 as usize)?.take()
+    pub fn take_resting(&self, id: AgentId) -> Option<Box<AgentRunner>> {
+        self.resting.get(id.0 as usize)?.take()
     }
 
     /// The agent that has returned from a leader.
-    pub fn come_home(&self, id: AgentId) -> Option<Box<AgentRunner>> {
+    pub fn take_returned(&self, id: AgentId) -> Option<Box<AgentRunner>> {
         self.handles.get(id.0 as usize)?.shared.seating.as_ref().and_then(Seating::come_home)
     }
 
     /// How long worker `at` may sleep from `now` on; `None`: until it is woken.
     pub fn pause(&self, at: usize, now: Duration) -> Option<Duration> {
-        let mine = moment(self.shelves[at].due.load(Relaxed));
-        let next = (at + 1) % self.shelves.len();
+        let mine = moment(self.queues[at].due.load(Relaxed));
+        let next = (at + 1) % self.queues.len();
         // each worker watches the next one; a worker that finds it late searches further
-        let theirs = moment(self.shelves[next].due.load(Relaxed)).filter(|_| next != at);
+        let theirs = moment(self.queues[next].due.load(Relaxed)).filter(|_| next != at);
         let watch = theirs.map(|due| due.saturating_add(OVERDUE).max(now + OVERDUE / 4));
         let until = mine.into_iter().chain(watch).min()?;
         Some(until.saturating_sub(now))
@@ -120,34 +120,34 @@ impl PoolState {
 
     /// Takes over agents that another worker serves worse than worker `at` serves its own.
     pub fn balance(&self, at: usize, timeline: &Timeline, now: Duration) {
-        let mine = self.shelves[at].frontier.load(Relaxed);
-        let unjust = |shelf: &WorkerQueue| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
-        if mine == NEVER || !self.shelves.iter().any(|shelf| unjust(shelf)) {
+        let mine = self.queues[at].frontier.load(Relaxed);
+        let is_imbalanced = |worker: &WorkerQueue| worker.frontier.load(Relaxed).saturating_add(IMBALANCE_NS) < mine;
+        if mine == NEVER || !self.queues.iter().any(|worker| is_imbalanced(worker)) {
             return;
         }
-        let Some(shelf) = self.shelves.iter().find(|shelf| unjust(shelf)) else { return };
-        let mut haul = Queue::default();
-        shelf.try_with(|queue| {
-            queue.keep_time(timeline, now);
-            let _ = (0..HAUL).take_while(|_| queue.give(&mut haul, now)).count();
+        let Some(worker) = self.queues.iter().find(|worker| is_imbalanced(worker)) else { return };
+        let mut stolen = Queue::default();
+        worker.try_with(|queue| {
+            queue.set_timeline(timeline, now);
+            let _ = (0..STEAL_MAX).take_while(|_| queue.give_ready(&mut stolen, now)).count();
         });
-        self.shelves[at].with(|queue| while haul.give(queue, now) {});
+        self.queues[at].with(|queue| while stolen.give_ready(queue, now) {});
     }
 
     /// Visits and removes all resting and queued agents, at the end of a run.
     pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
-        self.beds.iter().filter_map(AtomicCell::take).for_each(&mut visit);
-        self.shelves.iter().for_each(|shelf| shelf.with(|queue| queue.drain().for_each(&mut visit)));
+        self.resting.iter().filter_map(AtomicCell::take).for_each(&mut visit);
+        self.queues.iter().for_each(|worker| worker.with(|queue| queue.drain().for_each(&mut visit)));
     }
 
     /// An overdue turn of another worker.
-    fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<AgentRunner>> {
-        let count = self.shelves.len();
-        let others = (1..count).map(|k| &self.shelves[(at + k) % count]);
-        let late = |shelf: &WorkerQueue| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
-        others.filter(|shelf| late(shelf)).find_map(|shelf| {
-            shelf.try_with(|queue| {
-                queue.keep_time(timeline, now);
+    fn steal_overdue(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<AgentRunner>> {
+        let count = self.queues.len();
+        let others = (1..count).map(|k| &self.queues[(at + k) % count]);
+        let late = |worker: &WorkerQueue| moment(worker.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
+        others.filter(|worker| late(worker)).find_map(|worker| {
+            worker.try_with(|queue| {
+                queue.set_timeline(timeline, now);
                 queue.take(now)
             })
         })
@@ -156,15 +156,15 @@ impl PoolState {
 
 impl WorkerQueue {
     fn with<R>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
-        self.show(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
+        self.update_keys(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
     }
 
     /// As [`Self::with`], if the queue's lock is free.
     fn try_with<R: Default>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
-        self.queue.try_lock().map_or_else(|_| R::default(), |queue| self.show(queue, act))
+        self.queue.try_lock().map_or_else(|_| R::default(), |queue| self.update_keys(queue, act))
     }
 
-    fn show<R>(&self, mut queue: MutexGuard<'_, Queue>, act: impl FnOnce(&mut Queue) -> R) -> R {
+    fn update_keys<R>(&self, mut queue: MutexGuard<'_, Queue>, act: impl FnOnce(&mut Queue) -> R) -> R {
         let result = act(&mut queue);
         self.due.store(queue.due(), Relaxed);
         self.frontier.store(queue.frontier(), Relaxed);

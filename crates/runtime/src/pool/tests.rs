@@ -7,7 +7,7 @@ use metachron_core::{AgentId, SimTime};
 use std::collections::BTreeSet;
 
 fn pool(spawns: Vec<AgentSpawn>, workers: usize, patience: Duration) -> Box<Pool> {
-    running(Pool::with_workers(spawns, system(), workers, (patience, Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, system(), workers, patience, Priority::Normal).unwrap())
 }
 
 const LONG: Duration = Duration::from_secs(60);
@@ -18,7 +18,7 @@ fn parked(agent: &AgentHandle) -> bool {
 }
 
 #[test]
-fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
+fn a_step_that_never_returns_parks_its_agent_only() {
     for workers in [1, 3] {
         let hung = |step| Dummy { fault: Some((step, Fault::Hang)), ..Dummy::new(1.0) };
         let mut spawns: Vec<_> = (0..20).map(|_| Dummy::new(1.0).at(200.0)).collect();
@@ -32,24 +32,24 @@ fn a_step_that_never_returns_costs_its_agent_and_nobody_else() {
         eventually("the others go on", || each(false).all(|(at, a)| a.stats().steps >= before[at] + 20));
         let stats = run.shutdown();
         for (at, agent) in stats.iter().enumerate() {
-            let state = AgentState::Parked("a step has not ended within 0.2 s".into());
+            let state = AgentState::Parked("a step did not end within 0.2 s".into());
             assert_eq!(agent.state, if is_hung(at) { state } else { AgentState::Running }, "{at} of {workers}");
         }
     }
 }
 
 #[test]
-fn those_who_are_led_by_one_that_hangs_are_parked_with_it() {
+fn agents_led_by_a_hung_agent_are_parked_with_it() {
     let log = Log::default();
-    let mate =
-        |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::mate(1.0, |_, _, _| true, &log) };
-    let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
+    let bonded =
+        |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::bonded(1.0, |_, _, _| true, &log) };
+    let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
     let run = pool(spawns, 2, SHORT);
     eventually("they are one", || run.agents()[1..3].iter().all(|a| a.led_by() == Some(AgentId(0))));
     eventually("all three are parked", || run.agents()[..3].iter().all(parked));
     let before = run.agents()[3].stats().steps;
-    eventually("a stranger goes on", || run.agents()[3].stats().steps >= before + 20);
+    eventually("an unrelated agent goes on", || run.agents()[3].stats().steps >= before + 20);
     assert_eq!(run.shutdown()[3].state, AgentState::Running);
 }
 
@@ -97,10 +97,10 @@ fn thousands_of_sleepers_wake_at_once_and_sleep_again() {
 fn a_pause_holds_thousands_and_a_step_moves_them_by_its_span() {
     let mut run = pool((0..1000).map(|_| Dummy::new(1.0).at(100.0)).collect(), 2, LONG);
     eventually("all run", || run.agents().iter().all(|a| a.stats().steps >= 1));
-    run.drive(Drive::Pause);
+    run.drive(TimelineCommand::Pause);
     let stopped = run.sim_now();
     let span = SimTime::from_nanos(50_000_000).since(SimTime::ZERO);
-    run.drive(Drive::Step(span));
+    run.drive(TimelineCommand::Step(span));
     let end = stopped + span;
     eventually("the step is made", || run.agents().iter().all(|a| a.latest().time >= end));
     // the step's states may be there before its time has come

@@ -16,40 +16,40 @@ pub(super) struct WatchdogWord {
 
 /// A turn in progress, as read by the watchdog; equal values are the same turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct TurnUnderWatch(u64);
+pub(super) struct WatchedTurn(u64);
 
 const IDLE: u64 = 0;
 const GIVEN_UP: u64 = u64::MAX;
 
-impl TurnUnderWatch {
+impl WatchedTurn {
     /// The agent of the turn.
-    pub const fn whose(self) -> AgentId {
+    pub const fn agent(self) -> AgentId {
         AgentId((self.0 as u32).wrapping_sub(1))
     }
 }
 
 impl WatchdogWord {
     /// Turn number `turn` begins, of `id`.
-    pub fn sit(&self, turn: u32, id: AgentId) -> TurnUnderWatch {
+    pub fn begin(&self, turn: u32, id: AgentId) -> WatchedTurn {
         let word = (u64::from(turn & 0x7fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
         // read by the watchdog only, and its timeout is long
         self.word.store(word, std::sync::atomic::Ordering::Relaxed);
-        TurnUnderWatch(word)
+        WatchedTurn(word)
     }
 
-    /// The step of `sitting` has returned; whether the worker has not been given up.
-    pub fn rise(&self, sitting: TurnUnderWatch) -> bool {
-        self.word.compare_exchange(sitting.0, IDLE, SeqCst, SeqCst).is_ok()
+    /// The step of `turn` has returned; whether the worker has not been given up.
+    pub fn end(&self, turn: WatchedTurn) -> bool {
+        self.word.compare_exchange(turn.0, IDLE, SeqCst, SeqCst).is_ok()
     }
 
     /// The turn in progress, if there is one.
-    pub fn sitting(&self) -> Option<TurnUnderWatch> {
-        Some(self.word.load(SeqCst)).filter(|word| *word != IDLE && *word != GIVEN_UP).map(TurnUnderWatch)
+    pub fn current(&self) -> Option<WatchedTurn> {
+        Some(self.word.load(SeqCst)).filter(|word| *word != IDLE && *word != GIVEN_UP).map(WatchedTurn)
     }
 
-    /// Gives the worker up, if `sitting` is still in progress; whether it was.
-    pub fn give_up(&self, sitting: TurnUnderWatch) -> bool {
-        self.word.compare_exchange(sitting.0, GIVEN_UP, SeqCst, SeqCst).is_ok()
+    /// Gives the worker up, if `turn` is still in progress; whether it was.
+    pub fn give_up(&self, turn: WatchedTurn) -> bool {
+        self.word.compare_exchange(turn.0, GIVEN_UP, SeqCst, SeqCst).is_ok()
     }
 }
 
@@ -59,16 +59,16 @@ mod tests {
 
     #[test]
     fn either_the_step_returns_or_the_worker_is_given_up() {
-        let desk = WatchdogWord::default();
-        assert_eq!(desk.sitting(), None);
-        let first = desk.sit(1, AgentId(7));
-        assert_eq!(desk.sitting().map(TurnUnderWatch::whose), Some(AgentId(7)));
-        assert!(desk.rise(first));
-        assert!(!desk.give_up(first), "it is over");
-        let second = desk.sit(2, AgentId(7));
+        let watchdog = WatchdogWord::default();
+        assert_eq!(watchdog.current(), None);
+        let first = watchdog.begin(1, AgentId(7));
+        assert_eq!(watchdog.current().map(WatchedTurn::agent), Some(AgentId(7)));
+        assert!(watchdog.end(first));
+        assert!(!watchdog.give_up(first), "it is over");
+        let second = watchdog.begin(2, AgentId(7));
         assert_ne!(first, second);
-        assert!(desk.give_up(second));
-        assert!(!desk.rise(second), "nobody waits for it any more");
-        assert_eq!(desk.sitting(), None);
+        assert!(watchdog.give_up(second));
+        assert!(!watchdog.end(second), "it is given up");
+        assert_eq!(watchdog.current(), None);
     }
 }

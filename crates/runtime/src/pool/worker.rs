@@ -1,6 +1,6 @@
 //! One worker of a pool: makes one due turn after the other.
 //!
-//! In: the pool's shared state, a place in it. Out: turns. Between two turns it serves summons, and sleeps if no turn is due: it waits for
+//! In: the pool's shared state, a place in it. Out: turns. Between two turns it serves notifications, and sleeps if no turn is due: it waits for
 //! no lock except its own queue's, and its only system call is to sleep. Never here: the choice of the next turn.
 
 use super::super::agent_clock::Timeline;
@@ -15,20 +15,20 @@ use std::thread;
 use std::time::Duration;
 
 /// After this long without sleep a worker yields its core for a moment, above all to the frame loop.
-const SHIFT: Duration = Duration::from_millis(1);
+const AWAKE_MAX: Duration = Duration::from_millis(1);
 
 /// An agent that is behind keeps its worker for this long: twenty cheap turns. Ten thousand such periods on two cores last as long as the
 /// lag cap: longer ones would make states old.
-const SPELL: Duration = Duration::from_micros(20);
+const CATCH_UP_MAX: Duration = Duration::from_micros(20);
 
 /// Turns between two checks whether agents of other workers are served worse than its own.
 const BALANCE_TURNS: u32 = 64;
 
 /// A worker and its state.
 pub(super) struct Worker {
-    hall: Arc<PoolState>,
+    state: Arc<PoolState>,
     at: usize,
-    desk: Arc<WatchdogWord>,
+    watchdog: Arc<WatchdogWord>,
     cpu: CpuShare,
     turns: u32,
     timeline: Timeline,
@@ -41,38 +41,38 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    pub fn new(hall: Arc<PoolState>, at: usize, desk: Arc<WatchdogWord>) -> Self {
-        let (now, timeline) = (hall.clock.now(), hall.timeline.read());
+    pub fn new(state: Arc<PoolState>, at: usize, watchdog: Arc<WatchdogWord>) -> Self {
+        let (now, timeline) = (state.clock.now(), state.timeline.read());
         let cpu = CpuShare::new();
-        Self { hall, at, desk, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
+        Self { state, at, watchdog, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
     }
 
     /// Works until the run is to end, or until the worker is given up.
     pub fn work(mut self) {
-        self.hall.board.bell().inspect(|bell| bell.enter(self.at));
-        while !self.hall.board.stopping() && !self.given_up {
+        self.state.sleep.wakeup().inspect(|wakeup| wakeup.register(self.at));
+        while !self.state.sleep.stopping() && !self.given_up {
             self.round();
         }
-        self.last.take().into_iter().for_each(|actor| self.hall.put(self.at, actor, self.now));
+        self.last.take().into_iter().for_each(|actor| self.state.put(self.at, actor, self.now));
     }
 
     /// Makes the next turn, or sleeps until one is due.
     fn round(&mut self) {
-        self.hall.timeline.renew(&mut self.timeline);
+        self.state.timeline.renew(&mut self.timeline);
         let timeline = self.timeline;
-        self.answer(&timeline);
-        match self.hall.exchange(self.at, self.last.take(), &timeline, self.now) {
-            Some(actor) => self.last = self.spell(actor, &timeline),
+        self.serve_notified(&timeline);
+        match self.state.next_turn(self.at, self.last.take(), &timeline, self.now) {
+            Some(actor) => self.last = self.catch_up(actor, &timeline),
             None => self.sleep(),
         }
-        self.pause(&timeline);
+        self.balance_and_yield(&timeline);
     }
 
-    /// Makes turns of `actor` for as long as it is behind, but for [`SPELL`] at most; returns it if it waits for another one.
+    /// Makes turns of `actor` for as long as it is behind, but for [`CATCH_UP_MAX`] at most; returns it if it waits for another one.
     ///
     /// If all agents are behind, the data of one are still in the cache for its second turn, but no longer after the turns of all others.
-    fn spell(&mut self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
-        let until = self.now + SPELL;
+    fn catch_up(&mut self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
+        let until = self.now + CATCH_UP_MAX;
         actor.fetch();
         let mut waiting = self.turn(actor, timeline);
         while self.now < until {
@@ -89,9 +89,9 @@ impl Worker {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
-        let sitting = self.desk.sit(self.turns, actor.id());
+        let watched = self.watchdog.begin(self.turns, actor.id());
         let begun = actor.begin(timeline, began);
-        if !self.desk.rise(sitting) {
+        if !self.watchdog.end(watched) {
             self.given_up = true;
             return None;
         }
@@ -99,7 +99,7 @@ impl Worker {
             actor.served += actor.pace.dt();
         }
         // the clock is read once per turn: the time after the step counts for the next one
-        self.now = self.hall.clock.now();
+        self.now = self.state.clock.now();
         let wall = self.now.saturating_sub(began);
         let next = match begun {
             None => Next::Parked,
@@ -109,58 +109,58 @@ impl Worker {
         actor.settle(self.cpu.count(wall));
         match next {
             Next::Due => Some(actor),
-            Next::Rest => self.lay(actor, timeline),
+            Next::Rest => self.store_resting(actor, timeline),
             Next::Join(leader) => move_in(actor, leader).err(),
             Next::Parked => None,
         }
     }
 
-    /// Serves the summoned agents.
-    fn answer(&mut self, timeline: &Timeline) {
-        let Some(bell) = self.hall.board.bell().filter(|bell| bell.has_rung()) else { return };
-        self.now = self.hall.clock.now();
-        if bell.answer(|id| self.attend(id, timeline)) > 1 {
+    /// Serves the notified agents.
+    fn serve_notified(&mut self, timeline: &Timeline) {
+        let Some(wakeup) = self.state.sleep.wakeup().filter(|wakeup| wakeup.is_notified()) else { return };
+        self.now = self.state.clock.now();
+        if wakeup.take_notified(|id| self.serve(id, timeline)) > 1 {
             // several agents may be too much for one worker: wake another
-            bell.rouse();
+            wakeup.wake_one();
         }
     }
 
-    fn attend(&self, id: AgentId, timeline: &Timeline) {
-        let woken = self.hall.lift(id).and_then(|actor| self.wake(actor, timeline));
-        let home = self.hall.come_home(id).filter(|actor| !actor.is_parked());
-        woken.into_iter().chain(home).for_each(|actor| self.hall.put(self.at, actor, self.now));
+    fn serve(&self, id: AgentId, timeline: &Timeline) {
+        let woken = self.state.take_resting(id).and_then(|actor| self.wake(actor, timeline));
+        let home = self.state.take_returned(id).filter(|actor| !actor.is_parked());
+        woken.into_iter().chain(home).for_each(|actor| self.state.put(self.at, actor, self.now));
     }
 
     /// Stores `actor` at rest, unless it was woken: then returns it to wait for a turn.
-    fn lay(&self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
-        self.hall.lay(actor).and_then(|actor| self.wake(actor, timeline))
+    fn store_resting(&self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
+        self.state.store_resting(actor).and_then(|actor| self.wake(actor, timeline))
     }
 
     /// Wakes `actor` if it was woken by a caller; else stores it at rest again.
     fn wake(&self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         loop {
-            if actor.wakes(timeline, self.now) {
+            if actor.try_wake(timeline, self.now) {
                 return Some(actor);
             }
-            actor = self.hall.lay(actor)?;
+            actor = self.state.store_resting(actor)?;
         }
     }
 
     fn sleep(&mut self) {
-        let span = self.hall.pause(self.at, self.now);
-        self.hall.board.bell().inspect(|bell| bell.sleep(self.at, span));
-        self.now = self.hall.clock.now();
+        let span = self.state.pause(self.at, self.now);
+        self.state.sleep.wakeup().inspect(|wakeup| wakeup.sleep(self.at, span));
+        self.now = self.state.clock.now();
         self.awake_since = self.now;
     }
 
     /// Periodic work of a worker while it has turns to make.
-    fn pause(&mut self, timeline: &Timeline) {
+    fn balance_and_yield(&mut self, timeline: &Timeline) {
         if self.turns.is_multiple_of(BALANCE_TURNS) {
-            self.hall.balance(self.at, timeline, self.now);
+            self.state.balance(self.at, timeline, self.now);
         }
-        if self.now.saturating_sub(self.awake_since) >= SHIFT {
+        if self.now.saturating_sub(self.awake_since) >= AWAKE_MAX {
             thread::yield_now();
-            self.now = self.hall.clock.now();
+            self.now = self.state.clock.now();
             self.awake_since = self.now;
         }
     }
@@ -168,19 +168,19 @@ impl Worker {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::agent_clock::Drive;
+    use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::spawn::{AssembledRun, assemble};
     use super::super::super::testing::Dummy;
     use super::super::super::{Clock, ManualClock};
     use super::*;
 
     fn worker(spawns: Vec<crate::AgentSpawn>, clock: &Arc<ManualClock>) -> Worker {
-        let AssembledRun { actors, handles, board } = assemble(spawns).unwrap();
-        board.hire(1);
+        let AssembledRun { actors, handles, sleep } = assemble(spawns).unwrap();
+        sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
-        let hall = Arc::new(PoolState::new(clock, board, handles, actors, 1));
-        hall.timeline.drive(Duration::ZERO, Drive::Run);
-        Worker::new(hall, 0, Arc::default())
+        let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));
+        state.timeline.drive(Duration::ZERO, TimelineCommand::Run);
+        Worker::new(state, 0, Arc::default())
     }
 
     /// Increase of the allocated heap, in bytes.
@@ -216,18 +216,18 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_of_sleepers_has_nothing_to_wake_for() {
+    fn a_worker_with_only_sleeping_agents_sleeps_without_a_timeout() {
         let clock = Arc::new(ManualClock::new());
         let sleepy = |_| Dummy { rest_from: Some(1), ..Dummy::new(1.0) }.at(100.0);
         let mut worker = worker((0..1000).map(sleepy).collect(), &clock);
         for _ in 0..1000 {
-            let timeline = worker.hall.timeline.read();
-            let actor = worker.hall.exchange(0, worker.last.take(), &timeline, worker.now).unwrap();
+            let timeline = worker.state.timeline.read();
+            let actor = worker.state.next_turn(0, worker.last.take(), &timeline, worker.now).unwrap();
             worker.last = worker.turn(actor, &timeline);
         }
         assert!(worker.last.is_none());
-        assert_eq!(worker.hall.pause(0, worker.now), None, "nobody is due");
-        assert!(worker.hall.handles.iter().all(|agent| agent.state() == crate::AgentState::Resting));
+        assert_eq!(worker.state.pause(0, worker.now), None, "no agent is due");
+        assert!(worker.state.handles.iter().all(|agent| agent.state() == crate::AgentState::Resting));
     }
 
     #[test]
@@ -246,7 +246,7 @@ mod tests {
         assert!(warm_up.count_total > 0, "the counter counts");
         let steady = allocation_counter::measure(|| rounds(50_000));
         assert_eq!(steady.count_total, 0, "{steady:?}");
-        let steps: u64 = worker.hall.handles.iter().map(|agent| agent.steps()).sum();
+        let steps: u64 = worker.state.handles.iter().map(|agent| agent.steps()).sum();
         // 5.6 s of simulated time
         assert!((62_000..64_000).contains(&steps), "{steps}");
     }

@@ -155,7 +155,8 @@ fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
     reader.limits(limits);
     let pixels = reader.decode().map_err(|why| why.to_string())?.to_rgba8();
     let texels = pixels.pixels().map(|pixel| pixel.0).collect();
-    Texture::new(pixels.dimensions(), texels, wrap).ok_or_else(|| "its image has no pixels".to_owned())
+    let (width, height) = pixels.dimensions();
+    Texture::new(width, height, texels, wrap).ok_or_else(|| "its image has no pixels".to_owned())
 }
 
 #[cfg(all(test, feature = "images"))]

@@ -4,13 +4,12 @@
 //! Theory: docs/theory/soft.md, eq. 15a.
 
 use super::super::primitives::Block;
-use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
-use super::{DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
-use crate::Place;
-use crate::Touch;
+use super::super::voronoi_regions::{Feature, LEAN_SHARE};
+use super::{BarycentricPoint, DEEP_SHARE, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
 use crate::near_triangle;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
+use crate::{Place, Touch};
 use glam::DVec3;
 
 /// Deeper than this share of an edge a place is pushed out of the block by the shortest way.
@@ -28,7 +27,16 @@ const PROJECTIONS: usize = 8;
 /// corner 0.6.
 const PIERCED: f64 = -0.5;
 
-impl Meeting<'_> {
+/// The point of a triangle that is nearest to a block.
+struct Projected {
+    point: SkinPoint,
+    /// The distance there, in the block's axes.
+    touch: signed_distance::Touch,
+    /// The largest distance of a corner of the triangle from its middle, metres.
+    size_m: f64,
+}
+
+impl SurfaceQuery<'_> {
     pub(super) fn block(&self, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) {
         let radius_m = self.surface.form.radius_m;
         let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
@@ -44,52 +52,57 @@ impl Meeting<'_> {
             })
         };
         for (vertex, at) in self.surface.vertices_in(self.region) {
-            let touch = nearest(at).and_then(|touch| self.out(Ridge::Vertex(vertex), block, touch));
+            let touch = nearest(at).and_then(|touch| self.out(Feature::Vertex(vertex), block, touch));
             if let Some(touch) = touch {
-                self.tell_block(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), (block, touch), into);
+                let key = KINDS[0] | u64::from(vertex);
+                into.extend(self.block_contact(key, SkinPoint::vertex(vertex, at), block, touch));
             }
         }
-        if !field.feels_spans() {
+        if !field.needs_span_tests() {
             return;
         }
         let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
-        for (number, edge, ends) in self.surface.edges_in(self.region) {
+        for edge in self.surface.edges_in(self.region) {
+            let ends = edge.ends;
             let Some((share, touch)) = field.lowest_of_span(ends.map(inward), self.reach_m) else { continue };
             let better_m = ROUNDING_SHARE * ends[0].distance(ends[1]);
             let inner = (LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&share)
                 && ends.into_iter().all(|end| touch.distance_m + better_m < apart(end));
-            if let Some(touch) = inner.then(|| self.out(Ridge::Edge(number, ends), block, touch)).flatten() {
-                let key = KINDS[1] | number << PART_SHIFT;
-                let point = ends[0].lerp(ends[1], share);
-                self.tell_block(key, (Spot::edge(edge, share), point), (block, touch), into);
+            if let Some(touch) = inner.then(|| self.out(edge.feature(), block, touch)).flatten() {
+                into.extend(self.block_contact(KINDS[1] | edge.number << PART_SHIFT, edge.at(share), block, touch));
             }
         }
-        for (number, triangle, corners) in self.surface.triangles_in(self.region) {
-            if self.corners((number, triangle, corners), (block, field), into) {
+        for triangle in self.surface.triangles_in(self.region) {
+            if self.corners(&triangle, block, field, into) {
                 continue;
             }
-            let Some((spot, point, touch, size)) = self.project((triangle, corners), (block, field)) else { continue };
+            let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, field) else { continue };
             let share = if field.corners(DVec3::Z).is_some() { BETTER_SHARE } else { ROUNDING_SHARE };
-            if corners.into_iter().all(|corner| touch.distance_m + share * size < apart(corner)) {
-                self.tell_block(KINDS[2] | number << PART_SHIFT, (spot, point), (block, touch), into);
+            if triangle.corners.into_iter().all(|corner| touch.distance_m + share * size_m < apart(corner)) {
+                into.extend(self.block_contact(KINDS[2] | triangle.number << PART_SHIFT, point, block, touch));
             }
         }
     }
 
     /// The place as reported by a vertex or an edge of the skin, with a push out of the skin and not along it; `None` where a neighbouring
     /// part is nearer. A place deep in the block is pushed out by the shortest way.
-    fn out(&self, ridge: Ridge, block: &Block<'_>, touch: signed_distance::Touch) -> Option<signed_distance::Touch> {
+    fn out(
+        &self,
+        feature: Feature,
+        block: &Block<'_>,
+        touch: signed_distance::Touch,
+    ) -> Option<signed_distance::Touch> {
         if touch.distance_m < -BETTER_SHARE * self.surface.form.edge_m {
             return Some(touch);
         }
         let way = -(block.rotation * touch.normal);
-        let out = ridge.out(self.surface, way)?;
+        let out = feature.out(self.surface, way)?;
         let local = block.rotation.conjugate() * -out;
-        if ridge.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
+        if feature.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
             return Some(signed_distance::Touch { normal: local, ..touch });
         }
         // the face continues there: the vertex may be the one that reaches it, whichever part is nearer now
-        let Ridge::Vertex(vertex) = ridge else { return None };
+        let Feature::Vertex(vertex) = feature else { return None };
         let field = block.field?;
         let here = block.inward(Ball { centre: self.surface.at(vertex), radius_m: 0.0 }).centre;
         let beside = here + (local - touch.normal).normalize_or_zero() * (BESIDE_SHARE * self.surface.form.edge_m);
@@ -98,12 +111,8 @@ impl Meeting<'_> {
     }
 
     /// Adds the corners of a block over a triangle; returns whether there are any.
-    fn corners(
-        &self,
-        (number, triangle, corners): (u64, [u32; 3], [DVec3; 3]),
-        (block, field): (&Block<'_>, &Field),
-        into: &mut Vec<Touch>,
-    ) -> bool {
+    fn corners(&self, triangle: &Triangle, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) -> bool {
+        let Triangle { number, vertices, corners } = *triangle;
         let (a, Some(out)) = (corners[0], self.facing(corners, block)) else { return false };
         let local = block.rotation.conjugate() * out;
         // for a thin body its far side does not count
@@ -124,8 +133,8 @@ impl Meeting<'_> {
                 continue;
             };
             let touch = signed_distance::Touch { normal: -local, distance_m };
-            let spot = Spot { vertices: triangle, shares };
-            self.tell_block(KINDS[2] | number << PART_SHIFT | name, (spot, foot), (block, touch), into);
+            let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position: foot };
+            into.extend(self.block_contact(KINDS[2] | number << PART_SHIFT | name, point, block, touch));
             any = true;
         }
         any
@@ -138,16 +147,13 @@ impl Meeting<'_> {
         Some(if turned { -across } else { across })
     }
 
-    /// The point of a triangle that is nearest to a block, if it is inside the triangle, and the size of the triangle.
-    fn project(
-        &self,
-        (triangle, corners): ([u32; 3], [DVec3; 3]),
-        (block, field): (&Block<'_>, &Field),
-    ) -> Option<(Spot, DVec3, signed_distance::Touch, f64)> {
+    /// The point of a triangle that is nearest to a block, if it is inside the triangle.
+    fn project(&self, triangle: &Triangle, block: &Block<'_>, field: &Field) -> Option<Projected> {
+        let corners = triangle.corners;
         let radius_m = self.surface.form.radius_m;
         let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let size = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
-        let look_m = radius_m + self.reach_m + 2.0 * size;
+        let size_m = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
+        let look_m = radius_m + self.reach_m + 2.0 * size_m;
         let mut found = None;
         for _ in 0..PROJECTIONS {
             found = Some(field.touches(block.inward(Ball { centre: point, radius_m }).centre, look_m).iter().next()?);
@@ -155,36 +161,36 @@ impl Meeting<'_> {
             let foot = point - block.rotation * touch.normal * touch.distance_m;
             point = near_triangle(foot, corners);
         }
-        let (spot, point) = self.surface.inside(triangle, corners, point)?;
+        let point = triangle.inside(point)?;
         let mut touch = found?;
         if touch.distance_m >= -BETTER_SHARE * self.surface.form.edge_m {
             touch.normal = block.rotation.conjugate() * -self.facing(corners, block)?;
         }
-        Some((spot, point, touch, size))
+        Some(Projected { point, touch, size_m })
     }
 
-    fn tell_block(
+    /// The contact between a point of the skin and a block whose distance there is `touch`, unless they are too far.
+    fn block_contact(
         &self,
         key: u64,
-        (spot, point): (Spot, DVec3),
-        (block, touch): (&Block<'_>, signed_distance::Touch),
-        into: &mut Vec<Touch>,
-    ) {
+        point: SkinPoint,
+        block: &Block<'_>,
+        touch: signed_distance::Touch,
+    ) -> Option<Touch> {
+        let SkinPoint { spot, position } = point;
         let gap_m = touch.distance_m - self.surface.form.radius_m;
         let normal = block.rotation * touch.normal;
-        if gap_m <= self.reach_m && !(block.pierces && self.is_pierced(spot, normal)) {
-            into.push(Touch {
-                key,
-                normal,
-                gap_m,
-                on_a: spot.place(),
-                on_b: Place::Point(point - normal * (0.5 * gap_m)),
-            });
-        }
+        (gap_m <= self.reach_m && !(block.pierces && self.is_pierced(spot, normal))).then(|| Touch {
+            key,
+            normal,
+            gap_m,
+            on_a: spot.place(),
+            on_b: Place::Point(position - normal * (0.5 * gap_m)),
+        })
     }
 
     /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
-    fn is_pierced(&self, spot: Spot, normal: DVec3) -> bool {
+    fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
         let inside = spot.shares[2] > 0.0;
         let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
         self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)

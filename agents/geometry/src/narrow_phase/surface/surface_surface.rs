@@ -3,9 +3,10 @@
 //! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, round pieces.
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
-use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
-use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
-use crate::Touch;
+use super::super::voronoi_regions::{Feature, LEAN_SHARE};
+use super::{BarycentricPoint, DEEP_SHARE, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
+use crate::capsule_chain::CROSSING_M;
+use crate::{Aabb, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use std::ops::RangeInclusive;
@@ -22,31 +23,31 @@ const HALF: f64 = 0.5;
 
 /// The place of a skin that is nearest to a point.
 #[derive(Clone, Copy)]
-struct Near {
-    spot: Spot,
+struct NearestPoint {
+    spot: BarycentricPoint,
     at: DVec3,
     /// The normal of its triangle, out of a closed skin; a rope has none.
     face: Option<DVec3>,
 }
 
 /// A contact of a place of one skin with another skin: the spot there, the normal from there, and the distance, metres.
-struct Met {
-    spot: Spot,
+struct SkinContact {
+    spot: BarycentricPoint,
     normal: DVec3,
     distance_m: f64,
 }
 
 /// Two skins that may touch.
-pub(super) struct Skins<'a> {
-    here: &'a Meeting<'a>,
-    there: &'a Meeting<'a>,
+pub(super) struct SkinPair<'a> {
+    here: &'a SurfaceQuery<'a>,
+    there: &'a SurfaceQuery<'a>,
     /// Sum of both half thicknesses, and how deep the two may overlap (`deep_m`), metres.
     thick_m: f64,
     deep_m: f64,
 }
 
-impl<'a> Skins<'a> {
-    pub fn new(here: &'a Meeting<'a>, there: &'a Meeting<'a>) -> Self {
+impl<'a> SkinPair<'a> {
+    pub fn new(here: &'a SurfaceQuery<'a>, there: &'a SurfaceQuery<'a>) -> Self {
         let (a, b) = (here.surface.form, there.surface.form);
         Self { here, there, thick_m: a.radius_m + b.radius_m, deep_m: DEEP_SHARE * a.edge_m.min(b.edge_m) }
     }
@@ -62,8 +63,8 @@ impl<'a> Skins<'a> {
     fn vertices_here(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         for (vertex, at) in here.surface.vertices_in(here.region) {
-            let Some(Met { spot, normal, distance_m }) = self.vertex(here, there, (vertex, at)) else { continue };
-            let (on_a, on_b) = (Spot::vertex(vertex).place(), spot.place());
+            let Some(SkinContact { spot, normal, distance_m }) = self.vertex(here, there, vertex, at) else { continue };
+            let (on_a, on_b) = (BarycentricPoint::vertex(vertex).place(), spot.place());
             into.push(Touch { key: KINDS[0] | u64::from(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
         }
     }
@@ -71,8 +72,8 @@ impl<'a> Skins<'a> {
     fn vertices_there(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         for (vertex, at) in there.surface.vertices_in(there.region) {
-            let Some(Met { spot, normal, distance_m }) = self.vertex(there, here, (vertex, at)) else { continue };
-            let (on_a, on_b, gap_m) = (spot.place(), Spot::vertex(vertex).place(), distance_m - thick_m);
+            let Some(SkinContact { spot, normal, distance_m }) = self.vertex(there, here, vertex, at) else { continue };
+            let (on_a, on_b, gap_m) = (spot.place(), BarycentricPoint::vertex(vertex).place(), distance_m - thick_m);
             into.push(Touch { key: KINDS[3] | u64::from(vertex), normal: -normal, gap_m, on_a, on_b });
         }
     }
@@ -80,19 +81,18 @@ impl<'a> Skins<'a> {
     fn edges(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
-        for (number, edge, ends) in here.surface.edges_in(here.region) {
-            let around = (ends[0].min(ends[1]) - self.within_m(), ends[0].max(ends[1]) + self.within_m());
-            for (other, edge_b, ends_b) in there.surface.edges_in(around) {
-                let (s, t) = near_segments(ends, ends_b);
+        for edge in here.surface.edges_in(here.region) {
+            let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
+            for other in there.surface.edges_in(around.grown(self.within_m())) {
+                let (s, t) = near_segments(edge.ends, other.ends);
                 if !(inner.contains(&s) && inner.contains(&t)) {
                     continue;
                 }
-                let (a, b) = (Spot::edge(edge, s), Spot::edge(edge_b, t));
-                let ridges = [Ridge::Edge(number, ends), Ridge::Edge(other, ends_b)];
-                let points = [ends[0].lerp(ends[1], s), ends_b[0].lerp(ends_b[1], t)];
-                if let Some((normal, distance_m)) = self.crossing([a, b], points, ridges) {
-                    let key = KINDS[1] | number << PART_SHIFT | other;
-                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a: a.place(), on_b: b.place() });
+                let (a, b) = (edge.at(s), other.at(t));
+                if let Some((normal, distance_m)) = self.crossing([a, b], [edge.feature(), other.feature()]) {
+                    let key = KINDS[1] | edge.number << PART_SHIFT | other.number;
+                    let (on_a, on_b) = (a.spot.place(), b.spot.place());
+                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a, on_b });
                 }
             }
         }
@@ -105,24 +105,24 @@ impl<'a> Skins<'a> {
     }
 
     /// Where a vertex of the skin `a` touches the skin `b`.
-    fn vertex(&self, a: &Meeting<'_>, b: &Meeting<'_>, (vertex, at): (u32, DVec3)) -> Option<Met> {
-        let out = Spot::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
+    fn vertex(&self, a: &SurfaceQuery<'_>, b: &SurfaceQuery<'_>, vertex: u32, at: DVec3) -> Option<SkinContact> {
+        let out = BarycentricPoint::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
         let near = b.nearest(at, self.within_m(), None)?;
         if b.is_behind(near, at) {
             // it is pushed out through a face that it can have come in by
-            let Near { spot, at: foot, face } = b.nearest(at, self.deep_m, out)?;
+            let NearestPoint { spot, at: foot, face } = b.nearest(at, self.deep_m, out)?;
             let distance_m = at.distance(foot);
             let normal = if distance_m > CROSSING_M { (foot - at) / distance_m } else { face? };
-            return Some(Met { spot, normal, distance_m: -distance_m });
+            return Some(SkinContact { spot, normal, distance_m: -distance_m });
         }
-        let Near { spot, at: foot, face } = near;
+        let NearestPoint { spot, at: foot, face } = near;
         let distance_m = at.distance(foot);
         if distance_m <= CROSSING_M {
-            let Near { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
+            let NearestPoint { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
             let away = out.map(|out| -out);
             // an open skin may be meant from either side
             let normal = face.map(|face| if away.is_some_and(|away| face.dot(away) < 0.0) { -face } else { face });
-            return Some(Met { spot, normal: normal.or(away)?, distance_m: 0.0 });
+            return Some(SkinContact { spot, normal: normal.or(away)?, distance_m: 0.0 });
         }
         let normal = (at - foot) / distance_m;
         let is_face = face.is_some_and(|face| face.dot(normal).abs() > FACE);
@@ -131,25 +131,26 @@ impl<'a> Skins<'a> {
             let least_m = if is_face { 0.0 } else { HALF * distance_m };
             let passed = !b.surface.form.closed
                 && distance_m <= self.deep_m
-                && Ridge::Vertex(vertex).out(a.surface, normal).is_some()
+                && Feature::Vertex(vertex).out(a.surface, normal).is_some()
                 && a.holds(foot, least_m..=distance_m)
                 && a.nearest(foot, distance_m, Some(normal)).is_none();
-            return passed.then_some(Met { spot, normal: -normal, distance_m: -distance_m });
+            return passed.then_some(SkinContact { spot, normal: -normal, distance_m: -distance_m });
         }
-        let out_here = Ridge::Vertex(vertex).out(a.surface, -normal)?;
+        let out_here = Feature::Vertex(vertex).out(a.surface, -normal)?;
         if let Some(face) = face.filter(|_| is_face) {
             let normal = face * face.dot(normal).signum();
-            return Some(Met { spot, normal, distance_m: normal.dot(at - foot) });
+            return Some(SkinContact { spot, normal, distance_m: normal.dot(at - foot) });
         }
-        let nearest = Ridge::Vertex(vertex).is_nearest(a.surface, -normal * distance_m);
-        nearest.then_some(Met { spot, normal: -out_here, distance_m: -out_here.dot(normal) * distance_m })
+        let nearest = Feature::Vertex(vertex).is_nearest(a.surface, -normal * distance_m);
+        nearest.then_some(SkinContact { spot, normal: -out_here, distance_m: -out_here.dot(normal) * distance_m })
     }
 
     /// The normal where two edges cross, towards the first, and their distance; `None` where a neighbouring part is nearer, and for
     /// parallel edges, whose ends report the same contact.
-    fn crossing(&self, spots: [Spot; 2], [a, b]: [DVec3; 2], ridges: [Ridge; 2]) -> Option<(DVec3, f64)> {
+    fn crossing(&self, points: [SkinPoint; 2], ridges: [Feature; 2]) -> Option<(DVec3, f64)> {
+        let [a, b] = points.map(|point| point.position);
         let [here, there] = [self.here, self.there];
-        let out = [spots[0].out(here.normals), spots[1].out(there.normals)];
+        let out = [points[0].spot.out(here.normals), points[1].spot.out(there.normals)];
         let across = along(ridges[0]).cross(along(ridges[1]));
         if across.length() < PARALLEL {
             return None;
@@ -176,29 +177,35 @@ impl<'a> Skins<'a> {
 }
 
 /// The direction of an edge.
-fn along(ridge: Ridge) -> DVec3 {
-    if let Ridge::Edge(_, [a, b]) = ridge { (b - a).normalize_or_zero() } else { DVec3::ZERO }
+fn along(feature: Feature) -> DVec3 {
+    if let Feature::Edge(_, [a, b]) = feature { (b - a).normalize_or_zero() } else { DVec3::ZERO }
 }
 
-impl Meeting<'_> {
+impl SurfaceQuery<'_> {
     /// The place of the skin that is nearest to a point within `within_m`; only of faces opposed to the normal `facing`, if one is given.
-    fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<Near> {
-        let region = (point - within_m, point + within_m);
-        let faces = self.surface.triangles_in(region).filter_map(|(_, triangle, corners)| {
+    fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<NearestPoint> {
+        let region = Aabb::about(point, within_m);
+        let faces = self.surface.triangles_in(region).filter_map(|Triangle { vertices, corners, .. }| {
             let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
             if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
                 return None;
             }
             let at = near_triangle(point, corners);
-            Some(Near { spot: Spot { vertices: triangle, shares: shares(at, corners)? }, at, face: Some(face) })
+            Some(NearestPoint {
+                spot: BarycentricPoint { vertices, shares: shares(at, corners)? },
+                at,
+                face: Some(face),
+            })
         });
         let is_rope = self.surface.form.triangles.is_empty();
-        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|(_, edge, ends)| {
-            let along = ends[1] - ends[0];
-            let share = ((point - ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            Near { spot: Spot::edge(edge, share), at: ends[0].lerp(ends[1], share), face: None }
+        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|edge| {
+            let along = edge.ends[1] - edge.ends[0];
+            let share =
+                ((point - edge.ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let SkinPoint { spot, position } = edge.at(share);
+            NearestPoint { spot, at: position, face: None }
         });
-        let distance2 = |near: &Near| near.at.distance_squared(point);
+        let distance2 = |near: &NearestPoint| near.at.distance_squared(point);
         faces
             .chain(lines)
             .filter(|near| distance2(near) <= within_m * within_m)
@@ -206,13 +213,13 @@ impl Meeting<'_> {
     }
 
     /// Whether a point is inside the closed skin whose nearest place this is.
-    fn is_behind(&self, near: Near, point: DVec3) -> bool {
+    fn is_behind(&self, near: NearestPoint, point: DVec3) -> bool {
         near.spot.out(self.normals).is_some_and(|out| out.dot(point - near.at) < 0.0)
     }
 
     /// Whether a point is inside the skin, at a depth in this range, metres; for an open skin always true.
     fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
-        let deep = |near: Near| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
+        let deep = |near: NearestPoint| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
         !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
     }
 }

@@ -63,7 +63,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn boxes_are_as_far_as_corners_and_edges_say(way in vector(1.0), far in 0.25..0.6, r in turn(), s in turn()) {
+    fn box_distance_is_that_of_their_corners_and_edges(way in vector(1.0), far in 0.25..0.6, r in turn(), s in turn()) {
         let (first, second) = (cuboid(HALF[0]), cuboid(HALF[1]));
         let q = way.normalize_or(DVec3::X) * far;
         let expected = apart((DVec3::ZERO, r), (q, s));
@@ -93,7 +93,7 @@ proptest! {
     }
 
     #[test]
-    fn boxes_overlap_as_deep_as_fifteen_axes_say(q in vector(0.2), r in turn(), s in turn()) {
+    fn box_overlap_is_that_of_the_fifteen_axis_test(q in vector(0.2), r in turn(), s in turn()) {
         let (first, second) = (cuboid(HALF[0]), cuboid(HALF[1]));
         let expected = widest_slab(q, r, s);
         prop_assume!(expected < 0.0);
@@ -166,16 +166,16 @@ fn a_lying_cylinder_touches_a_box_along_its_side_and_a_standing_one_at_its_rim()
     let side = all(&at(&round, DVec3::Z * 0.15, lying), &floor, 1e-3);
     let span = |found: &[Touch]| {
         let points = found.iter().map(|touch| axis(touch.on_a, &[]).0);
-        crate::bounds(&points.collect::<Vec<_>>())
+        crate::Aabb::of(&points.collect::<Vec<_>>())
     };
-    assert!(side.len() >= 2 && (span(&side).1.y - 0.1).abs() < 1e-5 && (span(&side).0.y + 0.1).abs() < 1e-5);
+    assert!(side.len() >= 2 && (span(&side).high.y - 0.1).abs() < 1e-5 && (span(&side).low.y + 0.1).abs() < 1e-5);
     let standing = all(&at(&round, DVec3::Z * 0.2, DQuat::IDENTITY), &floor, 1e-3);
     assert!(standing.len() >= 4 && standing.iter().all(|touch| touch.gap_m.abs() < 1e-6), "{standing:?}");
-    assert!((span(&standing).1 - span(&standing).0).length() > 0.09);
+    assert!((span(&standing).high - span(&standing).low).length() > 0.09);
 }
 
 #[test]
-fn crossed_cylinders_are_as_far_as_their_axes_say() {
+fn crossed_cylinder_distance_is_that_of_their_axes() {
     let (first, second) = (cylinder(0.05, 0.2), cylinder(0.03, 0.15));
     for angle in [0.0, 0.3, 1.0, 1.5] {
         for gap_m in [0.1, 1e-3, 1e-6, -1e-4, -0.01] {

@@ -63,7 +63,7 @@ proptest! {
     }
 
     #[test]
-    fn names_outlast_a_trembling(p in vector(0.03), r in turn(), s in turn(), shift in vector(1e-7)) {
+    fn contact_keys_survive_small_motions(p in vector(0.03), r in turn(), s in turn(), shift in vector(1e-7)) {
         let (u, v, w) = (curved((p, r)), curved((DVec3::ZERO, s)), curved((p + shift, r)));
         let cast = cast();
         for first in &cast {
@@ -111,7 +111,7 @@ fn gaps_and_normals_change_smoothly_along_a_motion() {
 }
 
 #[test]
-fn coincident_forms_still_have_normals() {
+fn coincident_shapes_still_have_normals() {
     let cast = cast();
     let v = curved((DVec3::ZERO, DQuat::IDENTITY));
     let stuck = [DVec3::ZERO; 8];
@@ -154,7 +154,7 @@ fn places_that_are_not_finite_and_views_of_another_kind_touch_nothing() {
 fn nothing_is_allocated_once_everything_is_known() {
     let cast = cast();
     let v = curved((DVec3::ZERO, DQuat::IDENTITY));
-    let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+    let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
     let mut run = |lift: f64, known: bool| {
         for first in &cast {
             for second in &cast {
@@ -163,8 +163,8 @@ fn nothing_is_allocated_once_everything_is_known() {
                 let (a, b) =
                     (place(first, (p, DQuat::IDENTITY), &u), place(second, (DVec3::ZERO, DQuat::IDENTITY), &v));
                 let info = allocation_counter::measure(|| {
-                    touches(&a, &b, 0.01, &mut room, &mut found);
-                    gap(&a, &b, 0.01, &mut room);
+                    touches(&a, &b, 0.01, &mut scratch, &mut found);
+                    gap(&a, &b, 0.01, &mut scratch);
                 });
                 assert!(!known || info.count_total == 0, "{} allocations", info.count_total);
             }

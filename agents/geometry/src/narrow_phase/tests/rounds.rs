@@ -24,7 +24,7 @@ fn ends(position: DVec3, rotation: DQuat, half: f64) -> [DVec3; 2] {
 
 proptest! {
     #[test]
-    fn balls_are_as_far_as_their_centres_say(p in vector(0.3), q in vector(0.3), turns in turn()) {
+    fn ball_distance_is_that_of_their_centres(p in vector(0.3), q in vector(0.3), turns in turn()) {
         let (a, b) = (ball(0.05), ball(0.07));
         let found = all(&at(&a, p, turns), &at(&b, q, turns), 1.0);
         prop_assert_eq!(found.len(), 1);
@@ -36,7 +36,7 @@ proptest! {
     }
 
     #[test]
-    fn a_ball_feels_a_box_exactly(p in vector(0.4), q in vector(0.2), turns in turn()) {
+    fn ball_box_distance_is_exact(p in vector(0.4), q in vector(0.2), turns in turn()) {
         let half = DVec3::new(0.1, 0.15, 0.2);
         let (round, block) = (ball(0.05), cuboid(half));
         let (a, b) = (at(&round, p, DQuat::IDENTITY), at(&block, q, turns));
@@ -49,7 +49,7 @@ proptest! {
     }
 
     #[test]
-    fn capsules_are_as_far_as_their_axes_say(p in vector(0.2), q in vector(0.2), r in turn(), s in turn()) {
+    fn capsule_distance_is_that_of_their_axes(p in vector(0.2), q in vector(0.2), r in turn(), s in turn()) {
         let (first, second) = (capsule(0.03, 0.1), capsule(0.02, 0.15));
         let (u, v) = (ends(p, r, 0.1), ends(q, s, 0.15));
         let from_axis = |x: DVec3| least(|t| x.distance(v[0].lerp(v[1], t)));
@@ -65,7 +65,7 @@ proptest! {
     }
 
     #[test]
-    fn a_capsule_feels_a_box_where_its_axis_is_lowest(p in vector(0.3), r in turn(), s in turn()) {
+    fn a_capsule_touches_a_box_where_its_axis_is_lowest(p in vector(0.3), r in turn(), s in turn()) {
         let half = DVec3::new(0.1, 0.15, 0.2);
         let (round, block) = (capsule(0.03, 0.1), cuboid(half));
         let axis = ends(p, r, 0.1);

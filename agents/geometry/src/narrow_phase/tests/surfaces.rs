@@ -51,12 +51,12 @@ proptest! {
     #[test]
     fn a_ball_and_a_box_s_corner_touch_where_they_are_nearest(x in 0.01_f64..0.19, y in 0.01_f64..0.19, z in 0.03_f64..0.06) {
         let (form, positions) = sheet();
-        let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+        let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
         let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
         let at = DVec3::new(x, y, z);
         let round = ball(0.02);
         let there = PlacedShape { form: &round, view: ShapePose::Solid { position: at, rotation: DQuat::IDENTITY } };
-        touches(&here, &there, 0.1, &mut room, &mut list);
+        touches(&here, &there, 0.1, &mut scratch, &mut list);
         let nearest = lowest(&list);
         let wanted = apart(&form, &positions, at) - 0.02 - 1e-3;
         prop_assert!(nearest.gap_m >= wanted - 1e-12 && nearest.gap_m <= wanted + 1e-6, "{} {wanted}", nearest.gap_m);
@@ -64,7 +64,7 @@ proptest! {
         prop_assert!(list.windows(2).all(|pair| pair[0].key < pair[1].key));
         // both sides see the same, turned round
         let mut back = vec![];
-        touches(&there, &here, 0.1, &mut room, &mut back);
+        touches(&there, &here, 0.1, &mut scratch, &mut back);
         prop_assert_eq!(list.len(), back.len());
         for (one, two) in list.iter().zip(&back) {
             prop_assert_eq!((one.gap_m, one.normal, one.on_a, one.on_b), (two.gap_m, -two.normal, two.on_b, two.on_a));
@@ -78,7 +78,7 @@ proptest! {
     fn on_a_flat_skin_every_place_pushes_straight_out_of_it(x in 0.05_f64..0.15, y in 0.05_f64..0.15, lean in -0.05_f64..0.05) {
         let (form, mut positions) = sheet();
         positions.iter_mut().for_each(|x| x.z = 0.0);
-        let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+        let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
         let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
         for (solid, height) in [
             (ball(0.02), 0.02),
@@ -87,7 +87,7 @@ proptest! {
         ] {
             let rotation = DQuat::from_rotation_y(lean);
             let position = DVec3::new(x, y, height + 1.5e-3);
-            touches(&here, &at(&solid, position, rotation), 0.02, &mut room, &mut list);
+            touches(&here, &at(&solid, position, rotation), 0.02, &mut scratch, &mut list);
             prop_assert!(!list.is_empty());
             // what is beneath a face pushes along that
             let face = rotation * DVec3::NEG_Z;
@@ -103,14 +103,14 @@ proptest! {
 fn a_box_s_corner_over_a_triangle_touches_inside_it() {
     let (form, mut positions) = sheet();
     positions.iter_mut().for_each(|x| x.z = 0.0);
-    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+    let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let cube = cuboid(DVec3::splat(0.02));
     // a corner down: half a diagonal under the middle
     let down = DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::NEG_Z);
     let (x, y) = (0.068, 0.06);
     let position = DVec3::new(x, y, 0.02 * 3.0_f64.sqrt() + 0.003);
     let there = PlacedShape { form: &cube, view: ShapePose::Solid { position, rotation: down } };
-    touches(&PlacedShape { form: &form, view: ShapePose::Surface(&positions) }, &there, 0.01, &mut room, &mut list);
+    touches(&PlacedShape { form: &form, view: ShapePose::Surface(&positions) }, &there, 0.01, &mut scratch, &mut list);
     let nearest = lowest(&list);
     assert!((nearest.gap_m - 0.002).abs() < 1e-4, "{nearest:?}"); // eight projections from the middle of the triangle
     assert!(matches!(nearest.on_a, Place::Surface { shares, .. } if shares.iter().all(|share| *share > 0.02)));
@@ -134,12 +134,18 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         held: false,
     };
     let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
-    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
+    let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
         let position = DVec3::new(0.2, 0.2, depth);
         let there = PlacedShape { form: &round, view: ShapePose::Solid { position, rotation: DQuat::IDENTITY } };
-        touches(&PlacedShape { form: &form, view: ShapePose::Surface(&positions) }, &there, 0.0, &mut room, &mut list);
+        touches(
+            &PlacedShape { form: &form, view: ShapePose::Surface(&positions) },
+            &there,
+            0.0,
+            &mut scratch,
+            &mut list,
+        );
         let nearest = lowest(&list);
         // the surface is above the ball, which has to go down, whichever side its middle is on
         assert!(nearest.normal.distance(DVec3::Z) < 1e-12, "{depth}: {nearest:?}");

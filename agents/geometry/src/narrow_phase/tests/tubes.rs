@@ -24,7 +24,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn tubes_are_as_near_as_sampling_says(a in crooked(12), b in crooked(12), off in vector(0.08)) {
+    fn tube_distance_agrees_with_sampling(a in crooked(12), b in crooked(12), off in vector(0.08)) {
         let b: Vec<_> = b.iter().map(|p| *p + off).collect();
         let form = chain();
         let (first, second) = (along(&form, &a, &RADII), along(&form, &b, &RADII));
@@ -42,7 +42,7 @@ proptest! {
     }
 
     #[test]
-    fn every_foot_and_every_crossing_is_told(a in crooked(12), b in crooked(12), off in vector(0.05)) {
+    fn every_foot_and_every_crossing_is_reported(a in crooked(12), b in crooked(12), off in vector(0.05)) {
         let b: Vec<_> = b.iter().map(|p| *p + off).collect();
         let form = chain();
         let found = all(&along(&form, &a, &RADII), &along(&form, &b, &RADII), 0.02);
@@ -68,7 +68,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tube_is_as_near_to_a_solid_as_sampling_says(a in crooked(12), r in turn(), off in vector(0.06)) {
+    fn tube_solid_distance_agrees_with_sampling(a in crooked(12), r in turn(), off in vector(0.06)) {
         let half = DVec3::new(0.02, 0.03, 0.04);
         let (tube, solids) = (chain(), [cuboid(half), cylinder(0.02, 0.04), hull(half)]);
         for form in &solids {
@@ -110,15 +110,15 @@ fn helix(segments: usize, phase: f64) -> Vec<DVec3> {
 }
 
 #[test]
-fn the_pairs_looked_at_grow_with_the_length_of_the_tubes() {
+fn tested_pairs_grow_linearly_with_the_length_of_the_tubes() {
     let form = chain();
     let tried = |segments: usize| {
         let (a, b) = (helix(segments, 0.0), helix(segments, std::f64::consts::PI));
         let radii = vec![8e-3; segments + 1];
-        let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
+        let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+        touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
         assert!(found.len() > segments, "the strands of a double helix lie side by side");
-        room.chains.tried
+        scratch.chains.tried
     };
     let (short, long) = (tried(100), tried(400));
     assert!(long < 5 * short, "{short} pairs for 100 spans, {long} for 400");
@@ -127,13 +127,13 @@ fn the_pairs_looked_at_grow_with_the_length_of_the_tubes() {
 }
 
 #[test]
-fn tubes_far_apart_look_at_no_pairs() {
+fn tubes_far_apart_test_no_pairs() {
     let form = chain();
     let (a, radii) = (helix(400, 0.0), vec![8e-3; 401]);
     let b: Vec<_> = a.iter().map(|p| *p + DVec3::X).collect();
-    let (mut room, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-    touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut room, &mut found);
-    assert!(found.is_empty() && room.chains.tried == 0);
+    let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
+    touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
+    assert!(found.is_empty() && scratch.chains.tried == 0);
 }
 
 #[test]

@@ -258,9 +258,9 @@ impl Island {
                 body.late = None;
             }
             if body.motion.position != before.position || body.motion.rotation != before.rotation {
-                body.go_part(&before, self.free_share(index, &body.motion));
+                body.scale_displacement(&before, self.free_share(index, &body.motion));
             }
-            body.stand_fast();
+            body.transmit_to_ground();
             let member = &mut self.members[index];
             (member.motion, member.gravity, member.springs) = (body.motion, body.gravity, None);
             member.alone = body.ties.is_empty() && body.company.guests().is_empty();
@@ -289,7 +289,7 @@ impl Island {
             let moves = direct.moves(index, [carried.linear, carried.angular]);
             for (member, way) in self.members.iter_mut().zip(moves.into_iter().flatten()) {
                 let body = crew.body(member.seat).0;
-                body.go_by(way);
+                body.displace_by(way);
                 member.motion = body.motion;
             }
         }
@@ -340,7 +340,7 @@ impl Island {
         if let Solver::Few(direct) = &mut self.solver {
             if direct.advance((&mut self.members, &self.ground), &self.held, h)? {
                 for member in self.members.iter().filter(|m| m.springs.is_some()) {
-                    crew.body(member.seat).0.give_way(member.bent, h);
+                    crew.body(member.seat).0.react_to_change(member.bent, h);
                 }
                 return Ok(());
             }
@@ -414,7 +414,7 @@ impl Island {
             }
             let (body, around) = crew.body(member.seat);
             (body.motion, body.at_rest, body.within) = (member.motion, at_rest, member.answer);
-            body.led(around, dt_s, (member.touching, member.depth_m));
+            body.finish_island_step(around, dt_s, member.touching, member.depth_m);
         }
     }
 }

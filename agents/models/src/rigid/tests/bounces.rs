@@ -69,7 +69,7 @@ fn bodies_that_bounce_without_loss_gain_nothing_where_messages_are_lost() {
 
 /// The body that owns the contact stands on the ground; what falls on it bounces all the same.
 #[test]
-fn a_ball_bounces_on_a_body_that_stands_whoever_owns_the_contact() {
+fn a_ball_bounces_on_a_standing_body_whichever_owns_the_contact() {
     for rates in [[1000.0, 100.0], [100.0, 1000.0]] {
         let mut stage = Stage::new(Faults::default());
         let table = RigidSpec { mass_kg: 20.0, obstacles: [floor(0.5)].into(), ..cube(0.1, UP * 0.1) };

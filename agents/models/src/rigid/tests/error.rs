@@ -9,7 +9,7 @@ fn steps(dt: f64) -> u32 {
 }
 
 /// What it says after it has made steps of `dt` for a tenth of a second, and how far it then is from `exact` of how it began.
-fn said_and_true(
+fn estimated_and_true(
     body: &mut RigidBody,
     (dt, pull): (f64, Option<AnchorSpring>),
     exact: impl Fn(DVec3, DVec3) -> DVec3,
@@ -26,7 +26,7 @@ fn said_and_true(
 }
 
 #[test]
-fn the_error_of_sliding_is_told_to_a_tenth() {
+fn the_error_of_sliding_is_estimated_to_a_tenth() {
     for dt in [1e-3, 2e-3, 4e-3, 1e-2, 2e-2] {
         let sliding = RigidSpec { velocity: DVec3::X * 4.0, obstacles: [floor(0.5)].into(), ..cube(0.1, UP * 0.1) };
         let mut body = RigidBody::new(sliding).unwrap();
@@ -34,14 +34,14 @@ fn the_error_of_sliding_is_told_to_a_tenth() {
             step(&mut body, dt);
         });
         let braked = |x: DVec3, v: DVec3| x + v * DRIFT_S - DVec3::X * (0.25 * G * DRIFT_S * DRIFT_S);
-        let [said, truth] = said_and_true(&mut body, (dt, None), braked);
+        let [estimated, truth] = estimated_and_true(&mut body, (dt, None), braked);
         // measured: 0.99 … 1.04
-        assert!((0.9..1.1).contains(&(said / truth)), "{dt} s: said {said} m, true {truth} m");
+        assert!((0.9..1.1).contains(&(estimated / truth)), "{dt} s: said {estimated} m, true {truth} m");
     }
 }
 
 #[test]
-fn the_error_of_a_spring_is_told_to_a_fifth() {
+fn the_error_of_a_spring_is_estimated_to_a_fifth() {
     for (dt, stiffness) in [(1e-3, 5.0), (4e-3, 5.0), (2e-2, 5.0), (1e-3, 50.0), (4e-3, 50.0)] {
         let free = RigidSpec { gravity: DVec3::ZERO, ..ball(1.0, 0.0) };
         let mut body = RigidBody::new(RigidSpec { obstacles: [].into(), ..free }).unwrap();
@@ -54,9 +54,12 @@ fn the_error_of_a_spring_is_told_to_a_fifth() {
         let swung = |x: DVec3, v: DVec3| {
             target + (x - target) * libm::cos(omega * DRIFT_S) + v * (libm::sin(omega * DRIFT_S) / omega)
         };
-        let [said, truth] = said_and_true(&mut body, (dt, Some(pull)), swung);
+        let [estimated, truth] = estimated_and_true(&mut body, (dt, Some(pull)), swung);
         // measured: 0.94 … 1.02
-        assert!((0.8..1.2).contains(&(said / truth)), "{stiffness} N/m, {dt} s: said {said} m, true {truth} m");
+        assert!(
+            (0.8..1.2).contains(&(estimated / truth)),
+            "{stiffness} N/m, {dt} s: said {estimated} m, true {truth} m"
+        );
     }
 }
 

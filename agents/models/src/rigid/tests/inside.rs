@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn what_starts_inside_the_ground_comes_out_of_it_without_a_jump() {
+fn a_body_that_starts_inside_the_ground_comes_out_without_a_jump() {
     let block = Obstacle { solid: Solid::Box { half_extents_m: DVec3::ONE }, position: -UP, ..floor(0.5) };
     for ground in [floor(0.5), block] {
         for height in [0.09, 0.05, 0.0, -0.05, -0.15] {

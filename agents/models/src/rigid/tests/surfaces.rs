@@ -94,7 +94,7 @@ fn a_brick_that_slides_askew_keeps_its_pace_and_nearly_its_line() {
 }
 
 #[test]
-fn what_falls_flat_bounces_straight_up() {
+fn a_plate_that_falls_flat_bounces_straight_up() {
     let cylinder = Solid::Cylinder { radius_m: 0.1, half_height_m: 0.1 };
     let turned = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let solids = [(cube(0.1, UP).solid, DQuat::IDENTITY), (cylinder, turned)];
@@ -149,7 +149,7 @@ fn cubes_pile_up_inside_a_trough() {
 }
 
 #[test]
-fn a_thrown_cube_settles_alike_at_any_step() {
+fn a_thrown_cube_settles_in_the_same_way_at_any_step() {
     for ground in [plate(), sheet()] {
         for dt in [0.002, 0.004, 0.016] {
             let spec = RigidSpec { spin: DVec3::new(5.0, 3.0, 1.0), restitution: 0.3, ..cube(0.05, UP * 0.5) };

@@ -192,7 +192,7 @@ impl Wall {
             let span_m = 0.5 * (left + right - skin.length(segment) - skin.taper(segment));
             clear_m = clear_m.min(span_m).min(left).min(right);
             let margin_m = slack_m + skin.span_speed(segment) * skin.h_s;
-            if span_m <= margin_m && self.field.feels_spans() {
+            if span_m <= margin_m && self.field.needs_span_tests() {
                 self.measure_span(skin, segment, SearchRange { slack_m, reach_m: margin_m }, visit);
             }
         }

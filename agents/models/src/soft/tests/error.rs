@@ -24,14 +24,14 @@ fn the_error_of_falling_is_that_of_the_closed_form() {
             run(&mut body, dt_s, (DRIFT_S / dt_s).round() as u32);
             // x = g t (t + h)/2: half a step's speed too far
             let truth = 0.5 * 9.81 * dt_s * DRIFT_S;
-            let said = snapshot(&body).drift_m;
-            assert!((said / truth - 1.0).abs() < 1e-6, "{dt_s} s: said {said} m, true {truth} m");
+            let estimated = snapshot(&body).drift_m;
+            assert!((estimated / truth - 1.0).abs() < 1e-6, "{dt_s} s: said {estimated} m, true {truth} m");
         }
     }
 }
 
 #[test]
-fn the_error_of_a_swing_is_told_within_a_factor_of_three_or_too_small_where_it_turns_round_at_once() {
+fn the_error_of_a_swing_is_estimated_within_a_factor_of_three_but_for_immediate_reversals() {
     // a solid turns round within the tenth of a second: what two steps say of that is too little
     let ends = vec![Side::Left, Side::Right];
     let cases = [
@@ -52,16 +52,16 @@ fn the_error_of_a_swing_is_told_within_a_factor_of_three_or_too_small_where_it_t
             coarse.steps = FIRST; // the steps that come next are made twice
             run(&mut coarse, dt_s, (DRIFT_S / dt_s).round() as u32);
             run(&mut fine, 5e-5, 2000);
-            let (said, truth) = (snapshot(&coarse).drift_m, apart(&coarse, &fine));
-            let ratio = said / truth;
-            println!("{} {dt_s} s: said {said:e}, true {truth:e}, {ratio:.2}", shape.model());
-            assert!(ratio > least && ratio < 3.0, "{} {dt_s} s: said {said} m, true {truth} m", shape.model());
+            let (estimated, truth) = (snapshot(&coarse).drift_m, apart(&coarse, &fine));
+            let ratio = estimated / truth;
+            println!("{} {dt_s} s: said {estimated:e}, true {truth:e}, {ratio:.2}", shape.model());
+            assert!(ratio > least && ratio < 3.0, "{} {dt_s} s: said {estimated} m, true {truth} m", shape.model());
         }
     }
 }
 
 #[test]
-fn of_many_steps_a_twenty_fourth_is_made_again() {
+fn one_step_in_twenty_four_is_repeated_for_its_error() {
     for shape in all() {
         let mut body = shaken(shape);
         let (mut work, mut plain) = (0.0, 0.0);
@@ -75,7 +75,7 @@ fn of_many_steps_a_twenty_fourth_is_made_again() {
 }
 
 #[test]
-fn the_error_in_space_of_a_hanging_rope_is_told_within_a_factor_of_three() {
+fn the_spatial_error_of_a_hanging_rope_is_estimated_within_a_factor_of_three() {
     for (span, segments) in [(0.5, 10), (0.5, 20), (0.5, 40), (0.8, 10), (0.8, 20), (0.8, 40)] {
         let low = DVec3::new(0.5 * span, 0.0, -0.5 * libm::sqrt(1.0 - span * span));
         let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, low, DVec3::X * span], radius_m: 0.005, segments };
@@ -83,10 +83,10 @@ fn the_error_in_space_of_a_hanging_rope_is_told_within_a_factor_of_three() {
         let held = vec![Side::Left, Side::Right];
         let mut body = SoftBody::new(SoftSpec { matter, gravity: G, held, ..spec(shape) }).unwrap();
         run(&mut body, 0.02, 1000);
-        let (said, truth) = (snapshot(&body).residual_m, off_the_catenary(&body.positions, span));
-        let ratio = said / truth;
-        println!("span {span}, {segments} pieces: said {said:e}, true {truth:e}, {ratio:.2}");
-        assert!(ratio > 1.0 / 3.0 && ratio < 3.0, "span {span}, {segments} pieces: said {said} m, true {truth} m");
+        let (estimated, truth) = (snapshot(&body).residual_m, off_the_catenary(&body.positions, span));
+        let ratio = estimated / truth;
+        println!("span {span}, {segments} pieces: said {estimated:e}, true {truth:e}, {ratio:.2}");
+        assert!(ratio > 1.0 / 3.0 && ratio < 3.0, "span {span}, {segments} pieces: said {estimated} m, true {truth} m");
     }
 }
 

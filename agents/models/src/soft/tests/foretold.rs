@@ -39,8 +39,8 @@ fn a_step_that_was_divided_foretells_a_whole_one() {
     assert!(report.substeps > 1, "it is not divided");
     // a body that stands still in the same shape makes an undivided step from there
     let mut still = SoftBody::new(spec(BALL)).unwrap();
-    (still.positions, still.lattice) = (shaken.positions.clone(), shaken.lattice.clone());
-    still.foresee(h).unwrap();
+    (still.positions, still.mesh) = (shaken.positions.clone(), shaken.mesh.clone());
+    still.predict(h).unwrap();
     let told = told(&shaken);
     assert!((told.span_s - h).abs() < 1e-8, "it foretells {} s", told.span_s); // whole nanoseconds
     for vertex in [0, 31, 62, 124] {

@@ -7,7 +7,7 @@ use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
 
 #[test]
-fn every_promise_of_an_agent_is_kept() {
+fn every_conformance_check_of_an_agent_passes() {
     for shape in all() {
         let make = || {
             let made = SoftBody::new(SoftSpec { gravity: G, ..spec(shape.clone()) }).unwrap();

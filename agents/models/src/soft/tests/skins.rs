@@ -18,7 +18,7 @@ const STRAIGHT: f64 = 0.98;
 fn skin(shape: SoftShape, (middle, turn): (DVec3, f64)) -> (Arc<CollisionShape>, Vec<DVec3>) {
     let body = SoftBody::new(spec(shape)).unwrap();
     let rest = state(&body).positions;
-    let (low, high) = metachron_geometry::bounds(&rest);
+    let metachron_geometry::Aabb { low, high } = metachron_geometry::Aabb::of(&rest);
     let turn = DQuat::from_rotation_z(turn);
     (body.form().unwrap(), rest.iter().map(|x| middle + turn * (*x - 0.5 * (low + high))).collect())
 }
@@ -30,8 +30,8 @@ fn slab(size_m: DVec3, segments: [u32; 3], place: (DVec3, f64)) -> (Arc<Collisio
 /// Every place of the two, and that the other side sees the same.
 fn met(a: &(Arc<CollisionShape>, Vec<DVec3>), b: &(Arc<CollisionShape>, Vec<DVec3>)) -> Vec<Touch> {
     let placed = [a, b].map(|(form, positions)| PlacedShape { form, view: ShapePose::Surface(positions) });
-    let (mut room, mut list) = (NarrowPhaseScratch::default(), vec![]);
-    touches(&placed[0], &placed[1], REACH_M, &mut room, &mut list);
+    let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
+    touches(&placed[0], &placed[1], REACH_M, &mut scratch, &mut list);
     list
 }
 
@@ -67,7 +67,7 @@ proptest! {
     }
 
     #[test]
-    fn what_stands_beside_is_pushed_aside_alone(y in -0.05_f64..0.05, z in -0.05_f64..0.05, gap_m in -3e-4_f64..3e-4) {
+    fn a_body_beside_another_is_pushed_sideways_only(y in -0.05_f64..0.05, z in -0.05_f64..0.05, gap_m in -3e-4_f64..3e-4) {
         let shape = |x: f64, y: f64, z: f64| slab(DVec3::splat(0.1), [3, 3, 3], (DVec3::new(x, y, z), 0.0));
         agree(&met(&shape(0.1 + gap_m, y, z), &shape(0.0, 0.0, 0.0)), DVec3::X, gap_m)?;
     }

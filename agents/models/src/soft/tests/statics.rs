@@ -50,10 +50,10 @@ fn a_strip_of_sheet_bends_like_a_plate() {
         // held along two rows: the sheet leaves the wall level
         let mut body = SoftBody::new(SoftSpec { matter, gravity: G, held: vec![Side::Left], ..spec(shape) }).unwrap();
         let first = length / f64::from(segments[0]);
-        for (held, rest) in body.lattice.held.iter_mut().zip(&body.lattice.rest) {
+        for (held, rest) in body.mesh.held.iter_mut().zip(&body.mesh.rest) {
             *held |= rest.x < 1.5 * first;
         }
-        body.system = body.lattice.system();
+        body.system = body.mesh.system();
         let tip = settled(&mut body, 0.02, 400).positions.last().unwrap().z;
         // two rows make a wall half-way between them
         let free = length - 0.5 * first;

@@ -1,0 +1,36 @@
+//! Axis-aligned boxes.
+//!
+//! In: points. Out: the box around them. Never here: speeds ([`metachron_core::Bounds`] has them).
+
+use glam::DVec3;
+
+/// An axis-aligned box, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aabb {
+    /// Its lowest coordinates.
+    pub low: DVec3,
+    /// Its highest coordinates.
+    pub high: DVec3,
+}
+
+impl Aabb {
+    /// The smallest box that contains all `points`.
+    #[must_use]
+    pub fn of(points: &[DVec3]) -> Self {
+        let (low, high) =
+            points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+        Self { low, high }
+    }
+
+    /// The cube about `centre` whose sides are `half_m` from it, metres.
+    #[must_use]
+    pub fn about(centre: DVec3, half_m: f64) -> Self {
+        Self { low: centre - half_m, high: centre + half_m }
+    }
+
+    /// The same with every side moved out by `by_m` metres.
+    #[must_use]
+    pub fn grown(self, by_m: f64) -> Self {
+        Self { low: self.low - by_m, high: self.high + by_m }
+    }
+}
