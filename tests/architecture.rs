@@ -243,6 +243,71 @@ fn names_are_compared_word_by_word() {
     assert_eq!(types("pub struct Hall {\n    pub(super) enum B;\nfn type_of() {}"), ["Hall", "B"]);
 }
 
+/// Where the parenthesis of the parameters is, if what begins at `at` are generics or it.
+fn after_generics(text: &str, at: usize) -> Option<usize> {
+    let mut depth = 0;
+    for (offset, c) in text[at..].char_indices() {
+        match c {
+            '<' => depth += 1,
+            '>' if !text[..at + offset].ends_with('-') => depth -= 1,
+            '(' if depth == 0 => return Some(at + offset),
+            _ if depth == 0 => return None,
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Parameters of every function of `text`, as written.
+fn parameters(text: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    for (at, _) in text.match_indices("fn ") {
+        let name = text[at + 3..].find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or_default();
+        let Some(open) = after_generics(text, at + 3 + name).filter(|_| name > 0) else { continue };
+        let (mut depth, mut start) = (0_u32, open + 1);
+        for (offset, c) in text[open..].char_indices() {
+            match c {
+                '(' | '[' | '{' | '<' => depth += 1,
+                ')' | ']' | '}' => depth -= 1,
+                // of `->` in a bound
+                '>' if !text[..open + offset].ends_with('-') => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 || (c == ',' && depth == 1) {
+                found.push(text[start..open + offset].trim());
+                start = open + offset + 1;
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// A parameter that takes a tuple apart is a missing type with named fields.
+fn is_tuple(parameter: &str) -> bool {
+    parameter.trim_start_matches('&').starts_with('(')
+}
+
+#[test]
+fn no_function_takes_a_tuple_apart() {
+    let doomed = doomed();
+    for (path, text) in sources().iter().filter(|(path, _)| !doomed.contains(path) && !is_test(path)) {
+        let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+        let tuples: Vec<_> = parameters(code).into_iter().filter(|parameter| is_tuple(parameter)).collect();
+        assert!(tuples.is_empty(), "{path}: a struct with named fields instead of {tuples:?}");
+    }
+}
+
+#[test]
+fn parameters_that_are_tuples_are_found() {
+    let code = "fn a<F: Fn(u8) -> u8>(x: Vec<(u8, u8)>, (y, z): (u8, [u8; 2])) {}\nfn b(f: impl Fn((u8, u8)) -> u8, w: u8) {}";
+    let found = parameters(code);
+    assert_eq!(found.iter().filter(|parameter| is_tuple(parameter)).count(), 1, "{found:?}");
+    assert!(found.contains(&"(y, z): (u8, [u8; 2])") && found.contains(&"w: u8"), "{found:?}");
+}
+
 #[test]
 fn every_doomed_file_is_still_there() {
     let gone: Vec<_> = doomed().into_iter().filter(|path| !root().join(path).is_file()).collect();
