@@ -40,8 +40,8 @@ pub(super) struct Observer {
     neighbours: Vec<Neighbour>,
     /// One for each neighbour, in their order.
     sources: Vec<Source>,
-    /// The first `links` neighbours are the linked ones.
-    links: usize,
+    /// The first `links` neighbours are the linked ones; 32 bits, beside the number of the agent.
+    links: u32,
     /// Only where there is a broad phase.
     neighbour_list: Option<Box<NeighbourList>>,
     /// Agents to be seen in addition to the linked ones.
@@ -112,7 +112,7 @@ impl Peers {
         let mut observer =
             Observer { me, neighbours: Vec::new(), sources: Vec::new(), links: 0, neighbour_list, wanted: Vec::new() };
         links.iter().for_each(|id| observer.list(self, *id));
-        observer.links = observer.neighbours.len();
+        observer.links = observer.neighbours.len() as u32;
         observer
     }
 }
@@ -168,14 +168,14 @@ impl Observer {
     /// body to which this agent also gives.
     fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, members: &Fellows) {
         let Self { me, neighbours, links, neighbour_list, wanted, sources } = self;
-        let me = *me;
-        let (linked, near_once) = neighbours.split_at_mut(*links);
+        let (me, links) = (*me, *links as usize);
+        let (linked, near_once) = neighbours.split_at_mut(links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
         let near = neighbour_list.iter().flat_map(|neighbour_list| neighbour_list.near().iter().copied());
         wanted.extend(near.filter(|id| !is_linked(*id) && !members.has(*id)));
         let near = wanted.len();
-        for (neighbour, source) in near_once.iter_mut().zip(&sources[*links..]) {
+        for (neighbour, source) in near_once.iter_mut().zip(&sources[links..]) {
             if wanted[..near].binary_search(&neighbour.id).is_ok() {
                 continue;
             }
@@ -200,11 +200,12 @@ impl Observer {
     }
 
     fn list_wanted(&mut self, peers: &Peers) {
-        if self.neighbours[self.links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
+        let links = self.links as usize;
+        if self.neighbours[links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
             return;
         }
-        self.neighbours.truncate(self.links);
-        self.sources.truncate(self.links);
+        self.neighbours.truncate(links);
+        self.sources.truncate(links);
         for at in 0..self.wanted.len() {
             self.list(peers, self.wanted[at]);
         }
