@@ -302,7 +302,8 @@ fn no_function_takes_a_tuple_apart() {
 
 #[test]
 fn parameters_that_are_tuples_are_found() {
-    let code = "fn a<F: Fn(u8) -> u8>(x: Vec<(u8, u8)>, (y, z): (u8, [u8; 2])) {}\nfn b(f: impl Fn((u8, u8)) -> u8, w: u8) {}";
+    let code =
+        "fn a<F: Fn(u8) -> u8>(x: Vec<(u8, u8)>, (y, z): (u8, [u8; 2])) {}\nfn b(f: impl Fn((u8, u8)) -> u8, w: u8) {}";
     let found = parameters(code);
     assert_eq!(found.iter().filter(|parameter| is_tuple(parameter)).count(), 1, "{found:?}");
     assert!(found.contains(&"(y, z): (u8, [u8; 2])") && found.contains(&"w: u8"), "{found:?}");
