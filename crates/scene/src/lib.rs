@@ -131,7 +131,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         machine: build::machine(c, file.machine.as_ref()),
         agents: objects.agents,
         obstacles: objects.obstacles,
-        obstacle_looks: objects.obstacle_looks,
+        obstacle_appearances: objects.obstacle_appearances,
         scenery: objects.scenery,
         groups,
         contacts: file.world.as_ref().and_then(|w| w.contacts).unwrap_or(true),

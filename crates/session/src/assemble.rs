@@ -107,14 +107,14 @@ pub fn scene_view(scene: &Scene) -> SceneView {
     let agents = scene.agents.iter().map(|member| Actor {
         id: member.id,
         form: form(&member.spec),
-        appearance: appearance(&member.look),
+        appearance: appearance(&member.appearance),
     });
     let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
         let form = Form::Scenery(it.model.clone(), it.at);
-        Actor { id: AgentId(id), form, appearance: appearance(&it.look) }
+        Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
     });
     let actors = agents.chain(still);
-    let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
+    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances);
     let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
@@ -130,7 +130,7 @@ fn scenery(scene: &Scene) -> impl Iterator<Item = &Scenery> {
     scene.scenery.iter().chain(scene.groups.iter().map(|group| &group.proxy))
 }
 
-const fn appearance(wish: &metachron_world::Look) -> Appearance {
+const fn appearance(wish: &metachron_world::Appearance) -> Appearance {
     let material = match wish.material {
         kinds::Material::Tissue => Material::Tissue,
         kinds::Material::Metal => Material::Metal,
@@ -236,8 +236,8 @@ fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
 
 fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-    let view = view_of(seen, kind, range, &it.look);
-    match (it.look.shading, &it.texture) {
+    let view = view_of(seen, kind, range, &it.appearance);
+    match (it.appearance.shading, &it.texture) {
         (ShadingKind::Any, Some(_)) => ObjectView { shading: (view.shading.0, control::Shading::Textured), ..view },
         _ => view,
     }
@@ -260,19 +260,24 @@ fn view(seen: &Visibility, member: &Member) -> ObjectView {
         Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
         None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
     };
-    view_of(seen, kind, member.picture, &member.look)
+    view_of(seen, kind, member.picture, &member.appearance)
 }
 
-fn view_of(seen: &Visibility, kind: Kind, range: ResolutionRange, look: &metachron_world::Look) -> ObjectView {
+fn view_of(
+    seen: &Visibility,
+    kind: Kind,
+    range: ResolutionRange,
+    appearance: &metachron_world::Appearance,
+) -> ObjectView {
     ObjectView {
         id: seen.id,
         kind,
         range,
-        shading: shading(look.shading),
+        shading: shading(appearance.shading),
         pixels: seen.pixels,
         distance_m: seen.distance_m,
         speed_px_s: seen.speed_px_s,
-        importance: look.importance,
+        importance: appearance.importance,
         off_centre: seen.off_centre,
         from_focus_m: seen.from_focus_m,
         visible: seen.visible,

@@ -5,7 +5,7 @@
 
 use super::couplings::Faults;
 use super::kinds::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
-use super::scene::{Gains, Look, Machine, Member, PaceWish, Scene, Spec, Target};
+use super::scene::{Appearance, Gains, Machine, Member, PaceWish, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Obstacle, Solid};
@@ -332,7 +332,7 @@ impl SceneBuilder {
             camera: None,
             machine: Machine::default(),
             agents: agents?,
-            obstacle_looks: obstacles.iter().map(|_| DEFAULT_LOOK).collect(),
+            obstacle_appearances: obstacles.iter().map(|_| DEFAULT_APPEARANCE).collect(),
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
@@ -348,9 +348,13 @@ impl SceneBuilder {
     }
 }
 
-/// How parts look that do not say it.
-const DEFAULT_LOOK: Look =
-    Look { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::PerPixel };
+/// Appearance of parts that declare none.
+const DEFAULT_APPEARANCE: Appearance = Appearance {
+    colour: [200, 160, 150],
+    material: Material::Plastic,
+    importance: 1.0,
+    shading: ShadingKind::PerPixel,
+};
 
 fn member(
     id: AgentId,
@@ -387,7 +391,7 @@ fn member(
         start,
         picture,
         links: Vec::new(),
-        look: DEFAULT_LOOK,
+        appearance: DEFAULT_APPEARANCE,
         faults: Faults::default(),
     })
 }

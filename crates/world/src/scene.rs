@@ -46,7 +46,7 @@ pub struct Scene {
     /// The static solids.
     pub obstacles: Arc<[Obstacle]>,
     /// Looks of the obstacles, in their order.
-    pub obstacle_looks: Vec<Look>,
+    pub obstacle_appearances: Vec<Appearance>,
     /// Objects that are only drawn and never move; the members of a group are adjacent.
     pub scenery: Vec<Scenery>,
     /// Scenery that may be drawn as one mesh.
@@ -206,7 +206,7 @@ pub struct Member {
     /// Agents whose snapshots it sees: tools that may grasp it, or agents that it may grasp.
     pub links: Vec<AgentId>,
     /// How it looks.
-    pub look: Look,
+    pub appearance: Appearance,
     /// Faults injected into its clock and messages.
     pub faults: Faults,
 }
@@ -221,7 +221,7 @@ pub struct Scenery {
     /// Its pose and scale.
     pub at: Placement,
     /// How it looks.
-    pub look: Look,
+    pub appearance: Appearance,
     /// Its texture.
     pub texture: Option<Arc<Texture>>,
 }
@@ -282,7 +282,7 @@ impl Spec {
 
 /// How an object looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Look {
+pub struct Appearance {
     /// Red, green, blue (sRGB).
     pub colour: [u8; 3],
     /// Its material.

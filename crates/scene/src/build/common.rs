@@ -5,7 +5,7 @@ use crate::format::{CommonFile, FaultsFile, HoldKind, OneOrRange};
 use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::{Material, ShadingKind};
-use metachron_world::{Look, PaceWish};
+use metachron_world::{Appearance, PaceWish};
 
 /// Default rate, hertz, of an object for which the scene gives neither rate nor step.
 const RATE_DEFAULT_HZ: f64 = 240.0;
@@ -149,7 +149,7 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
 }
 
 /// Colour and material of an object without a texture; `default` is the material of the model.
-pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
+pub(super) fn appearance(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Appearance {
     if file.shading == Some(ShadingKind::Textured) {
         c.wrong(
             place,
@@ -158,11 +158,16 @@ pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, de
             "expected `texture` beside it, which only a mesh can have",
         );
     }
-    painted_look(c, place, file, default)
+    painted_appearance(c, place, file, default)
 }
 
 /// The same for an object that may have a texture.
-pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
+pub(super) fn painted_appearance(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &CommonFile,
+    default: Material,
+) -> Appearance {
     let material = file.material.unwrap_or(default);
     let colour = match &file.colour {
         None => colour_of(material),
@@ -172,7 +177,7 @@ pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &Common
         }),
     };
     let importance = c.optional(place, "importance", file.importance, &IMPORTANCE).unwrap_or(1.0);
-    Look { colour, material, importance, shading: file.shading.unwrap_or_default() }
+    Appearance { colour, material, importance, shading: file.shading.unwrap_or_default() }
 }
 
 fn colour_of(material: Material) -> [u8; 3] {

@@ -9,7 +9,7 @@ use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Model, Placement, ProgressiveMesh, proxy};
-use metachron_world::{GROUP_LEVELS_MAX, Look, Scenery};
+use metachron_world::{Appearance, GROUP_LEVELS_MAX, Scenery};
 use std::sync::Arc;
 
 /// By default the finest level has this share of its members' triangles, within these bounds.
@@ -52,9 +52,9 @@ pub(super) fn impostors(
         Some(levels) => cuts(c, place, levels, &mesh)?,
         None => default_levels(&mesh),
     };
-    let importance = members.iter().map(|m| m.look.importance).fold(0.0, f64::max);
-    let look = Look { colour: mean_colour(members), importance, ..first.look };
-    Some((Scenery { name: file.name.clone(), model: Model::Mesh(mesh), at, look, texture: None }, levels))
+    let importance = members.iter().map(|m| m.appearance.importance).fold(0.0, f64::max);
+    let appearance = Appearance { colour: mean_colour(members), importance, ..first.appearance };
+    Some((Scenery { name: file.name.clone(), model: Model::Mesh(mesh), at, appearance, texture: None }, levels))
 }
 
 /// Reports levels that are wrong whatever mesh they are cut from.
@@ -139,7 +139,8 @@ fn mean_colour(members: &[Scenery]) -> [u8; 3] {
     let weight = |m: &Scenery| f64::from(m.model.range().1);
     let all: f64 = members.iter().map(weight).sum();
     std::array::from_fn(|i| {
-        (members.iter().map(|m| weight(m) * f64::from(m.look.colour[i])).sum::<f64>() / all.max(1.0)).round() as u8
+        (members.iter().map(|m| weight(m) * f64::from(m.appearance.colour[i])).sum::<f64>() / all.max(1.0)).round()
+            as u8
     })
 }
 

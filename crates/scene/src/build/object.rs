@@ -1,6 +1,6 @@
 //! Reads the objects of a scene: each by its model, with names and links.
 
-use super::common::{faults, levels, look, pace, refuse_tolerance, tolerance};
+use super::common::{appearance, faults, levels, pace, refuse_tolerance, tolerance};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::{rigid, scenery, soft, synthetic, tool, tube};
@@ -22,7 +22,7 @@ use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
 use metachron_world::kinds::Material;
-use metachron_world::{Look, Member, Scenery, Spec};
+use metachron_world::{Appearance, Member, Scenery, Spec};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -42,7 +42,7 @@ const NAME_MAX: usize = 64;
 pub(crate) struct Objects {
     pub(crate) agents: Vec<Member>,
     pub(crate) obstacles: Arc<[Obstacle]>,
-    pub(crate) obstacle_looks: Vec<Look>,
+    pub(crate) obstacle_appearances: Vec<Appearance>,
     pub(crate) scenery: Vec<Scenery>,
     /// Names of fixed objects and of agents.
     pub(crate) names: Names,
@@ -205,11 +205,11 @@ pub(crate) fn read_objects(
         entry.copies = copies(c, &entry.place, &entry.common, can_move, most);
     }
     let names = assign_names(c, &entries);
-    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, context.source);
+    let (obstacles, obstacle_appearances) = fixed_objects(c, &entries, context.source);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
     let agents = agents(c, &entries, &names, &AgentContext { scene: context, obstacles: &obstacles });
     let scenery = scenery::read(c, &entries, context.source);
-    Objects { agents, obstacles, obstacle_looks, scenery, names }
+    Objects { agents, obstacles, obstacle_appearances, scenery, names }
 }
 
 fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>) -> Option<Entry> {
@@ -310,7 +310,7 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     names
 }
 
-fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> (Vec<Obstacle>, Vec<Look>) {
+fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> (Vec<Obstacle>, Vec<Appearance>) {
     let mut found = (Vec::new(), Vec::new());
     for entry in entries.iter().filter(|e| e.fixed) {
         let ModelFile::Rigid(file) = &entry.model else { continue };
@@ -318,11 +318,11 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
         pace(c, &entry.place, &entry.common);
         refuse_tolerance(c, &entry.place, &entry.common);
         levels(c, &entry.place, &entry.common);
-        let look = look(c, &entry.place, &entry.common, Material::Plastic);
+        let appearance = appearance(c, &entry.place, &entry.common, Material::Plastic);
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
             for (offset, name) in entry.copies.places(&entry.common.name) {
                 found.0.push(Obstacle { name, position: obstacle.position + offset, ..obstacle.clone() });
-                found.1.push(look);
+                found.1.push(appearance);
             }
         }
     }
@@ -419,7 +419,7 @@ fn member(
         ModelFile::Tool(_) => Material::Metal,
         _ => Material::Plastic,
     };
-    let look = look(c, place, common, material);
+    let appearance = appearance(c, place, common, material);
     let levels = model_context.levels;
     // a body without length has one interval: its ε has no effect
     let unit = Resolution { eps_m: 1.0, n: levels.1 };
@@ -444,7 +444,7 @@ fn member(
     let (name, links) = (common.name.clone(), Vec::new());
     let range = (!matches!(spec, Spec::Tool(_))).then_some(simulation);
     let tolerance_m = tolerance(c, place, common, pace, range);
-    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
+    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, appearance, faults })
 }
 
 /// Links each tool with the agents that it can grasp, in both directions.

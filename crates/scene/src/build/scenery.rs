@@ -2,7 +2,7 @@
 //!
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
-use super::common::{levels, look, pace, painted_look, parse_colour};
+use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
 use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
@@ -16,7 +16,7 @@ use metachron_geometry::{
     Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
 };
 use metachron_world::kinds::Material;
-use metachron_world::{Look, Scenery};
+use metachron_world::{Appearance, Scenery};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -207,13 +207,14 @@ fn check_unused_keys(c: &mut Checker<'_, '_>, entry: &Entry) {
 
 fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &mut Meshes<'_>) -> Parts {
     check_unused_keys(c, entry);
-    let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
+    let appearance = painted_appearance(c, &entry.place, &entry.common, Material::Plastic);
     if file.dome_m.is_some() && file.scale.is_some() {
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
     let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
     let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
-    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&mesh)), at, look, texture: None };
+    let part =
+        |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&mesh)), at, appearance, texture: None };
     match dome {
         None => vec![(String::new(), part(at))],
         Some(radius_m) => {
@@ -228,7 +229,7 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
     let place = &entry.place;
     check_unused_keys(c, entry);
-    let bark = look(c, place, &entry.common, Material::Skin);
+    let bark = appearance(c, place, &entry.common, Material::Skin);
     let pieces = allowed(1.0..=PIECES_MAX, "");
     let mut count = |key: &str, given: Option<u32>, usual: u32| {
         c.optional(place, key, given.map(f64::from), &pieces).unwrap_or(f64::from(usual)) as u32
@@ -248,11 +249,11 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
         c.wrong(place, "leaves_colour", "is not a colour", "expected `#rrggbb`, such as `#5a8a42`");
         LEAF
     });
-    let leaf = Look { colour, importance: bark.importance * share, ..bark };
-    let bark = Look { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
+    let leaf = Appearance { colour, importance: bark.importance * share, ..bark };
+    let bark = Appearance { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
     let at = placement(c, place, file.position_m, file.rotation_deg);
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
-    let part = |model, look| Scenery { name: String::new(), model, at, look, texture: None };
+    let part = |model, appearance| Scenery { name: String::new(), model, at, appearance, texture: None };
     vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]
 }
 

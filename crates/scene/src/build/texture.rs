@@ -12,7 +12,7 @@ use glam::Vec2;
 #[cfg(feature = "images")]
 use image::{ImageFormat, ImageReader, Limits};
 use metachron_geometry::{Model, Pattern, Texture, Wrap};
-use metachron_world::Look;
+use metachron_world::Appearance;
 use metachron_world::kinds::ShadingKind;
 use std::collections::BTreeMap;
 #[cfg(feature = "images")]
@@ -60,9 +60,9 @@ pub(super) fn apply(
     }
     if let Some(texture) = found {
         for (_, part) in &mut parts {
-            let colour = if entry.common.colour.is_some() { part.look.colour } else { [255; 3] };
+            let colour = if entry.common.colour.is_some() { part.appearance.colour } else { [255; 3] };
             let shading = entry.common.shading.unwrap_or(ShadingKind::Textured);
-            part.look = Look { colour, shading, ..part.look };
+            part.appearance = Appearance { colour, shading, ..part.appearance };
             part.texture = Some(Arc::clone(&texture));
         }
     }

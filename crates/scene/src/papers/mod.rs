@@ -160,7 +160,7 @@ mod tests {
     fn the_library_has_the_papers_polygons_and_leaves_its_shading_to_the_policy() {
         let scene = scene(Paper::Library, &Choices::default());
         assert_eq!(triangles(&scene).1, 19_800); // the paper: 19,821
-        assert!(scene.scenery.iter().all(|it| it.look.shading == metachron_world::kinds::ShadingKind::Any));
+        assert!(scene.scenery.iter().all(|it| it.appearance.shading == metachron_world::kinds::ShadingKind::Any));
     }
 
     #[test]
