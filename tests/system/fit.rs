@@ -142,7 +142,7 @@ position_m = [0, 0, -1]
     let notes = said["notes"].as_array().unwrap();
     let told = |start: &str| notes.iter().any(|note| note.as_str().unwrap().starts_with(start));
     assert!(told("torsion and bending of `cord`"), "{notes:?}");
-    assert!(told("nothing touches `ball`"), "{notes:?}");
+    assert!(told("`ball` touches nothing"), "{notes:?}");
     assert!(told("`block` does not move"), "{notes:?}");
     let word =
         |name: &str| said["objects"].as_array().unwrap().iter().find(|o| o["name"] == name).unwrap()["simpler"].clone();
@@ -244,7 +244,7 @@ fn an_error_that_cannot_be_held_is_refused_on_its_line() {
         (holding("", "hold = \"error\"\n"), "hold = \"error\"", "`tolerance_m` is missing"),
         (holding("1e-3", "hold = \"rate\"\n"), "tolerance_m = 1e-3", "contradicts"),
         (holding("-1", "hold = \"error\"\n"), "tolerance_m = -1", "expected a number from"),
-        (Folder::with(&TUBE.replace("sleep = false", "tolerance_m = 1e-3")), "tolerance_m = 1e-3", "cannot be met"),
+        (Folder::with(&TUBE.replace("sleep = false", "tolerance_m = 1e-3")), "tolerance_m = 1e-3", "cannot be held"),
     ] {
         let done = metachron(&["check", folder.scene()]);
         let said = unwrapped(&done);
