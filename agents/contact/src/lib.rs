@@ -23,6 +23,7 @@
 pub mod agent;
 pub mod audit;
 pub mod beside;
+pub mod cluster;
 pub mod contact;
 pub mod crowd;
 pub mod delassus;

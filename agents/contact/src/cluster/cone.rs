@@ -1,0 +1,135 @@
+//! Projections on Coulomb's disc, on the friction cone and on a ball, with their slopes.
+//!
+//! In: an impulse in the frame of a contact (x along the normal). Out: the nearest allowed one, and how it changes with the first.
+//! Never here: velocities, compliance. Theory: `docs/theory/clusters.md`, eq. 7.
+
+use glam::{DMat3, DVec3};
+
+/// What impulses a row may give.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Law {
+    /// Those of Coulomb's cone: no pull, and friction up to μ times the push.
+    Coulomb {
+        /// The coefficient μ.
+        friction: f64,
+    },
+    /// All.
+    Free,
+    /// All up to a length.
+    Bounded {
+        /// The length, N·s.
+        limit: f64,
+    },
+    /// None: nothing that the row touches moves.
+    Idle,
+}
+
+/// How Coulomb's law is read as a projection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// The friction's disc has the radius of the pressure sought (eq. 7): Coulomb's law itself.
+    Disc,
+    /// The nearest impulse of the cone: Coulomb's law after the shift of (SF98).
+    Cone,
+}
+
+/// A projection: its value, and its slope as three directions with a number each.
+///
+/// Of the disc the slope leaves out how the radius grows with the pressure, so that it is symmetric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Projection {
+    pub value: DVec3,
+    /// Orthonormal columns.
+    pub axes: DMat3,
+    /// The slope along each of them, 0 to 1.
+    pub slopes: DVec3,
+}
+
+impl Law {
+    /// The allowed impulse for `z`.
+    pub fn project(&self, form: Form, z: DVec3) -> Projection {
+        match (*self, form) {
+            (Self::Coulomb { friction }, Form::Disc) => disc(friction, z),
+            (Self::Coulomb { friction }, Form::Cone) => cone(friction, z),
+            (Self::Free, _) => Projection::whole(z),
+            (Self::Bounded { limit }, _) => ball(limit, z),
+            (Self::Idle, _) => Projection::NONE,
+        }
+    }
+}
+
+impl Projection {
+    const NONE: Self = Self { value: DVec3::ZERO, axes: DMat3::IDENTITY, slopes: DVec3::ZERO };
+
+    fn whole(z: DVec3) -> Self {
+        Self { value: z, axes: DMat3::IDENTITY, slopes: DVec3::ONE }
+    }
+
+    /// The slope's matrix with other numbers along the same directions.
+    pub fn along_axes(&self, numbers: DVec3) -> DMat3 {
+        let DMat3 { x_axis: x, y_axis: y, z_axis: z } = self.axes;
+        outer(x) * numbers.x + outer(y) * numbers.y + outer(z) * numbers.z
+    }
+}
+
+/// v vᵀ.
+fn outer(v: DVec3) -> DMat3 {
+    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+}
+
+/// Coulomb's law at the pressure of `z` itself.
+fn disc(friction: f64, z: DVec3) -> Projection {
+    if z.x <= 0.0 {
+        return Projection::NONE;
+    }
+    let (slip, radius) = (tangential(z), friction * z.x);
+    if slip <= radius {
+        return Projection::whole(z);
+    }
+    let along = DVec3::new(0.0, z.y / slip, z.z / slip);
+    Projection {
+        value: DVec3::new(z.x, radius * along.y, radius * along.z),
+        axes: DMat3::from_cols(DVec3::X, along, DVec3::X.cross(along)),
+        slopes: DVec3::new(1.0, 0.0, radius / slip),
+    }
+}
+
+/// The nearest impulse of the cone.
+fn cone(friction: f64, z: DVec3) -> Projection {
+    let slip = tangential(z);
+    if slip <= friction * z.x {
+        return Projection::whole(z);
+    }
+    if z.x <= -friction * slip {
+        return Projection::NONE;
+    }
+    let along = DVec3::new(0.0, z.y / slip, z.z / slip);
+    let edge = (DVec3::X + along * friction) / (1.0 + friction * friction).sqrt();
+    let value = edge * edge.dot(z);
+    let across = DVec3::X.cross(along);
+    Projection {
+        value,
+        axes: DMat3::from_cols(edge, across.cross(edge), across),
+        slopes: DVec3::new(1.0, 0.0, (tangential(value) / slip).min(1.0)),
+    }
+}
+
+/// The nearest impulse of a length up to `limit`.
+fn ball(limit: f64, z: DVec3) -> Projection {
+    let length = z.length();
+    if length <= limit {
+        return Projection::whole(z);
+    }
+    let (along, share) = (z / length, limit / length);
+    let side = along.any_orthonormal_vector();
+    Projection {
+        value: z * share,
+        axes: DMat3::from_cols(along, side, along.cross(side)),
+        slopes: DVec3::new(0.0, share, share),
+    }
+}
+
+/// The length of what is not along the normal.
+pub(super) fn tangential(z: DVec3) -> f64 {
+    z.y.hypot(z.z)
+}

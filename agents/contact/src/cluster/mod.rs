@@ -1,0 +1,61 @@
+//! Contact clusters: one frictional contact problem over all bodies that touch, solved to its end in every step.
+//!
+//! In: members (a matrix, free velocities), contacts and bilateral rows as plain data ([`Problem`]). Out: impulses, velocities and a
+//! report ([`Solution`]). Never here: search for contacts, clocks, models. Theory: `docs/theory/clusters.md`. No agent uses it yet.
+//!
+//! ```
+//! use glam::{DMat3, DVec3};
+//! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
+//!
+//! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
+//! let (h_s, mass_kg) = (0.01, 2.0);
+//! let inertia = DVec3::splat(mass_kg * 0.2 * 0.2 / 6.0);
+//! let blocks = [
+//!     Block { row: 0, column: 0, value: DMat3::from_diagonal(DVec3::splat(mass_kg)) },
+//!     Block { row: 1, column: 1, value: DMat3::from_diagonal(inertia) },
+//! ];
+//! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
+//! let members = [Member { blocks: &blocks, free: &free, share: 1.0 }];
+//! let corner = |key, x, y| Contact {
+//!     key,
+//!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
+//!     normal: DVec3::Z,
+//!     tangents: [DVec3::X, DVec3::Y],
+//!     gap_m: 0.0,
+//!     friction: 0.3,
+//!     owed_slip_m: DVec3::ZERO,
+//!     warm_n_s: DVec3::ZERO,
+//! };
+//! let contacts = [corner(0, -0.1, -0.1), corner(1, 0.1, -0.1), corner(2, -0.1, 0.1), corner(3, 0.1, 0.1)];
+//! let mut solver = Solver::default();
+//! let solution = solver.solve(&Problem { h_s, members: &members, contacts: &contacts, rows: &[] })?;
+//!
+//! let given: DVec3 = solution.contacts_n_s.iter().sum();
+//! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
+//! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
+//! assert!(!solution.report.cut);
+//! # Ok::<(), metachron_contact::cluster::ProblemError>(())
+//! ```
+
+mod cone;
+mod convex;
+mod error;
+mod factor;
+mod iterate;
+mod newton;
+mod order;
+mod passivity;
+mod problem;
+mod rows;
+mod side;
+mod solver;
+mod system;
+mod validate;
+
+pub use error::ProblemError;
+pub use problem::{BilateralRow, Block, Contact, Member, Problem, Spring};
+pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
+pub use solver::{Report, Settings, Solution, Solver, Way};
+
+#[cfg(test)]
+mod tests;

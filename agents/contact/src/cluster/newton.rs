@@ -1,0 +1,118 @@
+//! The primal-dual way: semismooth Newton on the projected laws of contact (AC91), each step one factor of the members' size.
+//!
+//! In: an iterate, started from impulses of the last step. Out: the same where all laws hold, or the word that they do not.
+//! Never here: what to do then (`convex.rs`). Theory: `docs/theory/clusters.md`, eq. 7–9.
+
+use super::cone::Form;
+use super::iterate::Iterate;
+use super::rows::Point;
+
+/// The most steps: where the pressure of what slides is not known it is found at a rate of about a half a step.
+const STEPS_MAX: usize = 60;
+/// Steps in a row that may fail to halve the error.
+const STALE_MAX: usize = 20;
+/// Looks along a step: whole, and halved up to five times.
+const LOOKS: usize = 6;
+/// The share of a step's length by which it must make the sum of squares fall.
+const DECREASE: f64 = 0.2;
+
+/// What the way needs to know besides the problem.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Aim {
+    /// Coulomb's law as a disc, or as a cone with a shift.
+    pub form: Form,
+    /// The miss at which all laws hold, m/s.
+    pub tolerance_m_s: f64,
+    /// What a contact gives way by, m/s (eq. 5).
+    pub yield_m_s: f64,
+}
+
+/// Iterates until all laws hold; `false` where it gave up, the iterate being of no use then.
+pub(super) fn solve(iterate: &mut Iterate, aim: &Aim) -> bool {
+    let (mut least, mut stale) = (f64::INFINITY, 0);
+    for step in 0..=STEPS_MAX {
+        let miss = linearise(iterate, aim.form);
+        if miss < aim.tolerance_m_s {
+            return true;
+        }
+        stale += 1;
+        if miss <= 0.5 * least {
+            (least, stale) = (miss, 0);
+        }
+        if step == STEPS_MAX || stale >= STALE_MAX || !miss.is_finite() || !iterate.take_step() {
+            return false;
+        }
+        let share = share_of_step(iterate, aim);
+        iterate.advance(share);
+        harden(iterate, aim.yield_m_s);
+    }
+    false
+}
+
+/// The largest miss of a law (eq. 9).
+pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
+    let misses = iterate.rows.rows.iter().enumerate().map(|(k, row)| {
+        let at = iterate.state.point(k);
+        row.miss(at.impulse, row.natural_map(form, at).value)
+    });
+    misses.fold(0.0, worse)
+}
+
+/// The larger miss; one that is not a number stays.
+fn worse(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
+/// Gains and pulls of all rows; returns the largest miss.
+fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
+    let mut largest = 0.0;
+    for k in 0..iterate.rows.len() {
+        let (row, at) = (iterate.rows.rows[k], iterate.state.point(k));
+        let image = row.natural_map(form, at);
+        largest = worse(largest, row.miss(at.impulse, image.value));
+        iterate.linearise(k, &image, row.scale);
+    }
+    largest
+}
+
+/// How far to go: the whole step, or as many halves as make the sum of squares fall, or the best look.
+fn share_of_step(iterate: &Iterate, aim: &Aim) -> f64 {
+    let before = sum_of_squares(iterate, aim, 0.0);
+    let (mut share, mut best_share, mut best) = (1.0, 1.0, f64::INFINITY);
+    for _ in 0..LOOKS {
+        let here = sum_of_squares(iterate, aim, share);
+        if here < best {
+            (best, best_share) = (here, share);
+        }
+        if here <= (1.0 - DECREASE * share) * before {
+            break;
+        }
+        share *= 0.5;
+    }
+    best_share
+}
+
+/// Σ w |λ − P|² at a share of the step, with the compliance that rows would have there.
+fn sum_of_squares(iterate: &Iterate, aim: &Aim, share: f64) -> f64 {
+    let Iterate { rows, state, step, .. } = iterate;
+    let terms = rows.rows.iter().enumerate().map(|(k, row)| {
+        let impulse = state.lambda[k] + step.lambda[k] * share;
+        let velocity = state.velocity[k] + step.velocity[k] * share;
+        let mut row = *row;
+        row.compliance = row.hardened(impulse, aim.yield_m_s);
+        let image = row.natural_map(aim.form, Point { impulse, velocity });
+        row.scale * (impulse - image.value).length_squared()
+    });
+    terms.sum()
+}
+
+/// Makes rows harder that give way too far; returns whether any was.
+pub(super) fn harden(iterate: &mut Iterate, yield_m_s: f64) -> bool {
+    let mut any = false;
+    for (row, impulse) in iterate.rows.rows.iter_mut().zip(&iterate.state.lambda) {
+        let harder = row.hardened(*impulse, yield_m_s);
+        any |= harder != row.compliance;
+        row.compliance = harder;
+    }
+    any
+}

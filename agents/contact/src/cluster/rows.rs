@@ -1,0 +1,190 @@
+//! The rows of a contact problem: Jacobian, free velocities, laws, scales and compliances of all contacts and bilateral rows.
+//!
+//! In: a problem. Out: products with J and Jᵀ, and what each row needs for its law, in its own frame (x along the normal).
+//! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
+
+use super::cone::{Form, Law, Projection, tangential};
+use super::problem::Problem;
+use super::side::Side;
+use glam::{DMat3, DVec3};
+
+/// The least and the most compliance of a contact, in shares of its scale (eq. 5).
+const COMPLIANCE_MIN: f64 = 1e-7;
+const COMPLIANCE_MAX: f64 = 1e-3;
+/// A compliance gives way by up to this many times the wanted velocity before it is made harder.
+const HARDEN_PAST: f64 = 2.0;
+/// The least scale, 1/kg: a row between parts that cannot move has none, and gets no impulse.
+const SCALE_MIN: f64 = 1e-12;
+
+/// The share of one block in the velocity of a row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Term {
+    /// The block, counted over all members.
+    pub block: usize,
+    /// From the block's velocity to the row's frame.
+    pub map: DMat3,
+}
+
+/// One contact or bilateral row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub law: Law,
+    /// Columns in world axes.
+    pub frame: DMat3,
+    /// What gap, slip owed or target add to the velocity.
+    pub bias: DVec3,
+    /// b of eq. 1: velocity without impulses, bias included.
+    pub free: DVec3,
+    /// w of eq. 6, 1/kg.
+    pub scale: f64,
+    /// R of eq. 5, 1/kg.
+    pub compliance: f64,
+    /// A compliance that is given and does not follow the load.
+    given: Option<f64>,
+    start: usize,
+    end: usize,
+}
+
+/// An impulse of a row, and its velocity with all impulses.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Point {
+    pub impulse: DVec3,
+    pub velocity: DVec3,
+}
+
+/// All rows, contacts first.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rows {
+    pub rows: Vec<Row>,
+    terms: Vec<Term>,
+}
+
+impl Row {
+    fn new(law: Law, frame: DMat3, bias: DVec3) -> Self {
+        let free = DVec3::ZERO;
+        Self { law, frame, bias, free, scale: 0.0, compliance: 0.0, given: None, start: 0, end: 0 }
+    }
+
+    /// The velocity that a law sees: what the row gives way by is part of it.
+    pub fn yielding_velocity(&self, at: Point) -> DVec3 {
+        at.velocity + at.impulse * self.compliance
+    }
+
+    /// P(z) of eq. 7 at an iterate; where it gives the impulse back, the law holds.
+    pub fn natural_map(&self, form: Form, at: Point) -> Projection {
+        let mut velocity = self.yielding_velocity(at);
+        if form == Form::Cone {
+            velocity.x += self.shift(at);
+        }
+        self.law.project(form, at.impulse - velocity / self.scale)
+    }
+
+    /// μ |ũ_t|, which makes the law one of complementarity of cones (SF98); zero without a cone.
+    pub fn shift(&self, at: Point) -> f64 {
+        match self.law {
+            Law::Coulomb { friction } => friction * tangential(self.yielding_velocity(at)),
+            _ => 0.0,
+        }
+    }
+
+    /// By how much the law is missed at an iterate with this image under P, m/s (eq. 9).
+    pub fn miss(&self, impulse: DVec3, image: DVec3) -> f64 {
+        self.scale * (impulse - image).abs().max_element()
+    }
+
+    /// The compliance that gives way by `yield_m_s` under an impulse (eq. 5).
+    pub fn compliance_under(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
+        let (least, most) = (COMPLIANCE_MIN * self.scale, COMPLIANCE_MAX * self.scale);
+        self.given.unwrap_or_else(|| (yield_m_s / impulse.length()).clamp(least, most))
+    }
+
+    /// The compliance, made harder where it gives way too far under an impulse.
+    pub fn hardened(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
+        let load = impulse.length();
+        if self.given.is_none() && self.compliance * load > HARDEN_PAST * yield_m_s {
+            self.compliance_under(impulse, yield_m_s)
+        } else {
+            self.compliance
+        }
+    }
+
+    /// A softer row: a share of the scale instead of a compliance that follows the load.
+    pub fn softened(&self, share: f64) -> f64 {
+        self.given.unwrap_or(share * self.scale)
+    }
+}
+
+impl Rows {
+    /// Takes up the rows of a problem whose member i has its first block at `offsets[i]`, and the velocities without impulses.
+    pub fn gather(&mut self, problem: &Problem<'_>, offsets: &[usize], free: &[DVec3]) {
+        self.rows.clear();
+        self.terms.clear();
+        for contact in problem.contacts {
+            let law = Law::Coulomb { friction: contact.friction };
+            let row = Row::new(law, contact.frame(), contact.bias_m_s(problem.h_s));
+            self.push(row, &contact.sides, offsets);
+        }
+        for given in problem.rows {
+            let law = given.limit_n_s.map_or(Law::Free, |limit| Law::Bounded { limit });
+            let row = Row::new(law, DMat3::IDENTITY, -given.target_m_s);
+            self.push(Row { given: given.compliance_per_kg, ..row }, &given.sides, offsets);
+        }
+        for k in 0..self.rows.len() {
+            self.rows[k].free = self.rows[k].bias + self.velocity(k, free);
+        }
+    }
+
+    /// Appends a row; of two terms with one block the sum.
+    fn push(&mut self, row: Row, sides: &[Side; 2], offsets: &[usize]) {
+        let start = self.terms.len();
+        let to_frame = row.frame.transpose();
+        for (side, sign) in sides.iter().zip([1.0, -1.0]) {
+            for term in side.terms() {
+                let (block, map) = (offsets[side.member] + term.block, to_frame * term.map * sign);
+                match self.terms[start..].iter_mut().find(|t| t.block == block) {
+                    Some(known) => known.map += map,
+                    None => self.terms.push(Term { block, map }),
+                }
+            }
+        }
+        self.rows.push(Row { start, end: self.terms.len(), ..row });
+    }
+
+    /// Sets the scale of a row; one that nothing answers is idle.
+    pub fn set_scale(&mut self, row: usize, scale: f64) {
+        let row = &mut self.rows[row];
+        // also where it is not a number
+        let moves = scale > SCALE_MIN;
+        row.scale = if moves { scale } else { 1.0 };
+        row.law = if moves { row.law } else { Law::Idle };
+    }
+
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The blocks that move a row.
+    pub fn terms(&self, row: usize) -> &[Term] {
+        &self.terms[self.rows[row].start..self.rows[row].end]
+    }
+
+    /// One row of J x.
+    pub fn velocity(&self, row: usize, x: &[DVec3]) -> DVec3 {
+        self.terms(row).iter().map(|term| term.map * x[term.block]).sum()
+    }
+
+    /// J x.
+    pub fn velocities(&self, x: &[DVec3], out: &mut [DVec3]) {
+        out.iter_mut().enumerate().for_each(|(row, out)| *out = self.velocity(row, x));
+    }
+
+    /// Jᵀ λ.
+    pub fn scatter(&self, impulses: &[DVec3], out: &mut [DVec3]) {
+        out.fill(DVec3::ZERO);
+        for (row, impulse) in impulses.iter().enumerate().filter(|(_, impulse)| **impulse != DVec3::ZERO) {
+            for term in self.terms(row) {
+                out[term.block] += term.map.mul_transpose_vec3(*impulse);
+            }
+        }
+    }
+}

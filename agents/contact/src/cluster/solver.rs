@@ -1,0 +1,254 @@
+//! The solve of one contact problem: set-up, the primal-dual way, the convex way behind it, the guard.
+//!
+//! In: a problem, with the impulses of the last step in it. Out: impulses, velocities and a report. Never here: search for contacts,
+//! keys, steps of members. Theory: `docs/theory/clusters.md`.
+
+use super::cone::Form;
+use super::convex::{self, Passes};
+use super::error::ProblemError;
+use super::iterate::{Iterate, State};
+use super::newton::{self, Aim};
+use super::passivity;
+use super::problem::Problem;
+use super::validate::validate;
+use glam::DVec3;
+
+/// What a depth gives back in a step: the velocity that a contact at rest yields by, in shares of depth over step (eq. 5).
+const YIELD_SHARE: f64 = 0.2;
+/// A member of no more blocks than a rigid body's.
+const RIGID_BLOCKS: usize = 2;
+
+/// What a solve aims at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The miss of a law at which a solve is done, m/s, > 0 (eq. 9). Larger lets piles drift; below 10⁻⁹ rounding is met.
+    pub tolerance_m_s: f64,
+    /// How deep contacts rest, metres, > 0: their compliance follows from it. Smaller takes more steps.
+    pub depth_m: f64,
+    /// The most passes of the convex way, ≥ 1. One leaves what slides floating by μ |u_t| h.
+    pub passes: usize,
+    /// Leaves the primal-dual way out, for comparison.
+    pub convex_only: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 5, convex_only: false }
+    }
+}
+
+/// How an answer was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Way {
+    /// The impulses of the last step still hold: no factor was needed.
+    #[default]
+    Kept,
+    /// By primal-dual Newton.
+    PrimalDual,
+    /// By convex passes.
+    Convex,
+}
+
+/// What a solve took, and how good its answer is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Report {
+    /// The way that the answer comes from.
+    pub way: Way,
+    /// Factors of the coupled matrix, those of ways that gave up included.
+    pub factors: usize,
+    /// Convex passes that were finished.
+    pub passes: usize,
+    /// The largest miss of a law by the answer given, m/s (eq. 9).
+    pub residual_m_s: f64,
+    /// The most work that the answer does but for push-out, J (eq. 12); above zero by rounding only.
+    pub work_j: f64,
+    /// What all impulses were multiplied by to be passive; 1 but for answers that are far off.
+    pub ray: f64,
+    /// Whether no way came to its end: the answer is that of a softer contact or of fewer passes.
+    pub cut: bool,
+}
+
+/// The answer of a solve; rows are counted as the problem gives them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Solution {
+    /// The impulse of each contact on side 0, world axes, N·s; side 1 gets its opposite.
+    pub contacts_n_s: Vec<DVec3>,
+    /// The impulse of each bilateral row, likewise.
+    pub rows_n_s: Vec<DVec3>,
+    /// The velocity of side 0 against side 1 of each contact, world axes, m/s.
+    pub contacts_m_s: Vec<DVec3>,
+    /// The velocity by which each contact gives way for an impulse, 1/kg: R of eq. 5.
+    pub compliances_per_kg: Vec<f64>,
+    /// What the solve took.
+    pub report: Report,
+    velocities: Vec<DVec3>,
+    offsets: Vec<usize>,
+}
+
+impl Solution {
+    /// The velocity of each block of a member: v̂ + f A⁻¹ Jᵀ λ (eq. 1), by which its places move. None where there is no such member.
+    #[must_use]
+    pub fn velocities(&self, member: usize) -> &[DVec3] {
+        let Some(&start) = self.offsets.get(member) else { return &[] };
+        let end = self.offsets.get(member + 1).copied().unwrap_or(self.velocities.len());
+        &self.velocities[start..end]
+    }
+}
+
+/// Solves problems one after the other, and keeps structure and storage between them.
+#[derive(Debug, Clone, Default)]
+pub struct Solver {
+    settings: Settings,
+    iterate: Iterate,
+    warm: Vec<DVec3>,
+    compliances: Vec<f64>,
+    solution: Solution,
+}
+
+impl Solver {
+    /// A solver with its settings.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        Self { settings, ..Self::default() }
+    }
+
+    /// Finds impulses by which all laws hold (eq. 4), or the best that is safe: the report tells which.
+    ///
+    /// # Errors
+    /// [`ProblemError`] where the problem is none; the solver may be used on.
+    pub fn solve(&mut self, problem: &Problem<'_>) -> Result<&Solution, ProblemError> {
+        validate(problem)?;
+        self.set_up(problem)?;
+        self.solution.report = if self.iterate.rows.len() > 0 { self.run(problem) } else { Report::resting() };
+        self.hand_out(problem);
+        Ok(&self.solution)
+    }
+
+    /// Velocities without impulses, matrices, rows, scales, and the last step's impulses with their compliances.
+    fn set_up(&mut self, problem: &Problem<'_>) -> Result<(), ProblemError> {
+        let Solution { offsets, velocities, .. } = &mut self.solution;
+        offsets.clear();
+        velocities.clear();
+        for member in problem.members {
+            offsets.push(velocities.len());
+            velocities.extend_from_slice(member.free);
+        }
+        let Iterate { rows, system, .. } = &mut self.iterate;
+        system.take_members(problem, offsets)?;
+        rows.gather(problem, offsets, velocities);
+        system.scale_rows(rows, offsets);
+        let yield_m_s = self.settings.yield_m_s(problem.h_s);
+        let given = problem.contacts.iter().map(|c| c.warm_n_s).chain(problem.rows.iter().map(|r| r.warm_n_s));
+        self.warm.clear();
+        self.compliances.clear();
+        for (row, warm) in rows.rows.iter().zip(given) {
+            let warm = row.law.project(Form::Disc, row.frame.transpose() * warm).value;
+            self.warm.push(warm);
+            self.compliances.push(row.compliance_under(warm, yield_m_s));
+        }
+        self.iterate.reset(self.solution.velocities.len());
+        Ok(())
+    }
+
+    /// Starts from the impulses of the last step.
+    fn start(&mut self) {
+        self.iterate.state.lambda.clone_from(&self.warm);
+        self.iterate.rows.rows.iter_mut().zip(&self.compliances).for_each(|(row, r)| row.compliance = *r);
+        self.iterate.respond();
+    }
+
+    /// The ways in their order, then the guard.
+    fn run(&mut self, problem: &Problem<'_>) -> Report {
+        let rigid = problem.members.iter().all(|member| member.free.len() <= RIGID_BLOCKS);
+        let aim = Aim {
+            form: if rigid { Form::Cone } else { Form::Disc },
+            tolerance_m_s: self.settings.tolerance_m_s,
+            yield_m_s: self.settings.yield_m_s(problem.h_s),
+        };
+        let mut report = Report::resting();
+        if !self.settings.convex_only && self.primal_dual(&aim) {
+            report.way = if self.iterate.factors > 0 { Way::PrimalDual } else { Way::Kept };
+        } else {
+            let passes = self.convex(&aim);
+            report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
+        }
+        report.factors = self.iterate.factors;
+        report.cut |= !self.settle();
+        let ray = passivity::guard(&mut self.iterate);
+        (report.work_j, report.ray) = (ray.work_j, ray.share);
+        report.residual_m_s = newton::largest_miss(&self.iterate, Form::Disc);
+        report
+    }
+
+    /// The primal-dual way, in the form that serves these members best, then in the other.
+    fn primal_dual(&mut self, aim: &Aim) -> bool {
+        let other = if aim.form == Form::Cone { Form::Disc } else { Form::Cone };
+        [aim.form, other].into_iter().any(|form| {
+            self.start();
+            newton::solve(&mut self.iterate, &Aim { form, ..*aim })
+        })
+    }
+
+    /// The convex way; passes that have not settled are a start from which the primal-dual way may find the rest.
+    fn convex(&mut self, aim: &Aim) -> Passes {
+        self.start();
+        let mut passes = convex::solve(&mut self.iterate, aim, self.settings.passes);
+        if !passes.settled && passes.finished > 0 && !self.settings.convex_only {
+            let kept = self.iterate.keep();
+            passes.settled = newton::solve(&mut self.iterate, &Aim { form: Form::Cone, ..*aim });
+            if !passes.settled {
+                self.iterate.restore(&kept);
+            }
+        }
+        passes
+    }
+
+    /// Impulses into their cones, and the velocities that these make; `false` where numbers have overflowed and there is no answer.
+    fn settle(&mut self) -> bool {
+        let Iterate { rows, state, .. } = &mut self.iterate;
+        for (row, impulse) in rows.rows.iter().zip(&mut state.lambda) {
+            *impulse = row.law.project(Form::Disc, *impulse).value;
+        }
+        self.iterate.respond();
+        let State { lambda, velocity, .. } = &mut self.iterate.state;
+        let finite = lambda.iter().chain(&*velocity).all(|v| v.is_finite());
+        if !finite {
+            lambda.fill(DVec3::ZERO);
+            self.iterate.respond();
+        }
+        finite
+    }
+
+    /// Fills the answer in world axes.
+    fn hand_out(&mut self, problem: &Problem<'_>) {
+        let Self { iterate, solution, .. } = self;
+        solution.contacts_n_s.clear();
+        solution.rows_n_s.clear();
+        solution.contacts_m_s.clear();
+        solution.compliances_per_kg.clear();
+        for (k, row) in iterate.rows.rows.iter().enumerate() {
+            let impulse = row.frame * iterate.state.lambda[k];
+            if k >= problem.contacts.len() {
+                solution.rows_n_s.push(impulse);
+                continue;
+            }
+            solution.contacts_n_s.push(impulse);
+            solution.contacts_m_s.push(row.frame * (iterate.state.velocity[k] - row.bias));
+            solution.compliances_per_kg.push(row.compliance);
+        }
+        solution.velocities.iter_mut().zip(&iterate.state.change).for_each(|(v, change)| *v += *change);
+    }
+}
+
+impl Settings {
+    /// v_s of eq. 5.
+    fn yield_m_s(&self, h_s: f64) -> f64 {
+        YIELD_SHARE * self.depth_m / h_s
+    }
+}
+
+impl Report {
+    fn resting() -> Self {
+        Self { ray: 1.0, ..Self::default() }
+    }
+}

@@ -1,0 +1,90 @@
+//! Projections against what defines them, and the guard of passivity.
+
+use super::{Body, Seeded, contact, diagonal};
+use crate::cluster::cone::{Form, Law};
+use crate::cluster::iterate::Iterate;
+use crate::cluster::passivity::guard;
+use crate::cluster::{Member, Problem, Side};
+use glam::{DMat3, DVec3};
+
+const COUNT: usize = 1000;
+
+fn friction_and_impulse(numbers: &mut Seeded) -> (Law, f64, DVec3) {
+    let friction = numbers.unit();
+    (Law::Coulomb { friction }, friction, numbers.vector())
+}
+
+#[test]
+fn the_projection_on_the_cone_is_the_nearest_point_of_it() {
+    let mut numbers = Seeded::new(1);
+    for _ in 0..COUNT {
+        let (law, friction, z) = friction_and_impulse(&mut numbers);
+        let p = law.project(Form::Cone, z).value;
+        let rest = p - z;
+        // Moreau: what is taken away lies in the dual cone and is orthogonal to what is left
+        assert!(p.y.hypot(p.z) <= friction * p.x + 1e-15);
+        assert!(rest.x - friction * rest.y.hypot(rest.z) >= -1e-15 && p.dot(rest).abs() < 1e-15, "{z}");
+    }
+}
+
+#[test]
+fn the_disc_keeps_the_pressure_and_the_direction_of_friction() {
+    let mut numbers = Seeded::new(2);
+    for _ in 0..COUNT {
+        let (law, friction, z) = friction_and_impulse(&mut numbers);
+        let p = law.project(Form::Disc, z).value;
+        let slip = z.y.hypot(z.z);
+        let share = if z.x > 0.0 { (friction * z.x / slip).min(1.0) } else { 0.0 };
+        assert!((p - DVec3::new(z.x.max(0.0), share * z.y, share * z.z)).length() < 1e-15, "{z}");
+    }
+}
+
+/// The slope by differences.
+fn differences(project: impl Fn(DVec3) -> DVec3, z: DVec3) -> DMat3 {
+    let step = 1e-6;
+    let column = |axis: DVec3| (project(z + axis * step) - project(z - axis * step)) / (2.0 * step);
+    DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
+}
+
+#[test]
+fn slopes_are_those_of_differences() {
+    let mut numbers = Seeded::new(3);
+    let mut compared = 0;
+    for _ in 0..COUNT {
+        let (law, ..) = friction_and_impulse(&mut numbers);
+        let z = numbers.vector();
+        let bounded = Law::Bounded { limit: 0.5 };
+        for (law, form) in [(law, Form::Cone), (law, Form::Disc), (bounded, Form::Disc)] {
+            let image = law.project(form, z);
+            let mut wanted = differences(|z| law.project(form, z).value, z);
+            if form == Form::Disc && law != bounded && image.slopes.x > 0.0 {
+                // the growth of the disc with the pressure is left out
+                wanted.x_axis = DVec3::X;
+            }
+            let off = image.along_axes(image.slopes) - wanted;
+            let largest = off.to_cols_array().iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+            // a kink between both points of a difference is met once in some ten thousand
+            compared += usize::from(largest < 1e-4); // curvature of 1/|z_t| times the step squared
+        }
+    }
+    assert!(compared >= 3 * COUNT - 5, "{compared} of {}", 3 * COUNT);
+}
+
+#[test]
+fn an_answer_that_makes_energy_is_shortened_to_one_that_does_not() {
+    let body = Body { blocks: vec![diagonal(0, DVec3::ONE)], free: vec![DVec3::new(0.0, 0.0, -1.0)] };
+    let members = [Member { blocks: &body.blocks, free: &body.free, share: 1.0 }];
+    let contacts = [contact([Side::node(0, 0), Side::FIXED], DVec3::Z)];
+    let problem = Problem { h_s: 0.01, members: &members, contacts: &contacts, rows: &[] };
+    let mut iterate = Iterate::default();
+    iterate.system.take_members(&problem, &[0]).unwrap();
+    iterate.rows.gather(&problem, &[0], &body.free);
+    iterate.system.scale_rows(&mut iterate.rows, &[0]);
+    iterate.reset(1);
+    // five times what stops it, so it leaves at four times its speed
+    iterate.state.lambda[0] = DVec3::X * 5.0;
+    iterate.respond();
+    let ray = guard(&mut iterate);
+    assert!((ray.share - 0.2).abs() < 1e-15 && (iterate.state.lambda[0].x - 1.0).abs() < 1e-15);
+    assert!((ray.work_j + 0.5).abs() < 1e-15);
+}
