@@ -44,7 +44,11 @@ fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
         (format!("{SOLID}shape = \"box\""), 1, "`size_m` of `s` is missing; a box needs it"),
         (format!("{SOLID}shape = \"ball\"\nradius_m = 0.1\nhold = [\"top\"]"), 7, "a ball does not have"),
         (format!("{ROPE}path_m = [[0, 0, 0]]"), 6, "`path_m` of `s` has 1 points; expected at least 2"),
-        (format!("{ROPE}path_m = [[0, 0, 0], [0, 0, 0]]"), 1, "cannot be built: the path of a rope needs at least two different points"),
+        (
+            format!("{ROPE}path_m = [[0, 0, 0], [0, 0, 0]]"),
+            1,
+            "cannot be built: the path of a rope needs at least two different points",
+        ),
     ] {
         let (at, said) = refusal(&object);
         assert!(said.contains(words), "{words:?} is not said: {said}");
