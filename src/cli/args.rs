@@ -65,7 +65,7 @@ pub enum Command {
     /// Run a scene: in a window where there is a display, otherwise headless
     #[command(after_help = RUN_EXAMPLES, allow_negative_numbers = true)]
     Run(Box<RunArgs>),
-    /// Validate scenes; every problem is shown at its place in the file
+    /// Validate scenes; all problems of the first stage that fails, each at its place in the file
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Find feedback gains for a scene, or explain given ones

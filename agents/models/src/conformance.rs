@@ -26,9 +26,9 @@ use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, DT_MAX_S, HASH_START, Resolution, SimSpan, SimTime, Snapshot, StepError};
 
 mod bits;
-mod form;
+mod physics;
 
-pub use form::fall_deviation;
+pub use physics::fall_deviation;
 
 #[cfg(test)]
 mod tests;
@@ -121,10 +121,10 @@ impl<'a> Suite<'a> {
 #[must_use]
 pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     let promises = [
-        (Promise::ExactTime, form::exact_time as fn(&Suite<'_>) -> Result<(), String>),
+        (Promise::ExactTime, physics::exact_time as fn(&Suite<'_>) -> Result<(), String>),
         (Promise::RefusedSpan, bits::refused_span),
-        (Promise::Retune, form::set_resolution),
-        (Promise::Residual, form::residual),
+        (Promise::Retune, physics::set_resolution),
+        (Promise::Residual, physics::residual),
         (Promise::SameBits, bits::same_bits),
         (Promise::Allocation, bits::allocation),
         (Promise::Finite, bits::finite),

@@ -13,7 +13,7 @@ pub struct CommonArgs {
     /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
     pub json: bool,
-    /// No progress, and no output for scenes without problems
+    /// No progress
     #[arg(short, long)]
     pub quiet: bool,
 }

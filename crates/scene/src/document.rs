@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Name of the table that carries overrides at the end of the text; no scene may use it.
-const OVERRIDES: &str = "--set";
+const OVERRIDES: &str = "command line";
 
 /// Appends the overrides given on the command line to the text, so that errors can show them.
 #[must_use]

@@ -1,6 +1,6 @@
-//! Converts a scene into agents for the runtime and into what the renderer draws.
+//! Converts a scene into what the renderer draws and what control chooses among; `metachron_world` makes its agents.
 //!
-//! In: a [`Scene`]. Out: spawns for the runtime, actors and static solids for the renderer, views for control, the declared machine.
+//! In: a [`Scene`]. Out: actors and static solids for the renderer, views for control, governors of agents.
 //! Never here: time passing.
 
 use super::cpu_budget::AgentBudget;

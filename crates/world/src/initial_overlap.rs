@@ -132,16 +132,16 @@ impl Scene {
 
     /// The shortest displacement that takes `shape` clear of everything it touches; for a tool, back along its shaft if that leads out.
     fn shortest_exit(&self, shape: &StartShape, shapes: &[StartShape]) -> Option<DVec3> {
-        let mut surroundings =
-            Surroundings { scene: self, shapes, apart: self.pairs_apart(), scratch: NarrowPhaseScratch::default() };
+        let mut search =
+            OverlapSearch { scene: self, shapes, apart: self.pairs_apart(), scratch: NarrowPhaseScratch::default() };
         let back = shape.shaft_direction();
         if let Some(way) = back
-            && let Some(far_m) = surroundings.clear(shape, way, f64::INFINITY)
+            && let Some(far_m) = search.clear(shape, way, f64::INFINITY)
         {
             return Some(way * far_m);
         }
         let mut ways = AXES.to_vec();
-        surroundings.deepest(shape, |touch| {
+        search.deepest(shape, |touch| {
             if ways.len() < DIRECTIONS_MAX && ways.iter().all(|way| way.dot(touch.normal) < SAME_DIRECTION) {
                 ways.push(touch.normal);
             }
@@ -149,21 +149,21 @@ impl Scene {
         let mut best: Option<DVec3> = None;
         for way in ways {
             let most_m = best.map_or(f64::INFINITY, |best| best.length() - TIE_M);
-            best = surroundings.clear(shape, way, most_m).map(|far_m| way * far_m).or(best);
+            best = search.clear(shape, way, most_m).map(|far_m| way * far_m).or(best);
         }
         best
     }
 }
 
 /// The objects that an agent may be inside of.
-struct Surroundings<'a> {
+struct OverlapSearch<'a> {
     scene: &'a Scene,
     shapes: &'a [StartShape],
     apart: BTreeSet<(AgentId, AgentId)>,
     scratch: NarrowPhaseScratch,
 }
 
-impl Surroundings<'_> {
+impl OverlapSearch<'_> {
     /// How far `shape` has to move along `way` to be clear, metres; `None` if that is `most_m` or more.
     ///
     /// It cannot be clear before it has moved as far as it is deep, so it moves by its depth and is tested again.
