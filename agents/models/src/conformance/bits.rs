@@ -1,6 +1,6 @@
 //! Promises about bits: refused steps, repeated runs, memory, what is not finite.
 //!
-//! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::form`]).
+//! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
 use super::{Run, Suite, too_long};
 use metachron_core::{SimSpan, StepError};
