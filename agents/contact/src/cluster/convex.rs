@@ -4,7 +4,7 @@
 //! Never here: the primal-dual way. Theory: `docs/theory/clusters.md`, eq. 10 and 11.
 
 use super::cone::Form;
-use super::iterate::{Iterate, Quadratic};
+use super::iterate::{Iterate, Kept, Quadratic};
 use super::newton::{Aim, harden, largest_miss};
 use glam::DVec3;
 
@@ -24,6 +24,9 @@ const LOOKS: usize = 20;
 /// The share of the first slope that may be left where a line search ends, and of the descent it foretells that must be met.
 const SLOPE_LEFT: f64 = 0.5;
 const DESCENT: f64 = 1e-4;
+/// The share of a gradient that an inexact step may leave. Impulses are velocities over R here, so most of a gradient is an error
+/// that the next step would have again.
+const LEAVE: f64 = 1e-3;
 /// Rounding of the sum of energies, in shares of it.
 const ROUNDING: f64 = 1e-14;
 
@@ -36,6 +39,15 @@ pub(super) struct Passes {
     pub settled: bool,
 }
 
+/// Storage of the way.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stores {
+    shifts: Vec<f64>,
+    pass: Kept,
+    rest: Kept,
+    soft: Kept,
+}
+
 /// One convex problem: its limits.
 #[derive(Debug, Clone, Copy)]
 struct Pass {
@@ -44,24 +56,25 @@ struct Pass {
 }
 
 /// Solves by up to `passes_max` passes. The iterate holds the impulses of the last finished one, or of a softer problem.
-pub(super) fn solve(iterate: &mut Iterate, aim: &Aim, passes_max: usize) -> Passes {
-    let mut shifts = vec![0.0; iterate.rows.len()];
+pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim, passes_max: usize) -> Passes {
+    stores.shifts.clear();
+    stores.shifts.resize(iterate.rows.len(), 0.0);
     let tolerance_m_s = PASS_TOLERANCE * aim.tolerance_m_s;
     let first = Pass { steps: WARM_STEPS, tolerance_m_s };
-    if !descend(iterate, &shifts, first) && !restart(iterate, &shifts, tolerance_m_s) {
+    if !descend(iterate, &stores.shifts, first) && !restart(iterate, stores, tolerance_m_s) {
         return Passes { finished: 0, settled: false };
     }
     for finished in 1..passes_max {
-        let kept = iterate.keep();
+        iterate.keep(&mut stores.pass);
         let hardened = harden(iterate, aim.yield_m_s);
         if !hardened && largest_miss(iterate, Form::Disc) < aim.tolerance_m_s {
             return Passes { finished, settled: true };
         }
         for (k, row) in iterate.rows.rows.iter().enumerate() {
-            shifts[k] = row.shift(iterate.state.point(k));
+            stores.shifts[k] = row.shift(iterate.state.point(k));
         }
-        if !descend(iterate, &shifts, Pass { steps: FULL_STEPS, tolerance_m_s }) {
-            iterate.restore(&kept);
+        if !descend(iterate, &stores.shifts, Pass { steps: FULL_STEPS, tolerance_m_s }) {
+            iterate.restore(&stores.pass);
             return Passes { finished, settled: false };
         }
     }
@@ -70,24 +83,25 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim, passes_max: usize) -> Pass
 
 /// The first pass again from rest: soft first, then at the wanted compliance. Where that is not reached the soft answer stands,
 /// and where not even that is found there are no impulses.
-fn restart(iterate: &mut Iterate, shifts: &[f64], tolerance_m_s: f64) -> bool {
+fn restart(iterate: &mut Iterate, stores: &mut Stores, tolerance_m_s: f64) -> bool {
+    let Stores { shifts, rest, soft: answer, .. } = stores;
     iterate.state.lambda.fill(DVec3::ZERO);
-    let rest = iterate.keep();
+    iterate.keep(rest);
     let soft = [(SOFT_SHARE, SOFT_STEPS), (SOFTEST_SHARE, FULL_STEPS)].iter().any(|&(share, steps)| {
-        iterate.restore(&rest);
+        iterate.restore(rest);
         iterate.rows.rows.iter_mut().for_each(|row| row.compliance = row.softened(share));
         descend(iterate, shifts, Pass { steps, tolerance_m_s })
     });
     if !soft {
-        iterate.restore(&rest);
+        iterate.restore(rest);
         return false;
     }
-    let answer = iterate.keep();
+    iterate.keep(answer);
     // the soft impulses' velocities are where the harder problem starts
-    iterate.restore_compliances(&rest);
+    iterate.restore_compliances(rest);
     let found = descend(iterate, shifts, Pass { steps: FULL_STEPS, tolerance_m_s });
     if !found {
-        iterate.restore(&answer);
+        iterate.restore(answer);
     }
     found
 }
@@ -96,19 +110,15 @@ fn restart(iterate: &mut Iterate, shifts: &[f64], tolerance_m_s: f64) -> bool {
 fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass) -> bool {
     for step in 0..=pass.steps {
         evaluate(iterate, shifts);
-        // `step` serves as storage for where the impulses of this look would lead
-        iterate.rows.scatter(&iterate.pull, &mut iterate.step.change);
-        iterate.system.respond(&mut iterate.step.change);
-        iterate.rows.velocities(&iterate.step.change, &mut iterate.step.velocity);
-        let rows = iterate.rows.rows.iter().zip(&iterate.state.velocity).zip(&iterate.step.velocity);
-        let off = rows.fold(DVec3::ZERO, |worst, ((row, u), led)| worst.max((row.free + *led - *u).abs()));
-        if off.max_element() < pass.tolerance_m_s {
-            iterate.state.lambda.clone_from(&iterate.pull);
-            iterate.state.change.clone_from(&iterate.step.change);
-            iterate.update_velocities();
+        let mut led = iterate.look_ahead(false);
+        if led.off.max_element() < pass.tolerance_m_s {
+            led = iterate.look_ahead(true);
+        }
+        if led.answered && led.off.max_element() < pass.tolerance_m_s {
+            iterate.take_pulls();
             return true;
         }
-        if step == pass.steps || !off.is_finite() || !iterate.take_step() {
+        if step == pass.steps || !led.off.is_finite() || !iterate.take_step(LEAVE * led.gradient) {
             return false;
         }
         let share = line_search(iterate, shifts);

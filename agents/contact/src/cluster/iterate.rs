@@ -1,12 +1,20 @@
 //! The iterate that both ways to a solution share, and the linear step that both take.
 //!
-//! In: rows and matrices of a problem. Out: impulses, velocities, and steps of them. Never here: when to stop, how far to step.
-//! Theory: `docs/theory/clusters.md`, eq. 8.
+//! In: rows and matrices of a problem. Out: impulses, velocities, steps of them, and what momentum lacks where equations were not
+//! solved to their end.
+//! Never here: when to stop, how far to step.
+//! Theory: `docs/theory/clusters.md`, eq. 8 and 15–17.
 
-use super::cone::Projection;
+use super::cone::{Form, Projection};
+use super::gradients::{Stiffness, Task};
 use super::rows::{Point, Rows};
 use super::system::System;
 use glam::{DMat3, DVec3};
+
+/// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
+const LOOK_SHARE: f64 = 0.01;
+/// The share of impulses from which on unanswered ones are not rounding that keeps a solve from its goal.
+const UNANSWERED: f64 = 1e-6;
 
 /// Impulses λ of all rows, the change of velocity of all blocks, and the velocity u of all rows.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +22,8 @@ pub(super) struct State {
     pub lambda: Vec<DVec3>,
     pub change: Vec<DVec3>,
     pub velocity: Vec<DVec3>,
+    /// Jᵀ λ − ⊕A/f Δv: the momentum that no velocity answers yet. Zero by a factor.
+    pub left: Vec<DVec3>,
 }
 
 /// A problem on its way to a solution.
@@ -28,18 +38,27 @@ pub(super) struct Iterate {
     pub gains: Vec<DMat3>,
     /// λ + c of each row: the impulse it would have if no velocity changed.
     pub pull: Vec<DVec3>,
-    /// Factors so far.
-    pub factors: usize,
-    /// Whether the structure of the matrix is that of these rows.
-    coupled: bool,
+    /// Newton steps so far.
+    pub steps: usize,
     scratch: Vec<DVec3>,
 }
 
 /// Impulses and compliances to which an iterate can go back.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Kept {
     lambda: Vec<DVec3>,
     compliances: Vec<f64>,
+}
+
+/// Where the impulses that a velocity asks for would lead.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Led {
+    /// The largest difference of a row's velocity along each of its axes, m/s.
+    pub off: DVec3,
+    /// The size of the gradient of eq. 10 (eq. 15), √J.
+    pub gradient: f64,
+    /// Whether the equations for it have been solved.
+    pub answered: bool,
 }
 
 /// The quadratic part of eq. 10 along the step d.
@@ -53,7 +72,13 @@ pub(super) struct Quadratic {
 
 impl State {
     fn resize(&mut self, rows: usize, blocks: usize) {
-        for (list, size) in [(&mut self.lambda, rows), (&mut self.velocity, rows), (&mut self.change, blocks)] {
+        let lists = [
+            (&mut self.lambda, rows),
+            (&mut self.velocity, rows),
+            (&mut self.change, blocks),
+            (&mut self.left, blocks),
+        ];
+        for (list, size) in lists {
             list.clear();
             list.resize(size, DVec3::ZERO);
         }
@@ -77,21 +102,51 @@ impl Iterate {
         self.pull.resize(rows, DVec3::ZERO);
         self.scratch.clear();
         self.scratch.resize(blocks, DVec3::ZERO);
-        self.factors = 0;
-        self.coupled = false;
+        self.steps = 0;
     }
 
-    /// Velocities as the impulses make them: exact momentum.
+    /// Velocities as the impulses make them: momentum to rounding by a factor, else to the share of it that is wanted (eq. 17).
     pub fn respond(&mut self) {
-        self.rows.scatter(&self.state.lambda, &mut self.state.change);
-        self.system.respond(&mut self.state.change);
+        let Self { rows, system, state, scratch, .. } = self;
+        rows.scatter(&state.lambda, scratch);
+        let goal = system.response_share * system.members.size_squared(scratch).sqrt();
+        system.respond(&mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal });
         self.update_velocities();
     }
 
-    /// What [`Self::restore`] goes back to.
-    pub fn keep(&self) -> Kept {
-        let compliances = self.rows.rows.iter().map(|row| row.compliance).collect();
-        Kept { lambda: self.state.lambda.clone(), compliances }
+    /// Makes impulses those that laws allow, and velocities theirs. Returns whether anything was off.
+    pub fn refine(&mut self) -> bool {
+        let off = self.allow() || self.state.left.iter().any(|left| *left != DVec3::ZERO);
+        if off {
+            self.respond();
+        }
+        off
+    }
+
+    /// Makes impulses those that laws allow; returns whether any was not.
+    pub fn allow(&mut self) -> bool {
+        let mut any = false;
+        for (row, impulse) in self.rows.rows.iter().zip(&mut self.state.lambda) {
+            let allowed = row.law.project(Form::Disc, *impulse).value;
+            any |= allowed != *impulse;
+            *impulse = allowed;
+        }
+        any
+    }
+
+    /// Whether velocities answer the impulses: not where a matrix is none of a body.
+    pub fn answered(&mut self) -> bool {
+        let Self { rows, system, state, scratch, .. } = self;
+        rows.scatter(&state.lambda, scratch);
+        let given = system.members.size_squared(scratch).sqrt();
+        system.members.size_squared(&state.left).sqrt() <= given * system.response_share.max(UNANSWERED)
+    }
+
+    /// Stores what [`Self::restore`] goes back to.
+    pub fn keep(&self, kept: &mut Kept) {
+        kept.lambda.clone_from(&self.state.lambda);
+        kept.compliances.clear();
+        kept.compliances.extend(self.rows.rows.iter().map(|row| row.compliance));
     }
 
     /// Goes back to impulses and compliances as they were.
@@ -124,34 +179,78 @@ impl Iterate {
         self.pull[row] = lambda + image.axes * (missing * factor);
     }
 
-    /// The step of eq. 8 from gains and pulls; `false` where there is none.
-    pub fn take_step(&mut self) -> bool {
+    /// Jᵀ (λ + c) − ⊕A/f Δv into `scratch`.
+    fn pull_on_members(&mut self) {
         let Self { rows, system, state, step, scratch, .. } = self;
-        if !self.coupled {
-            system.couple(rows);
-            self.coupled = true;
+        rows.scatter(&self.pull, scratch);
+        // `left` serves as storage
+        system.members.multiply(&state.change, &mut step.left);
+        scratch.iter_mut().zip(&step.left).for_each(|(right, av)| *right -= *av);
+    }
+
+    /// Where the pulls as impulses would lead from here: `step` has the change of velocities. The first look is a rough one.
+    pub fn look_ahead(&mut self, exactly: bool) -> Led {
+        self.rows.scatter(&self.pull, &mut self.scratch);
+        let pulled = self.system.members.size_squared(&self.scratch).sqrt();
+        self.pull_on_members();
+        let Self { rows, system, step, scratch, .. } = self;
+        let gradient = system.members.size_squared(scratch).sqrt();
+        let exact = system.response_share * pulled.max(gradient);
+        let goal = if exactly { exact } else { exact.max(LOOK_SHARE * gradient) };
+        if !exactly {
+            step.change.fill(DVec3::ZERO);
         }
-        self.factors += 1;
-        if !system.factor(rows, &self.gains) {
-            return false;
-        }
-        rows.scatter(&self.pull, &mut step.change);
-        system.multiply(&state.change, scratch);
-        step.change.iter_mut().zip(&*scratch).for_each(|(right, av)| *right -= *av);
-        system.solve(&mut step.change);
+        system.respond(&mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
+        rows.velocities(&step.change, &mut step.velocity);
+        let answered = system.members.size_squared(&step.left).sqrt() <= goal.max(UNANSWERED * pulled);
+        Led { off: step.velocity.iter().fold(DVec3::ZERO, |worst, u| worst.max(u.abs())), gradient, answered }
+    }
+
+    /// Takes the pulls as impulses, with the velocities that [`Self::look_ahead`] found.
+    pub fn take_pulls(&mut self) {
+        let Self { state, step, .. } = self;
+        state.lambda.clone_from(&self.pull);
+        state.left.clone_from(&step.left);
+        state.change.iter_mut().zip(&step.change).for_each(|(v, by)| *v += *by);
+        self.update_velocities();
+    }
+
+    /// The step of eq. 8 from gains and pulls, of which up to `goal` may be left, in √J; `false` where there is none.
+    pub fn take_step(&mut self, goal: f64) -> bool {
+        self.steps += 1;
+        self.pull_on_members();
+        let Self { rows, system, state, step, scratch, .. } = self;
+        step.change.fill(DVec3::ZERO);
+        let contacts = Stiffness { rows, gains: &self.gains };
+        let solved =
+            system.step(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
+        // what was left before is part of the right side, and goes
+        step.left.iter_mut().zip(&state.left).for_each(|(left, before)| *left -= *before);
         rows.velocities(&step.change, &mut step.velocity);
         for row in 0..rows.len() {
             step.lambda[row] = self.pull[row] - self.gains[row] * step.velocity[row] - state.lambda[row];
         }
-        step.change.iter().all(|v| v.is_finite())
+        let finite = solved && step.change.iter().all(|v| v.is_finite());
+        if !finite {
+            // no share of it, not even none, is of use to a later look
+            step.resize(self.rows.len(), self.scratch.len());
+        }
+        finite
     }
 
     /// The energy of the members along the step; Δvᵀ A Δv is the same everywhere and left out.
     pub fn quadratic(&mut self) -> Quadratic {
         let Self { system, state, step, scratch, .. } = self;
-        system.multiply(&step.change, scratch);
+        system.members.multiply(&step.change, scratch);
         let against = |list: &[DVec3]| list.iter().zip(&*scratch).map(|(x, ad)| x.dot(*ad)).sum();
         Quadratic { cross: against(&state.change), curve: against(&step.change) }
+    }
+
+    /// A share of all impulses, of what they changed and of what they left.
+    pub fn shorten(&mut self, share: f64) {
+        let State { lambda, change, left, .. } = &mut self.state;
+        lambda.iter_mut().chain(change).chain(left).for_each(|value| *value *= share);
+        self.update_velocities();
     }
 
     /// Goes a share of the step.
@@ -161,6 +260,7 @@ impl Iterate {
             (&mut state.lambda, &step.lambda),
             (&mut state.change, &step.change),
             (&mut state.velocity, &step.velocity),
+            (&mut state.left, &step.left),
         ];
         for (list, by) in lists {
             list.iter_mut().zip(by).for_each(|(value, by)| *value += *by * share);

@@ -39,14 +39,18 @@
 
 mod cone;
 mod convex;
+mod direct;
 mod error;
 mod factor;
+mod gradients;
 mod iterate;
+mod members;
 mod newton;
 mod order;
 mod passivity;
 mod problem;
 mod rows;
+mod scale;
 mod side;
 mod solver;
 mod system;
@@ -56,6 +60,7 @@ pub use error::ProblemError;
 pub use problem::{BilateralRow, Block, Contact, Member, Problem, Spring};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};
+pub use system::StepForm;
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! The primal-dual way: semismooth Newton on the projected laws of contact (AC91), each step one factor of the members' size.
+//! The primal-dual way: semismooth Newton on the projected laws of contact (AC91), each step one system of the members' size.
 //!
 //! In: an iterate, started from impulses of the last step. Out: the same where all laws hold, or the word that they do not.
 //! Never here: what to do then (`convex.rs`). Theory: `docs/theory/clusters.md`, eq. 7–9.
@@ -13,8 +13,16 @@ const STEPS_MAX: usize = 60;
 const STALE_MAX: usize = 20;
 /// Looks along a step: whole, and halved up to five times.
 const LOOKS: usize = 6;
+/// The shortest of them.
+const SHARE_MIN: f64 = 1.0 / 32.0;
 /// The share of a step's length by which it must make the sum of squares fall.
 const DECREASE: f64 = 0.2;
+
+/// The share of what is missed that an inexact step may leave (eq. 16), and the least that it comes down to, by the last factor, while
+/// steps do not halve what is missed: rough steps serve as well as exact ones until the laws' kinks are near.
+const LEAVE_MOST: f64 = 0.3;
+const LEAVE_LEAST: f64 = 1e-3;
+const LEAVE_LESS: f64 = 0.1;
 
 /// What the way needs to know besides the problem.
 #[derive(Debug, Clone, Copy)]
@@ -29,9 +37,13 @@ pub(super) struct Aim {
 
 /// Iterates until all laws hold; `false` where it gave up, the iterate being of no use then.
 pub(super) fn solve(iterate: &mut Iterate, aim: &Aim) -> bool {
-    let (mut least, mut stale) = (f64::INFINITY, 0);
+    let (mut least, mut stale, mut last) = (f64::INFINITY, 0, f64::INFINITY);
+    let (mut leave, mut stuck) = (LEAVE_MOST, false);
     for step in 0..=STEPS_MAX {
-        let miss = linearise(iterate, aim.form);
+        let mut miss = linearise(iterate, aim.form);
+        if miss < aim.tolerance_m_s && iterate.refine() {
+            miss = linearise(iterate, aim.form);
+        }
         if miss < aim.tolerance_m_s {
             return true;
         }
@@ -39,11 +51,17 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim) -> bool {
         if miss <= 0.5 * least {
             (least, stale) = (miss, 0);
         }
-        if step == STEPS_MAX || stale >= STALE_MAX || !miss.is_finite() || !iterate.take_step() {
+        let missed = sum_of_squares(iterate, aim, 0.0).sqrt();
+        leave = if missed > 0.5 * last { (LEAVE_LESS * leave).max(LEAVE_LEAST) } else { LEAVE_MOST };
+        if step == STEPS_MAX || stale >= STALE_MAX || !miss.is_finite() || !iterate.take_step(leave * missed) {
             return false;
         }
+        last = missed;
         let share = share_of_step(iterate, aim);
-        iterate.advance(share);
+        // a kink that no share gets past is gone over the second time
+        let over = stuck && share <= SHARE_MIN;
+        stuck = share <= SHARE_MIN && !over;
+        iterate.advance(if over { 1.0 } else { share });
         harden(iterate, aim.yield_m_s);
     }
     false
@@ -63,9 +81,9 @@ fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
-/// Gains and pulls of all rows; returns the largest miss.
+/// Gains and pulls of all rows; returns the largest miss, that of momentum among them.
 fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
-    let mut largest = 0.0;
+    let mut largest = iterate.system.members.largest_velocity(&iterate.state.left);
     for k in 0..iterate.rows.len() {
         let (row, at) = (iterate.rows.rows[k], iterate.state.point(k));
         let image = row.natural_map(form, at);
@@ -92,9 +110,14 @@ fn share_of_step(iterate: &Iterate, aim: &Aim) -> f64 {
     best_share
 }
 
-/// Σ w |λ − P|² at a share of the step, with the compliance that rows would have there.
+/// ‖F‖² of eq. 16 at a share of the step, with the compliance that rows would have there. A factor leaves Σ w |λ − P|² of it.
 fn sum_of_squares(iterate: &Iterate, aim: &Aim, share: f64) -> f64 {
-    let Iterate { rows, state, step, .. } = iterate;
+    let Iterate { rows, state, step, system, .. } = iterate;
+    let mobilities = system.members.mobilities.iter().zip(&state.left).zip(&step.left);
+    let momentum = mobilities.map(|((mobility, left), by)| {
+        let left = *left + *by * share;
+        left.dot(*mobility * left)
+    });
     let terms = rows.rows.iter().enumerate().map(|(k, row)| {
         let impulse = state.lambda[k] + step.lambda[k] * share;
         let velocity = state.velocity[k] + step.velocity[k] * share;
@@ -103,7 +126,7 @@ fn sum_of_squares(iterate: &Iterate, aim: &Aim, share: f64) -> f64 {
         let image = row.natural_map(aim.form, Point { impulse, velocity });
         row.scale * (impulse - image.value).length_squared()
     });
-    terms.sum()
+    terms.sum::<f64>() + momentum.sum::<f64>()
 }
 
 /// Makes rows harder that give way too far; returns whether any was.

@@ -4,19 +4,18 @@
 //! keys, steps of members. Theory: `docs/theory/clusters.md`.
 
 use super::cone::Form;
-use super::convex::{self, Passes};
+use super::convex::{self, Passes, Stores};
 use super::error::ProblemError;
-use super::iterate::{Iterate, State};
+use super::iterate::{Iterate, Kept, State};
 use super::newton::{self, Aim};
 use super::passivity;
 use super::problem::Problem;
+use super::system::StepForm;
 use super::validate::validate;
 use glam::DVec3;
 
 /// What a depth gives back in a step: the velocity that a contact at rest yields by, in shares of depth over step (eq. 5).
 const YIELD_SHARE: f64 = 0.2;
-/// A member of no more blocks than a rigid body's.
-const RIGID_BLOCKS: usize = 2;
 
 /// What a solve aims at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,18 +28,24 @@ pub struct Settings {
     pub passes: usize,
     /// Leaves the primal-dual way out, for comparison.
     pub convex_only: bool,
+    /// How the equations of a step are solved.
+    pub form: StepForm,
+    /// The share of the impulses given that velocities may leave unanswered in the iterative form, > 0 (eq. 17): momentum is balanced
+    /// to it. By factors it is balanced to rounding.
+    pub response_share: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 5, convex_only: false }
+        let form = StepForm::Direct;
+        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 5, convex_only: false, form, response_share: 1e-9 }
     }
 }
 
 /// How an answer was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Way {
-    /// The impulses of the last step still hold: no factor was needed.
+    /// The impulses of the last step still hold: no Newton step was needed.
     #[default]
     Kept,
     /// By primal-dual Newton.
@@ -54,8 +59,10 @@ pub enum Way {
 pub struct Report {
     /// The way that the answer comes from.
     pub way: Way,
-    /// Factors of the coupled matrix, those of ways that gave up included.
+    /// Factors of the coupled matrix, those of ways that gave up included; none in the iterative form.
     pub factors: usize,
+    /// Products of conjugate gradients with a matrix of the members' size, all for scales, steps and responses; none in the direct form.
+    pub products: usize,
     /// Convex passes that were finished.
     pub passes: usize,
     /// The largest miss of a law by the answer given, m/s (eq. 9).
@@ -102,6 +109,8 @@ pub struct Solver {
     iterate: Iterate,
     warm: Vec<DVec3>,
     compliances: Vec<f64>,
+    stores: Stores,
+    kept: Kept,
     solution: Solution,
 }
 
@@ -134,9 +143,10 @@ impl Solver {
             velocities.extend_from_slice(member.free);
         }
         let Iterate { rows, system, .. } = &mut self.iterate;
+        (system.form, system.response_share) = (self.settings.form, self.settings.response_share);
         system.take_members(problem, offsets)?;
         rows.gather(problem, offsets, velocities);
-        system.scale_rows(rows, offsets);
+        system.scale_rows(rows);
         let yield_m_s = self.settings.yield_m_s(problem.h_s);
         let given = problem.contacts.iter().map(|c| c.warm_n_s).chain(problem.rows.iter().map(|r| r.warm_n_s));
         self.warm.clear();
@@ -159,7 +169,7 @@ impl Solver {
 
     /// The ways in their order, then the guard.
     fn run(&mut self, problem: &Problem<'_>) -> Report {
-        let rigid = problem.members.iter().all(|member| member.free.len() <= RIGID_BLOCKS);
+        let rigid = self.iterate.system.members.rigid.iter().all(|rigid| *rigid);
         let aim = Aim {
             form: if rigid { Form::Cone } else { Form::Disc },
             tolerance_m_s: self.settings.tolerance_m_s,
@@ -167,14 +177,14 @@ impl Solver {
         };
         let mut report = Report::resting();
         if !self.settings.convex_only && self.primal_dual(&aim) {
-            report.way = if self.iterate.factors > 0 { Way::PrimalDual } else { Way::Kept };
+            report.way = if self.iterate.steps > 0 { Way::PrimalDual } else { Way::Kept };
         } else {
             let passes = self.convex(&aim);
             report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
         }
-        report.factors = self.iterate.factors;
-        report.cut |= !self.settle();
-        let ray = passivity::guard(&mut self.iterate);
+        report.cut |= !self.settle() || !self.iterate.answered();
+        let ray = passivity::guard(&mut self.iterate, &self.solution.velocities);
+        (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
         report.residual_m_s = newton::largest_miss(&self.iterate, Form::Disc);
         report
@@ -192,12 +202,12 @@ impl Solver {
     /// The convex way; passes that have not settled are a start from which the primal-dual way may find the rest.
     fn convex(&mut self, aim: &Aim) -> Passes {
         self.start();
-        let mut passes = convex::solve(&mut self.iterate, aim, self.settings.passes);
+        let mut passes = convex::solve(&mut self.iterate, &mut self.stores, aim, self.settings.passes);
         if !passes.settled && passes.finished > 0 && !self.settings.convex_only {
-            let kept = self.iterate.keep();
+            self.iterate.keep(&mut self.kept);
             passes.settled = newton::solve(&mut self.iterate, &Aim { form: Form::Cone, ..*aim });
             if !passes.settled {
-                self.iterate.restore(&kept);
+                self.iterate.restore(&self.kept);
             }
         }
         passes
@@ -205,10 +215,7 @@ impl Solver {
 
     /// Impulses into their cones, and the velocities that these make; `false` where numbers have overflowed and there is no answer.
     fn settle(&mut self) -> bool {
-        let Iterate { rows, state, .. } = &mut self.iterate;
-        for (row, impulse) in rows.rows.iter().zip(&mut state.lambda) {
-            *impulse = row.law.project(Form::Disc, *impulse).value;
-        }
+        self.iterate.allow();
         self.iterate.respond();
         let State { lambda, velocity, .. } = &mut self.iterate.state;
         let finite = lambda.iter().chain(&*velocity).all(|v| v.is_finite());

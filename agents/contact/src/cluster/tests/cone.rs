@@ -1,10 +1,10 @@
 //! Projections against what defines them, and the guard of passivity.
 
-use super::{Body, Seeded, contact, diagonal};
+use super::{Seeded, contact, diagonal};
 use crate::cluster::cone::{Form, Law};
 use crate::cluster::iterate::Iterate;
 use crate::cluster::passivity::guard;
-use crate::cluster::{Member, Problem, Side};
+use crate::cluster::{Contact, Member, Problem, Side};
 use glam::{DMat3, DVec3};
 
 const COUNT: usize = 1000;
@@ -70,21 +70,46 @@ fn slopes_are_those_of_differences() {
     assert!(compared >= 3 * COUNT - 5, "{compared} of {}", 3 * COUNT);
 }
 
-#[test]
-fn an_answer_that_makes_energy_is_shortened_to_one_that_does_not() {
-    let body = Body { blocks: vec![diagonal(0, DVec3::ONE)], free: vec![DVec3::new(0.0, 0.0, -1.0)] };
-    let members = [Member { blocks: &body.blocks, free: &body.free, share: 1.0 }];
-    let contacts = [contact([Side::node(0, 0), Side::FIXED], DVec3::Z)];
-    let problem = Problem { h_s: 0.01, members: &members, contacts: &contacts, rows: &[] };
+/// A point of 1 kg that meets the floor at 1 m/s, the floor asking for `push_m_s` more.
+fn falling(push_m_s: f64) -> Iterate {
+    let blocks = [diagonal(0, DVec3::ONE)];
+    let members = [Member { blocks: &blocks, free: &FALL, share: 1.0 }];
+    let h_s = 0.01;
+    let gap_m = -push_m_s * h_s / 0.2;
+    let contacts = [Contact { gap_m, ..contact([Side::node(0, 0), Side::FIXED], DVec3::Z) }];
+    let problem = Problem { h_s, members: &members, contacts: &contacts, rows: &[] };
     let mut iterate = Iterate::default();
     iterate.system.take_members(&problem, &[0]).unwrap();
-    iterate.rows.gather(&problem, &[0], &body.free);
-    iterate.system.scale_rows(&mut iterate.rows, &[0]);
+    iterate.rows.gather(&problem, &[0], &FALL);
+    iterate.system.scale_rows(&mut iterate.rows);
     iterate.reset(1);
+    iterate
+}
+
+const FALL: [DVec3; 1] = [DVec3::new(0.0, 0.0, -1.0)];
+
+#[test]
+fn an_answer_that_makes_energy_is_shortened_to_one_that_does_not() {
+    let mut iterate = falling(0.0);
     // five times what stops it, so it leaves at four times its speed
     iterate.state.lambda[0] = DVec3::X * 5.0;
     iterate.respond();
-    let ray = guard(&mut iterate);
+    let ray = guard(&mut iterate, &FALL);
     assert!((ray.share - 0.2).abs() < 1e-15 && (iterate.state.lambda[0].x - 1.0).abs() < 1e-15);
     assert!((ray.work_j + 0.5).abs() < 1e-15);
+}
+
+#[test]
+fn the_guard_counts_what_an_inexact_response_made() {
+    let mut iterate = falling(0.2);
+    // by its impulse it would leave at −0.5 m/s; an inexact solve has it leave at 1.2 m/s, and made 0.22 J, 0.1 of them by push-out
+    iterate.state.lambda[0] = DVec3::X * 0.5;
+    iterate.state.change[0] = DVec3::Z * 2.2;
+    iterate.state.left[0] = DVec3::Z * (0.5 - 2.2);
+    iterate.update_velocities();
+    let ray = guard(&mut iterate, &FALL);
+    let change = iterate.state.change[0].z;
+    let made = 0.5 * (change - 1.0).powi(2) - 0.5 - 0.2 * iterate.state.lambda[0].x;
+    assert!((ray.share - 2.3 / 4.84).abs() < 1e-12 && (change - 2.2 * ray.share).abs() < 1e-12, "{ray:?}");
+    assert!(made < 0.0 && (made - ray.work_j).abs() < 1e-12, "{made} {ray:?}");
 }

@@ -2,6 +2,7 @@
 
 mod cone;
 mod factor;
+mod iterative;
 mod promises;
 mod random;
 mod scenes;

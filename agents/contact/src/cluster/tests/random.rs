@@ -2,13 +2,13 @@
 
 use super::slow::gauss_seidel;
 use super::{BilateralRow, Body, Case, Lattice, Seeded, contact, rigid, side_velocity};
-use crate::cluster::{Contact, Settings, Side, SideTerm, Solution, Solver, Way};
+use crate::cluster::{Contact, Settings, Side, SideTerm, Solution, Solver, StepForm, Way};
 use glam::DVec3;
 
-const COUNT: u64 = 200;
+pub const COUNT: u64 = 200;
 
 /// Two to six members of 0.03 to 30 kg, up to forty contacts, friction up to 1, a joint now and then.
-fn random_case(seed: u64) -> Case {
+pub fn random_case(seed: u64) -> Case {
     let mut numbers = Seeded::new(1000 + seed);
     let h_s = 1.0 / numbers.between(60.0, 500.0);
     let count = 2 + numbers.below(5);
@@ -63,16 +63,16 @@ fn random_contact(numbers: &mut Seeded, bodies: &[Body]) -> Contact {
     Contact { gap_m, friction, ..contact(sides, normal) }
 }
 
-fn solved(case: &Case, settings: Settings) -> Solution {
+pub fn solved(case: &Case, settings: Settings) -> Solution {
     case.with(|problem| Solver::new(settings).solve(problem).unwrap().clone())
 }
 
-fn velocities(case: &Case, solution: &Solution) -> Vec<Vec<DVec3>> {
+pub fn velocities(case: &Case, solution: &Solution) -> Vec<Vec<DVec3>> {
     (0..case.bodies.len()).map(|member| solution.velocities(member).to_vec()).collect()
 }
 
 /// By how much the answer misses the laws, as a velocity, worked out from its velocities and impulses alone.
-fn miss(case: &Case, solution: &Solution) -> f64 {
+pub fn miss(case: &Case, solution: &Solution) -> f64 {
     let all = velocities(case, solution);
     let mut worst: f64 = 0.0;
     for (k, c) in case.contacts.iter().enumerate() {
@@ -106,12 +106,19 @@ fn work(case: &Case, solution: &Solution) -> f64 {
     of_contacts + rows.map(|(r, p)| p.dot(mean(&r.sides) - r.target_m_s)).sum::<f64>()
 }
 
-fn distance(a: &[Vec<DVec3>], b: &[Vec<DVec3>]) -> f64 {
+pub fn distance(a: &[Vec<DVec3>], b: &[Vec<DVec3>]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
 /// Fine enough that answers may be compared, with as many passes as it takes.
-const FINE: Settings = Settings { tolerance_m_s: 1e-9, depth_m: 20e-6, passes: 200, convex_only: false };
+pub const FINE: Settings = Settings {
+    tolerance_m_s: 1e-9,
+    depth_m: 20e-6,
+    passes: 200,
+    convex_only: false,
+    form: StepForm::Direct,
+    response_share: 1e-12,
+};
 
 #[test]
 fn the_laws_hold_in_random_problems_and_no_answer_makes_energy() {
@@ -149,12 +156,12 @@ fn a_finer_tolerance_is_met_as_finely() {
 
 /// How far two answers are apart, over many problems.
 #[derive(Default)]
-struct Comparison {
-    compared: usize,
+pub struct Comparison {
+    pub compared: usize,
     /// Of those that agree.
     worst_m_s: f64,
     /// Problems with two answers that both obey the laws.
-    ambiguous: usize,
+    pub ambiguous: usize,
 }
 
 /// Velocities that are further apart are those of two answers, m/s: the laws hold to 10⁻⁹ m/s, and what bends or is light moves by
@@ -162,7 +169,7 @@ struct Comparison {
 const AGREE_M_S: f64 = 1e-6;
 
 impl Comparison {
-    fn add(&mut self, apart: f64, other_miss: f64) {
+    pub fn add(&mut self, apart: f64, other_miss: f64) {
         self.compared += 1;
         if apart < AGREE_M_S {
             self.worst_m_s = self.worst_m_s.max(apart);
@@ -173,7 +180,7 @@ impl Comparison {
         }
     }
 
-    fn tell(&self) {
+    pub fn tell(&self) {
         let Self { compared, worst_m_s, ambiguous } = self;
         println!("{compared} compared, {worst_m_s:.1e} m/s apart at most; {ambiguous} with two answers");
     }
@@ -200,7 +207,7 @@ fn both_ways_give_the_same_velocities() {
 }
 
 /// Compares answers with those of the slow method at the same compliances.
-fn compare_with_slow(settings: Settings) -> Comparison {
+pub fn compare_with_slow(settings: Settings) -> Comparison {
     let mut comparison = Comparison::default();
     for seed in 0..COUNT {
         let case = random_case(seed);

@@ -1,31 +1,33 @@
 //! Scenes with an answer in closed form: rest, slopes, stacks, collisions.
 
 use super::{Body, Case, Lattice, contact, rigid};
-use crate::cluster::{BilateralRow, Contact, Settings, Side, Solver, Spring};
+use crate::cluster::{BilateralRow, Contact, Settings, Side, Solution, Solver, Spring};
 use glam::DVec3;
 
 const G: f64 = 9.81;
 const HALF: f64 = 0.05;
 
 /// Boxes of one size above each other over a floor, moved by small displacements and turns.
-struct Stack {
+pub struct Stack {
     h: f64,
-    gravity: DVec3,
-    friction: f64,
+    pub gravity: DVec3,
+    pub friction: f64,
     masses: Vec<f64>,
     /// Displacement and turn of each box.
-    places: Vec<[DVec3; 2]>,
-    velocities: Vec<[DVec3; 2]>,
+    pub places: Vec<[DVec3; 2]>,
+    pub velocities: Vec<[DVec3; 2]>,
     /// Of each of the four corners of each box: the impulse and the slip owed of the last step.
     impulses: Vec<DVec3>,
     owed: Vec<DVec3>,
     compliances: Vec<f64>,
-    solver: Solver,
-    factors: usize,
+    pub solver: Solver,
+    pub factors: usize,
+    /// Products of conjugate gradients.
+    pub products: usize,
 }
 
 impl Stack {
-    fn new(masses: &[f64]) -> Self {
+    pub fn new(masses: &[f64]) -> Self {
         let count = masses.len();
         Self {
             h: 1.0 / 60.0,
@@ -39,11 +41,16 @@ impl Stack {
             compliances: Vec::new(),
             solver: Solver::default(),
             factors: 0,
+            products: 0,
         }
     }
 
+    pub fn solved_by(self, settings: Settings) -> Self {
+        Self { solver: Solver::new(settings), ..self }
+    }
+
     fn exact(self) -> Self {
-        Self { solver: Solver::new(Settings { tolerance_m_s: 1e-11, ..Settings::default() }), ..self }
+        self.solved_by(Settings { tolerance_m_s: 1e-11, ..Settings::default() })
     }
 
     fn contact(&self, upper: usize, corner: usize) -> Contact {
@@ -91,15 +98,16 @@ impl Stack {
         }
         self.compliances = solution.compliances_per_kg;
         self.factors += solution.report.factors;
+        self.products += solution.report.products;
     }
 
-    fn steps(mut self, count: usize) -> Self {
+    pub fn steps(mut self, count: usize) -> Self {
         (0..count).for_each(|_| self.step());
         self
     }
 
     /// What the four contacts under a box carry, in shares of the weight above them.
-    fn carried(&self, body: usize) -> f64 {
+    pub fn carried(&self, body: usize) -> f64 {
         let force: DVec3 = self.impulses[4 * body..4 * body + 4].iter().sum();
         force.z / (self.masses[body..].iter().sum::<f64>() * G * self.h)
     }
@@ -199,31 +207,43 @@ fn a_collision_keeps_momentum_to_rounding() {
     }
 }
 
-#[test]
-fn a_soft_block_between_a_plate_and_the_floor_keeps_momentum() {
-    let lattice = Lattice { side: 4, pitch: 0.02, mass: 0.3, stiffness: 4.0 };
+/// A soft block of 0.3 kg, so many points to an edge, on the floor, under a plate of 2 kg that falls on it aslant.
+pub fn plate_on_soft_block(side: usize, stiffness: f64) -> Case {
+    let pitch = 0.06 / (side - 1) as f64;
+    let lattice = Lattice { side, pitch, mass: 0.3, stiffness };
     let (mut soft, mut plate) = (lattice.body(), rigid(2.0, DVec3::new(0.05, 0.05, 0.01)));
     soft.free.fill(DVec3::new(0.05, 0.0, -0.16));
     plate.free[0] = DVec3::new(0.3, -0.1, -0.5);
     let centre = DVec3::new(0.03, 0.03, 0.07);
+    let layer = side * side;
     let mut contacts = Vec::new();
     for (node, place) in lattice.places().into_iter().enumerate() {
-        if node < 16 {
+        if node < layer {
             contacts.push(contact([Side::node(0, node), Side::FIXED], DVec3::Z));
-        } else if node >= 48 {
+        } else if node >= layer * (side - 1) {
             let under = Side::rigid(1, DVec3::new(place.x, place.y, 0.06) - centre);
             contacts.push(contact([under, Side::node(0, node)], DVec3::Z));
         }
     }
-    let case = Case { h_s: 1.0 / 60.0, bodies: vec![soft, plate], contacts, rows: Vec::new() };
+    Case { h_s: 1.0 / 60.0, bodies: vec![soft, plate], contacts, rows: Vec::new() }
+}
+
+#[test]
+fn a_soft_block_between_a_plate_and_the_floor_keeps_momentum() {
+    let case = plate_on_soft_block(4, 4.0);
     let solution = case.with(|problem| Solver::default().solve(problem).unwrap().clone());
     println!("soft block: {:?}", solution.report);
     assert!(!solution.report.cut && solution.report.residual_m_s < 1e-5, "{:?}", solution.report);
+    let gained = momentum_gained(&case, &solution, 64);
     let floor: DVec3 = solution.contacts_n_s[..16].iter().sum();
+    assert!(gained.distance(floor) < 1e-12, "{gained} is not {floor}"); // of a few N s, by stiffness a thousand times the mass
+}
+
+/// What the block and the plate have gained together.
+pub fn momentum_gained(case: &Case, solution: &Solution, nodes: usize) -> DVec3 {
     let soft_change: DVec3 = solution.velocities(0).iter().zip(&case.bodies[0].free).map(|(v, f)| *v - *f).sum();
     let plate_change = solution.velocities(1)[0] - case.bodies[1].free[0];
-    let gained = soft_change * (0.3 / 64.0) + plate_change * 2.0;
-    assert!(gained.distance(floor) < 1e-12, "{gained} is not {floor}"); // of a few N s, by stiffness a thousand times the mass
+    soft_change * (0.3 / nodes as f64) + plate_change * 2.0
 }
 
 fn tip(spring: Option<Spring>, limit_n_s: Option<f64>) -> (DVec3, DVec3) {

@@ -1,0 +1,74 @@
+//! The matrices of all members of a contact problem: ⊕ A/f, its diagonal, and the measure of impulses that follows from it.
+//!
+//! In: members. Out: products and sizes. Never here: contacts, solutions. Theory: `docs/theory/clusters.md`, eq. 1 and 15.
+
+use super::problem::{Block, Problem};
+use glam::{DMat3, DVec3};
+
+/// A member of no more blocks than a rigid body's.
+const RIGID_BLOCKS: usize = 2;
+
+/// ⊕ A/f, blocks counted over all members.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Members {
+    /// The lower half.
+    pub blocks: Vec<Block>,
+    /// The member of each block.
+    pub owners: Vec<usize>,
+    /// The inverse of each diagonal block.
+    pub mobilities: Vec<DMat3>,
+    /// Whether each member has no more blocks than a rigid body.
+    pub rigid: Vec<bool>,
+}
+
+impl Members {
+    /// Takes up the members of a problem, the first block of each being at its offset.
+    pub fn take(&mut self, problem: &Problem<'_>, offsets: &[usize]) {
+        self.blocks.clear();
+        self.owners.clear();
+        self.rigid.clear();
+        for (place, member) in problem.members.iter().enumerate() {
+            let offset = offsets[place];
+            self.rigid.push(member.free.len() <= RIGID_BLOCKS);
+            self.owners.extend(member.free.iter().map(|_| place));
+            self.blocks.extend(member.blocks.iter().map(|block| Block {
+                row: offset + block.row,
+                column: offset + block.column,
+                value: block.value * (1.0 / member.share),
+            }));
+        }
+        self.mobilities.clear();
+        self.mobilities.resize(self.owners.len(), DMat3::ZERO);
+        for block in self.blocks.iter().filter(|block| block.row == block.column) {
+            self.mobilities[block.row] += block.value;
+        }
+        self.mobilities.iter_mut().for_each(|m| *m = m.inverse());
+    }
+
+    /// How many blocks of velocity there are.
+    pub fn size(&self) -> usize {
+        self.owners.len()
+    }
+
+    /// out ← ⊕ A/f x.
+    pub fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
+        out.fill(DVec3::ZERO);
+        for block in &self.blocks {
+            out[block.row] += block.value * x[block.column];
+            if block.row != block.column {
+                out[block.column] += block.value.mul_transpose_vec3(x[block.row]);
+            }
+        }
+    }
+
+    /// ‖r‖² of impulses on all blocks, J (eq. 15).
+    pub fn size_squared(&self, impulses: &[DVec3]) -> f64 {
+        self.mobilities.iter().zip(impulses).map(|(m, r)| r.dot(*m * *r)).sum()
+    }
+
+    /// The largest velocity that impulses would give to blocks by themselves, m/s.
+    pub fn largest_velocity(&self, impulses: &[DVec3]) -> f64 {
+        let speeds = self.mobilities.iter().zip(impulses).map(|(m, r)| (*m * *r).abs().max_element());
+        speeds.fold(0.0, |worst, speed| if speed > worst || speed.is_nan() { speed } else { worst })
+    }
+}

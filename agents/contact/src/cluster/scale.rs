@@ -1,0 +1,130 @@
+//! The scale of each row: the size of its own block of W.
+//!
+//! In: members and rows. Out: a scale of each row, in the row. Never here: how equations are solved.
+//! Theory: `docs/theory/clusters.md`, eq. 6.
+
+use super::gradients::Task;
+use super::members::Members;
+use super::rows::Rows;
+use super::system::System;
+use glam::{DMat3, DVec3};
+
+/// Contacts of a member whose exact compliance is compared with the estimate of its diagonal.
+const SAMPLES: usize = 4;
+/// The most that an iterative solve may leave of a sample's impulses, in shares of them. A compliance is off by about the square, and
+/// may be by this many times what responses may be.
+const SAMPLE_SHARE: f64 = 0.01;
+const COARSER: f64 = 1e4;
+
+/// Storage for the samples.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scales {
+    samples: Vec<Sample>,
+    right: Vec<DVec3>,
+    x: Vec<DVec3>,
+    left: Vec<DVec3>,
+}
+
+/// The rows of one member at which it is sampled, and what was found.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sample {
+    /// Rows that touch the member.
+    count: usize,
+    /// Rows seen so far, and the last of them.
+    seen: usize,
+    last: Option<usize>,
+    chosen: [Option<usize>; SAMPLES],
+    exact: f64,
+    estimate: f64,
+}
+
+impl Scales {
+    /// The estimate of the members' diagonals, put right by some exact ones.
+    pub fn set(&mut self, system: &mut System, rows: &mut Rows) {
+        self.samples.clear();
+        self.samples.resize(system.members.rigid.len(), Sample::default());
+        if system.members.blocks.iter().any(|block| block.row != block.column) {
+            self.choose(&system.members, rows);
+            (0..SAMPLES).for_each(|sample| self.sample(system, rows, sample));
+        }
+        let members = &system.members;
+        for row in 0..rows.len() {
+            let terms = rows.terms(row).iter();
+            let scale: f64 =
+                terms.map(|t| self.samples[members.owners[t.block]].ratio() * estimate(members, &t.map, t.block)).sum();
+            rows.set_scale(row, scale / 3.0);
+        }
+    }
+
+    /// Chooses rows of each member that lie evenly among all of its rows.
+    fn choose(&mut self, members: &Members, rows: &Rows) {
+        for row in 0..rows.len() {
+            for term in rows.terms(row) {
+                let sample = &mut self.samples[members.owners[term.block]];
+                sample.count += usize::from(sample.last.replace(row) != Some(row));
+            }
+        }
+        self.samples.iter_mut().for_each(|sample| sample.last = None);
+        for row in 0..rows.len() {
+            for term in rows.terms(row) {
+                self.samples[members.owners[term.block]].meet(row);
+            }
+        }
+    }
+
+    /// Adds the mobility of every member at one row of its own; all members share three solutions.
+    fn sample(&mut self, system: &mut System, rows: &Rows, sample: usize) {
+        let size = system.members.size();
+        for axis in 0..3 {
+            for list in [&mut self.right, &mut self.x, &mut self.left] {
+                list.clear();
+                list.resize(size, DVec3::ZERO);
+            }
+            for (member, at) in self.samples.iter().enumerate() {
+                let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
+                for term in terms.filter(|t| system.members.owners[t.block] == member) {
+                    self.right[term.block] += term.map.row(axis);
+                }
+            }
+            let share = (COARSER * system.response_share).sqrt().min(SAMPLE_SHARE);
+            let goal = share * system.members.size_squared(&self.right).sqrt();
+            system.respond(&mut Task { right: &self.right, x: &mut self.x, left: &mut self.left, goal });
+            for (member, at) in self.samples.iter_mut().enumerate() {
+                let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
+                for term in terms.filter(|t| system.members.owners[t.block] == member) {
+                    at.exact += term.map.row(axis).dot(self.x[term.block]);
+                    if axis == 0 {
+                        at.estimate += estimate(&system.members, &term.map, term.block);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Sample {
+    /// Counts a row, and keeps it where it is one of those wanted.
+    fn meet(&mut self, row: usize) {
+        if self.last.replace(row) == Some(row) {
+            return;
+        }
+        for (sample, chosen) in self.chosen.iter_mut().enumerate() {
+            if sample * self.count / SAMPLES == self.seen {
+                *chosen = Some(row);
+            }
+        }
+        self.seen += 1;
+    }
+
+    /// Exact over estimated mobility; 1 where nothing was sampled.
+    fn ratio(&self) -> f64 {
+        let ratio = self.exact / self.estimate;
+        if ratio > 0.0 && ratio.is_finite() { ratio } else { 1.0 }
+    }
+}
+
+/// The trace of M diag(A)⁻¹ Mᵀ.
+fn estimate(members: &Members, map: &DMat3, block: usize) -> f64 {
+    let product = *map * members.mobilities[block] * map.transpose();
+    product.x_axis.x + product.y_axis.y + product.z_axis.z
+}
