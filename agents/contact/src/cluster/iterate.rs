@@ -171,7 +171,7 @@ impl Iterate {
     pub fn linearise(&mut self, row: usize, image: &Projection, scale: f64) {
         let yielding = self.rows.rows[row].compliance / scale;
         let slopes = image.slopes;
-        // (I − D (1 − R/w))⁻¹ along each axis of the slope D
+        // (I − P′ (1 − R/w))⁻¹ along each axis of the slope P′
         let factor = (DVec3::ONE - slopes + slopes * yielding).recip();
         let lambda = self.state.lambda[row];
         self.gains[row] = image.along_axes(slopes * factor / scale);

@@ -29,7 +29,7 @@ pub struct Block {
 /// A body that takes part: how it answers impulses, and how it would move without any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Member<'a> {
-    /// The lower half of A = M + h D + h² K: symmetric and positive definite; kg, or kg m² for spins.
+    /// The lower half of A = M + h C + h² S: symmetric and positive definite; kg, or kg m² for spins.
     pub blocks: &'a [Block],
     /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins.
     pub free: &'a [DVec3],
