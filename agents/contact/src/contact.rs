@@ -10,6 +10,11 @@ pub const PUSH_OUT_SHARE: f64 = 0.2;
 /// The fastest push-out, m/s: a body found deep inside another comes out slowly instead of being shot out.
 const PUSH_OUT_MAX_M_S: f64 = 0.5;
 
+/// The velocity by which an overlap, a gap below zero, is corrected over `span_s` seconds: below zero, m/s.
+pub(crate) fn push_out_m_s(gap_m: f64, span_s: f64) -> f64 {
+    (gap_m * PUSH_OUT_SHARE / span_s).max(-PUSH_OUT_MAX_M_S)
+}
+
 /// A place where two bodies touch, or may touch within the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
@@ -38,11 +43,7 @@ impl Contact {
     /// The velocity added to the real normal velocity before the condition u·n + bias ≥ 0 (eq. 3, 4).
     #[must_use]
     pub fn bias_m_s(&self, h: f64) -> f64 {
-        let bias = if self.gap_m >= 0.0 {
-            self.gap_m / h
-        } else {
-            (self.gap_m * PUSH_OUT_SHARE / h.max(self.age_s)).max(-PUSH_OUT_MAX_M_S)
-        };
+        let bias = if self.gap_m >= 0.0 { self.gap_m / h } else { push_out_m_s(self.gap_m, h.max(self.age_s)) };
         if self.rebound_m_s > 0.0 { bias.min(-self.rebound_m_s) } else { bias }
     }
 

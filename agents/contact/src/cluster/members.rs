@@ -69,6 +69,11 @@ impl Members {
     /// The largest velocity that impulses would give to blocks by themselves, m/s.
     pub fn largest_velocity(&self, impulses: &[DVec3]) -> f64 {
         let speeds = self.mobilities.iter().zip(impulses).map(|(m, r)| (*m * *r).abs().max_element());
-        speeds.fold(0.0, |worst, speed| if speed > worst || speed.is_nan() { speed } else { worst })
+        speeds.fold(0.0, worse)
     }
+}
+
+/// The larger of two sizes; one that is not a number stays.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }

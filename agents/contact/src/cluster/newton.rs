@@ -5,6 +5,7 @@
 
 use super::cone::Form;
 use super::iterate::Iterate;
+use super::members::worse;
 use super::rows::Point;
 
 /// The most steps: where the pressure of what slides is not known it is found at a rate of about a half a step.
@@ -74,11 +75,6 @@ pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
         row.miss(at.impulse, row.natural_map(form, at).value)
     });
     misses.fold(0.0, worse)
-}
-
-/// The larger miss; one that is not a number stays.
-fn worse(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
 }
 
 /// Gains and pulls of all rows; returns the largest miss, that of momentum among them.

@@ -4,12 +4,9 @@
 //! state between steps, the solve. Theory: `docs/theory/clusters.md`, section 2.
 
 use super::side::Side;
+use crate::contact::push_out_m_s;
 use glam::{DMat3, DVec3};
 
-/// The share of a depth that one step takes back.
-const PUSH_OUT_SHARE: f64 = 0.2;
-/// The fastest that a depth is taken back, m/s: push-out must not become speed.
-const PUSH_OUT_MAX_M_S: f64 = 0.5;
 /// The share of the slip owed that one step takes back.
 const SLIP_SHARE: f64 = 0.2;
 /// A contact sticks while its friction is below this share of the most that Coulomb allows.
@@ -109,8 +106,7 @@ impl Contact {
     /// What the gap and the slip owed add to the velocity, in the frame (eq. 2, 3).
     #[must_use]
     pub fn bias_m_s(&self, h_s: f64) -> DVec3 {
-        let allowed = self.gap_m / h_s;
-        let normal = if allowed >= 0.0 { allowed } else { (PUSH_OUT_SHARE * allowed).max(-PUSH_OUT_MAX_M_S) };
+        let normal = if self.gap_m >= 0.0 { self.gap_m / h_s } else { push_out_m_s(self.gap_m, h_s) };
         let owed = self.owed_slip_m * (SLIP_SHARE / h_s);
         DVec3::new(normal, self.tangents[0].dot(owed), self.tangents[1].dot(owed))
     }

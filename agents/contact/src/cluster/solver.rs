@@ -12,10 +12,8 @@ use super::passivity;
 use super::problem::Problem;
 use super::system::StepForm;
 use super::validate::validate;
+use crate::contact::PUSH_OUT_SHARE;
 use glam::DVec3;
-
-/// What a depth gives back in a step: the velocity that a contact at rest yields by, in shares of depth over step (eq. 5).
-const YIELD_SHARE: f64 = 0.2;
 
 /// What a solve aims at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -248,9 +246,9 @@ impl Solver {
 }
 
 impl Settings {
-    /// v_s of eq. 5.
+    /// v_s of eq. 5: what push-out gives back in a step at the depth wanted.
     fn yield_m_s(&self, h_s: f64) -> f64 {
-        YIELD_SHARE * self.depth_m / h_s
+        PUSH_OUT_SHARE * self.depth_m / h_s
     }
 }
 

@@ -259,7 +259,7 @@ impl Stepper {
         }
         let last = 2 * segment + 3 == slots;
         let (start, end) = (matter.held[0] && segment == 0, matter.held[1] && last);
-        // a held node does not move: its slot in the matrix is only a placeholder
+        // a held node does not move: the identity stands in its row of the matrix, which is no mobility
         let (v, w) = (if start { 0.0 } else { 1.0 - w }, if end { 0.0 } else { w });
         let mut blocks = InverseBlocks::default();
         self.factor.inverse_blocks(&mut blocks);
