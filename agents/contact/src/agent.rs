@@ -3,6 +3,7 @@
 //! In: a step length and what the agent can see of the others ([`StepContext`]). Out: a new state and what the step took.
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by the suite `metachron_models::conformance`.
 
+use crate::stepper::ClusterMember;
 use crate::{Law, Link};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
@@ -58,6 +59,11 @@ pub trait Agent: Send {
 
     /// The contact shape, constant over the agent's life; `None` where nothing can touch it.
     fn form(&self) -> Option<Arc<CollisionShape>> {
+        None
+    }
+
+    /// The agent as contact clusters step it, together with all that it touches; `None` for a model that touches nothing.
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
         None
     }
 

@@ -36,6 +36,7 @@ pub mod mates;
 pub mod other;
 pub mod presses;
 pub mod solver;
+pub mod stepper;
 pub mod taken;
 pub mod tank;
 

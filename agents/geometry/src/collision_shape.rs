@@ -4,7 +4,7 @@
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
 
 use super::narrow_phase::VoronoiRegions;
-use crate::{ShapeError, Solid, ToolShape};
+use crate::{Aabb, ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
 use metachron_core::ContactJacobian;
 use rapier3d::parry::shape::SharedShape;
@@ -156,6 +156,23 @@ pub struct PlacedShape<'a> {
     pub form: &'a CollisionShape,
     /// Its placement.
     pub view: ShapePose<'a>,
+}
+
+impl PlacedShape<'_> {
+    /// A box around it, with the thickness of its skin.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        match (&self.form.kind, self.view) {
+            (ShapeKind::Solid(solid), ShapePose::Solid { position, .. }) => Aabb::about(position, solid.radius_m),
+            (ShapeKind::Tool(tool), ShapePose::Tool { tip, .. }) => Aabb::about(tip, tool.reach_m()),
+            (ShapeKind::Surface(surface), ShapePose::Surface(positions)) => Aabb::of(positions).grown(surface.radius_m),
+            (_, ShapePose::Chain { positions, radii_m }) => {
+                Aabb::of(positions).grown(radii_m.iter().copied().fold(0.0, f64::max))
+            }
+            // a form at a place of another kind touches nothing
+            _ => Aabb::of(&[]),
+        }
+    }
 }
 
 /// A point of a body's skin.

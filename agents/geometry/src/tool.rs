@@ -44,6 +44,14 @@ const JAW_LENGTH: f64 = 8.0;
 const JAW_BEHIND: f64 = 0.75;
 
 impl ToolShape {
+    /// No point of it is farther from the point between its jaws, metres.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        // behind the jaws come clevis and ring, then the shaft; wide open jaws reach five radii to the side
+        let Self { shaft_radius_m: r, shaft_length_m } = *self;
+        (10.0 * r + shaft_length_m).hypot(5.0 * r)
+    }
+
     /// The parts of the tool with its jaws `jaw` open (0 shut … 1 wide open).
     #[must_use]
     pub fn parts(&self, jaw: f64) -> [ToolPart; 6] {

@@ -76,6 +76,18 @@ impl Side {
         side
     }
 
+    /// The same point of the member at another place of the problem.
+    #[must_use]
+    pub fn of_member(self, member: usize) -> Self {
+        Self { member, ..self }
+    }
+
+    /// The velocity of the point where the blocks of its member have these velocities; zero of a fixed one.
+    #[must_use]
+    pub fn velocity(&self, blocks: &[DVec3]) -> DVec3 {
+        self.terms().iter().map(|term| term.map * blocks[term.block]).sum()
+    }
+
     /// The blocks that move the point; none of a fixed one.
     #[must_use]
     pub fn terms(&self) -> &[SideTerm] {

@@ -131,6 +131,12 @@ impl Solver {
         Ok(&self.solution)
     }
 
+    /// The answer of the last solve.
+    #[must_use]
+    pub fn solution(&self) -> &Solution {
+        &self.solution
+    }
+
     /// Velocities without impulses, matrices, rows, scales, and the last step's impulses with their compliances.
     fn set_up(&mut self, problem: &Problem<'_>) -> Result<(), ProblemError> {
         let Solution { offsets, velocities, .. } = &mut self.solution;

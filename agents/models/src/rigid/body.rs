@@ -12,6 +12,7 @@ use super::leant;
 use super::leant::Leant;
 use super::mass_properties::MassDistribution;
 use super::meeting::Meeting;
+use super::member::Unknowns;
 use super::motion::Motion;
 use super::sided::Sided;
 use super::spring_set::SpringSet;
@@ -24,6 +25,7 @@ use metachron_contact::beside;
 use metachron_contact::beside::{bends, is_driven};
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
+use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, IslandMember, Neighbour, StepContext};
 use metachron_core::DRIFT_S;
 use metachron_core::{
@@ -103,13 +105,15 @@ pub struct RigidBody {
     pub(super) sunk_m: Option<f64>,
     /// Error of its steps in contact and under springs over a tenth of a second, metres.
     drift_m: f64,
+    /// What it is in a contact cluster.
+    pub(super) unknowns: Unknowns,
 }
 
 /// A body in contact that moves slower than this everywhere is calm, m/s: above the solver's own jitter
 /// (measured: below 1e-4 m/s for a box of 1 m at rest), below the visible.
-const CALM_M_S: f64 = 2e-3;
+pub(super) const CALM_M_S: f64 = 2e-3;
 /// A body that was calm for this long of its own time is at rest, seconds.
-const REST_S: f64 = 0.5;
+pub(super) const REST_S: f64 = 0.5;
 /// A step longer than [`PART_MAX_S`] by less than this factor is not split once more.
 const SPLIT_SLACK: f64 = 1.01;
 
@@ -172,6 +176,7 @@ impl RigidBody {
             jointed: None,
             sunk_m: None,
             drift_m: 0.0,
+            unknowns: Unknowns::default(),
         };
         body.publish_initial_support();
         Ok(body)
@@ -385,6 +390,10 @@ impl Agent for RigidBody {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.company.form.clone())
+    }
+
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        Some(self)
     }
 
     fn island_body(&mut self) -> Option<&mut dyn Any> {

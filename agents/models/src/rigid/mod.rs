@@ -27,6 +27,7 @@ mod leant;
 mod linear_spring;
 mod mass_properties;
 mod meeting;
+mod member;
 mod motion;
 mod orientation_spring;
 mod pair;

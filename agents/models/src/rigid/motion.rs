@@ -100,7 +100,7 @@ impl Motion {
     }
 
     /// Turns freely for `t` seconds; the angular momentum in world axes stays.
-    fn turn(&mut self, body: &MassDistribution, t: f64) {
+    pub(super) fn turn(&mut self, body: &MassDistribution, t: f64) {
         if self.angular == DVec3::ZERO {
             return;
         }

@@ -26,6 +26,7 @@ mod footing;
 mod history;
 mod horizon;
 mod inertia;
+mod member;
 mod method;
 mod publish;
 mod remesh;

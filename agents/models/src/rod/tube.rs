@@ -11,6 +11,7 @@ use super::contact::TubeContacts;
 use super::discretization;
 use super::discretization::Discretization;
 use super::horizon::owns_it;
+use super::member::Unknowns;
 use super::publish::bounds;
 use super::remesh::{MeshedRod, Remesher};
 use super::rest::RestDetector;
@@ -25,6 +26,7 @@ use metachron_contact::beside::has_a_say;
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
 use metachron_contact::smooth;
+use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ShapeKind, height_j_kg};
@@ -59,13 +61,15 @@ pub struct Tube {
     /// The length of the step that these predict, seconds; zero where they are those of the last one.
     pub(super) ahead_s: f64,
     pub(super) resolution: Resolution,
-    time: SimTime,
+    pub(super) time: SimTime,
     /// Own time at which its wave starts, seconds.
     wave_from_s: f64,
     pub(super) dt_s: f64,
     pub(super) steps: u64,
     /// Its recent support by fixed solids, and its last step length.
     pub(super) lately: Lately,
+    /// What it is in a contact cluster.
+    pub(super) unknowns: Unknowns,
 }
 
 /// The outer radius under `pressure_pa` inside: r + p r² (1 − ν/2)/(E t) (docs/theory/rod.md, eq. 33).
@@ -117,6 +121,7 @@ impl Tube {
             dt_s: 0.0,
             steps: 0,
             lately: Lately::default(),
+            unknowns: Unknowns::default(),
         };
         let held_ends = tube.matter.held.map(u8::from).iter().sum();
         let height_j_kg = height_j_kg(&tube.now.x, tube.spec.gravity, held_ends > 0);
@@ -285,18 +290,32 @@ impl Tube {
         }
     }
 
+    /// Whether its radius changes by itself.
+    fn has_wave(&self) -> bool {
+        self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0)
+    }
+
+    /// Whether it has been quiet for long enough after a step of `dt` seconds, as far as it can tell by itself.
+    pub(super) fn observe_rest(&mut self, dt: f64) -> bool {
+        self.spec.sleep && !self.has_wave() && self.rest.observe(&self.now, dt)
+    }
+
+    /// Stops it exactly: a sleeping tube must not drift on screen.
+    pub(super) fn stop(&mut self) {
+        self.now.u.fill(DVec3::ZERO);
+        self.now.kinetic_j = 0.0;
+    }
+
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
     fn update_rest(&mut self, dt: f64) -> bool {
-        let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
-        if !self.spec.sleep || wave || !self.ties.is_empty() || !self.stepper.company.is_calm() {
+        if !self.spec.sleep || self.has_wave() || !self.ties.is_empty() || !self.stepper.company.is_calm() {
             self.rest.wake();
             return false;
         }
         let at_rest = self.rest.observe(&self.now, dt);
         if at_rest {
             self.doubling.rest();
-            self.now.u.fill(DVec3::ZERO); // a sleeping tube must not drift on screen
-            self.now.kinetic_j = 0.0;
+            self.stop();
         }
         at_rest
     }
@@ -416,6 +435,10 @@ impl Agent for Tube {
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         self.publish(into);
+    }
+
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        Some(self)
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

@@ -9,6 +9,7 @@ use super::contact::Contacts;
 use super::fe_mesh::FeMesh;
 use super::footing::Footing;
 use super::foretold::Foretold;
+use super::member::Unknowns;
 use super::spec::{SoftError, SoftSpec};
 use super::step::EDGE_CHANGE_MAX;
 use super::step_doubling::Doubling;
@@ -19,6 +20,7 @@ use metachron_contact::beside;
 use metachron_contact::beside::has_a_say;
 use metachron_contact::crowd;
 use metachron_contact::crowd::Lately;
+use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, Neighbour, StepContext};
 use metachron_contact::{Knock, Law, Link};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
@@ -51,10 +53,12 @@ pub struct SoftBody {
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
     before: Vec<DVec3>,
-    quiet_s: f64,
+    pub(super) quiet_s: f64,
     pub(super) steps: u64,
     /// Its recent contact history.
     pub(super) lately: Lately,
+    /// What it is in a contact cluster.
+    pub(super) unknowns: Unknowns,
 }
 
 impl SoftBody {
@@ -95,6 +99,7 @@ impl SoftBody {
             quiet_s: 0.0,
             steps: 0,
             lately: Lately::default(),
+            unknowns: Unknowns::default(),
             spec,
         })
     }
@@ -209,6 +214,10 @@ impl Agent for SoftBody {
 
     /// The division of a soft body is fixed by its scene: nothing changes.
     fn set_resolution(&mut self, _wanted: Resolution) {}
+
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        Some(self)
+    }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.contacts.form.clone())

@@ -246,10 +246,9 @@ impl FeMesh {
     }
 
     /// The largest change of an edge within `h` seconds at these velocities, as a share of its rest length.
-    pub fn edge_change(&self, velocities: &[DVec3], h: f64) -> f64 {
+    pub fn edge_change(&self, velocity: impl Fn(u32) -> DVec3, h: f64) -> f64 {
         let share = |&[a, b]: &[u32; 2]| {
-            let [a, b] = [a as usize, b as usize];
-            velocities[a].distance(velocities[b]) * h / self.rest[a].distance(self.rest[b])
+            velocity(a).distance(velocity(b)) * h / self.rest[a as usize].distance(self.rest[b as usize])
         };
         self.edges.iter().map(share).fold(0.0, f64::max)
     }

@@ -18,6 +18,7 @@ mod grid;
 mod hexahedron;
 mod inertia;
 mod initial_overlap;
+mod member;
 mod membrane;
 mod publish;
 mod spec;

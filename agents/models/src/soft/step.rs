@@ -12,7 +12,7 @@ use metachron_core::foot::press;
 /// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
 pub(super) const EDGE_CHANGE_MAX: f64 = 0.3;
 /// The largest coordinate or speed accepted, metres or m/s: its square would soon overflow.
-const REACH_MAX: f64 = 1e9;
+pub(super) const REACH_MAX: f64 = 1e9;
 /// The most substeps of a step.
 pub(super) const SUBSTEPS_MAX: u32 = 16;
 
@@ -29,7 +29,7 @@ impl SoftBody {
             let h = dt / f64::from(parts);
             self.predict(h).map_err(|what| self.diverged(what, dt))?;
             self.solve_contacts(h);
-            if self.mesh.edge_change(&self.free, h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
+            if self.mesh.edge_change(|vertex| self.free[vertex as usize], h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
                 self.given.iter_mut().for_each(|given| *given *= 0.5); // the impulse acts evenly through the step
                 continue;
@@ -121,7 +121,7 @@ impl SoftBody {
         Ok(())
     }
 
-    fn diverged(&self, what: &str, dt_s: f64) -> StepError {
+    pub(super) fn diverged(&self, what: &str, dt_s: f64) -> StepError {
         StepError::Diverged { model: self.spec.shape.model(), dt_s, what: what.to_owned() }
     }
 }

@@ -3,6 +3,7 @@
 //! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
+use metachron_contact::cluster::Block;
 use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
@@ -13,6 +14,8 @@ pub(super) struct System {
     first: Vec<u32>,
     /// Force on each vertex at the start of the substep, N.
     pub forces: Vec<DVec3>,
+    /// The lower half of the matrix as blocks of moving vertices, as they were added.
+    blocks: Vec<Block>,
     /// h², s²: the factor of every stiffness.
     square: f64,
 }
@@ -34,7 +37,13 @@ impl System {
             rows.iter().zip(first).filter_map(|(row, first)| row.and(rows[*first as usize])).collect();
         let mut matrix = SkylineCholesky::default();
         matrix.shape(&first);
-        Self { matrix: Factor { matrix, rows }, first, forces: vec![DVec3::ZERO; held.len()], square: 0.0 }
+        Self {
+            matrix: Factor { matrix, rows },
+            first,
+            forces: vec![DVec3::ZERO; held.len()],
+            blocks: vec![],
+            square: 0.0,
+        }
     }
 
     /// Number of vertices.
@@ -46,6 +55,7 @@ impl System {
     pub fn begin(&mut self, h: f64) {
         // the factor overwrote the matrix in place, of the same shape
         self.matrix.matrix.clear();
+        self.blocks.clear();
         self.forces.fill(DVec3::ZERO);
         self.square = h * h;
     }
@@ -75,6 +85,7 @@ impl System {
     fn add(&mut self, i: usize, j: usize, block: DMat3) {
         let Factor { matrix, rows } = &mut self.matrix;
         if let (Some(row), Some(column)) = (rows[i], rows[j]) {
+            self.blocks.push(Block { row: row as usize, column: column as usize, value: block });
             matrix.add_block(
                 BlockIndex { row: row as usize, column: column as usize },
                 block.transpose().to_cols_array_2d(),
@@ -102,6 +113,16 @@ impl System {
         let Factor { matrix, rows } = &self.matrix;
         let trace = |row: u32| (0..3).map(|axis| matrix.diagonal(3 * row as usize + axis)).sum::<f64>();
         rows[vertex].map_or(0.0, |row| 3.0 / trace(row))
+    }
+
+    /// The lower half of the matrix, in blocks of moving vertices; entries with one place add up.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// The row of each vertex among those that move; none for held ones.
+    pub fn rows(&self) -> &[Option<u32>] {
+        &self.matrix.rows
     }
 
     /// Cost of a factorisation, multiplications.

@@ -1,0 +1,125 @@
+//! What a pair of bodies remembers from step to step: impulses, slip owed, and when the two were last near.
+//!
+//! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
+//! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
+
+use glam::DVec3;
+use metachron_core::{AgentId, SimTime};
+
+/// The other side of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Partner {
+    /// The body itself.
+    Own,
+    /// A static solid, by its number.
+    Static(u32),
+    /// Another agent.
+    Agent(AgentId),
+    /// The far end of a spring or joint, by the number of the spring among those of its body.
+    Tie(u32),
+}
+
+/// What a contact or a joint hands to the next step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Remembered {
+    /// The name of the place within its pair.
+    pub key: u64,
+    /// The impulse of one second at the rate of the last step: its mean force, world axes, N.
+    pub force_n: DVec3,
+    /// The slip owed, world axes, metres.
+    pub owed_slip_m: DVec3,
+}
+
+/// One pair, with its places by rising keys.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct PairMemory {
+    pub partner: Partner,
+    /// Until when the two count as near.
+    pub near_until: SimTime,
+    pub places: Vec<Remembered>,
+    /// Places of the step that is being made.
+    pub next: Vec<Remembered>,
+}
+
+/// All that one body remembers: pairs with higher numbers, static solids, itself.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ContactMemory {
+    pairs: Vec<PairMemory>,
+}
+
+impl ContactMemory {
+    /// The pair with `partner`, made where it is new.
+    pub(super) fn pair(&mut self, partner: Partner) -> &mut PairMemory {
+        let at = match self.pairs.binary_search_by_key(&partner, |pair| pair.partner) {
+            Ok(at) => at,
+            Err(at) => {
+                let pair = PairMemory { partner, near_until: SimTime::ZERO, places: Vec::new(), next: Vec::new() };
+                self.pairs.insert(at, pair);
+                at
+            }
+        };
+        &mut self.pairs[at]
+    }
+
+    /// What the place `key` of the pair with `partner` remembers; nothing of a new one.
+    pub(super) fn recall(&self, partner: Partner, key: u64) -> Remembered {
+        let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok().map(|at| &self.pairs[at]);
+        let place = pair.and_then(|pair| {
+            let at = pair.places.binary_search_by_key(&key, |place| place.key).ok()?;
+            Some(pair.places[at])
+        });
+        place.unwrap_or(Remembered { key, ..Remembered::default() })
+    }
+
+    /// Replaces the places of every pair by those noted since, and forgets pairs that have not been near at `now`.
+    pub(super) fn turn(&mut self, now: SimTime) {
+        for pair in &mut self.pairs {
+            std::mem::swap(&mut pair.places, &mut pair.next);
+            pair.next.clear();
+        }
+        self.pairs.retain(|pair| !pair.places.is_empty() || pair.near_until > now);
+    }
+
+    /// The agents of higher number that were near lately, at `now`.
+    pub fn near(&self, now: SimTime) -> impl Iterator<Item = AgentId> + '_ {
+        self.pairs.iter().filter_map(move |pair| match pair.partner {
+            Partner::Agent(id) if pair.near_until > now => Some(id),
+            _ => None,
+        })
+    }
+
+    /// Forgets all pairs, where the body was divided anew.
+    pub fn forget(&mut self) {
+        self.pairs.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_recalled_after_one_turn_and_forgotten_after_two() {
+        let mut memory = ContactMemory::default();
+        let (partner, now) = (Partner::Static(3), SimTime::ZERO);
+        let place = Remembered { key: 70_000, force_n: DVec3::Z, owed_slip_m: DVec3::X };
+        memory.pair(partner).next.push(place);
+        memory.turn(now);
+        assert_eq!(memory.recall(partner, 70_000), place);
+        assert_eq!(memory.recall(partner, 70_000 - 32_768).force_n, DVec3::ZERO, "another place of the same pair");
+        assert_eq!(memory.recall(Partner::Static(3 + 32_768), 70_000).force_n, DVec3::ZERO, "another pair");
+        memory.turn(now);
+        assert_eq!(memory.recall(partner, 70_000).force_n, DVec3::ZERO);
+        assert!(memory.pairs.is_empty());
+    }
+
+    #[test]
+    fn a_pair_that_was_near_counts_as_near_until_its_time_is_over() {
+        let mut memory = ContactMemory::default();
+        memory.pair(Partner::Agent(AgentId(40_000))).near_until = SimTime::from_nanos(2);
+        memory.turn(SimTime::from_nanos(1));
+        assert_eq!(memory.near(SimTime::from_nanos(1)).collect::<Vec<_>>(), [AgentId(40_000)]);
+        memory.turn(SimTime::from_nanos(2));
+        assert_eq!(memory.near(SimTime::from_nanos(2)).count(), 0);
+    }
+}

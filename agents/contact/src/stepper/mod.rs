@@ -1,0 +1,379 @@
+//! The steps of a contact cluster: bodies that touch or are joined advance together, each by steps of its own length.
+//!
+//! In: members at one common time, the static solids, what members remember of each other. Out: members a macro step later.
+//! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 7.
+//!
+//! plan      how many steps each member makes within the macro step
+//! begin     members whose step begins: matrix and velocities without contact
+//! seen      velocities with the impulses that each has been given since its step began
+//! search    places that may close, joints, springs
+//! solve     one problem for all
+//! end       members move; those whose step ends take its velocities
+
+mod member;
+mod memory;
+mod scene;
+mod search;
+mod springs;
+
+use crate::StepContext;
+use crate::cluster::{Member, Problem, ProblemError, Settings, Solver};
+use crate::law::Law;
+use glam::DVec3;
+pub use member::{ClusterMember, MaterialPoint, Role};
+use memory::Remembered;
+pub use memory::{ContactMemory, Partner};
+use metachron_core::{AgentId, Grip, SimSpan, StepError};
+pub use scene::ClusterScene;
+use search::Search;
+use springs::Springs;
+use std::f64::consts::SQRT_2;
+
+/// The most steps that a member makes within a macro step.
+const PARTS_MAX: u32 = 16;
+/// Two bodies belong together until they have not been near each other for this long, seconds.
+const PART_S: f64 = 0.2;
+
+/// A body in its cluster's step.
+pub struct Participant<'a> {
+    /// The agent's number.
+    pub id: AgentId,
+    /// The body.
+    pub member: &'a mut dyn ClusterMember,
+    /// What it sees at the start of the macro step.
+    pub context: StepContext<'a>,
+    /// What it remembers of others.
+    pub memory: &'a mut ContactMemory,
+    /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
+    pub parts: u32,
+    /// The forces of springs and grasps on it in the last fine step.
+    pub grips: &'a mut Vec<Grip>,
+}
+
+impl Participant<'_> {
+    /// Whether it touches `other` where the two meet.
+    fn may_touch(&self, other: AgentId) -> bool {
+        !self.context.neighbours.iter().any(|n| n.id == other && n.law == Law::Off)
+    }
+}
+
+/// What a macro step was.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClusterReport {
+    /// Fine steps that it was made in.
+    pub fine_steps: u32,
+    /// Contacts of the last fine step, those that bear nothing included.
+    pub contacts: u32,
+    /// Factors of the coupled matrix in all fine steps.
+    pub factors: u32,
+    /// Convex passes in all fine steps.
+    pub passes: u32,
+    /// Fine steps whose solve came to no end.
+    pub cut: u32,
+    /// The deepest overlap seen, metres.
+    pub depth_m: f64,
+    /// Work of all members, in the unit of [`metachron_core::StepReport::work`].
+    pub work: f64,
+}
+
+/// What a pair of bodies gave each other in a macro step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairTotal {
+    /// The participant of lower number, by its place in the list.
+    pub member: usize,
+    /// What it touched.
+    pub partner: Partner,
+    /// The impulse on the participant, world axes, N·s.
+    pub impulse_n_s: DVec3,
+    /// Places that bore something, counted in every fine step.
+    pub contacts: u32,
+    /// The deepest overlap, metres, ≥ 0.
+    pub depth_m: f64,
+}
+
+/// How far a member is in its own step (eq. 18–20).
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Progress {
+    /// Fine steps within its own step, and how many of them have begun.
+    share: u32,
+    part: u32,
+    /// Its velocities when its step began.
+    start: Vec<DVec3>,
+    /// What its step would have changed them by without contact.
+    gain: Vec<DVec3>,
+    /// What the impulses since have changed them by.
+    given: Vec<DVec3>,
+    /// v(p − 1): by which its place has moved so far.
+    before: Vec<DVec3>,
+    /// v̄(p): its velocities with what it has been given so far.
+    known: Vec<DVec3>,
+    /// û: the velocity at which its place moves in this fine step, without the impulses sought.
+    seen: Vec<DVec3>,
+    /// Whether anything has acted on it since its step began.
+    touched: bool,
+}
+
+/// Steps clusters one after the other, and keeps structure and storage between them.
+#[derive(Default)]
+pub struct ClusterStepper {
+    solver: Solver,
+    search: Search,
+    springs: Springs,
+    progress: Vec<Progress>,
+    members: Vec<Member<'static>>,
+    totals: Vec<PairTotal>,
+}
+
+impl ClusterStepper {
+    /// A stepper whose contacts rest `depth_m` metres deep.
+    #[must_use]
+    pub fn new(depth_m: f64) -> Self {
+        Self { solver: Solver::new(Settings { depth_m, ..Settings::default() }), ..Self::default() }
+    }
+
+    /// Advances `all`, by rising numbers and at one common time, by `dt`.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the state of a member stops being finite: those that had not ended their step are as they were.
+    pub fn step(
+        &mut self,
+        scene: &ClusterScene,
+        all: &mut [Participant<'_>],
+        dt: SimSpan,
+    ) -> Result<ClusterReport, StepError> {
+        let parts = all.iter().map(|one| one.parts).max().unwrap_or(1);
+        let h_s = dt.as_secs_f64() / f64::from(parts);
+        self.progress.resize_with(all.len(), Progress::default);
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            (state.share, state.part) = (parts / one.parts, 0);
+            one.grips.clear();
+        }
+        self.totals.clear();
+        let mut report = ClusterReport { fine_steps: parts, ..ClusterReport::default() };
+        for fine in 0..parts {
+            self.begin(all, h_s, &mut report)?;
+            self.search.find(scene, all, &self.progress, h_s);
+            self.springs.gather(all, h_s, f64::from(fine) * h_s);
+            self.recall(all, h_s);
+            self.solve(all, h_s, &mut report)?;
+            self.remember(all, h_s, fine + 1 == parts, dt);
+            self.end(all, h_s)?;
+        }
+        Ok(report)
+    }
+
+    /// What pairs gave each other in the last macro step, by participants and partners.
+    pub fn totals(&self) -> &[PairTotal] {
+        &self.totals
+    }
+
+    /// Pairs of participants of the last step that are near each other, by their places in its list.
+    pub fn near(&self) -> &[[usize; 2]] {
+        &self.search.near
+    }
+
+    /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 18).
+    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            if state.part == 0 {
+                one.member.begin(h_s * f64::from(state.share))?;
+                report.work += one.member.work();
+                state.start(one.member.velocities(), one.member.free());
+            }
+            state.part += 1;
+            state.look();
+        }
+        Ok(())
+    }
+
+    /// Starts every contact from what the last step gave.
+    fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
+        for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
+            let place = all[owner.member].memory.recall(owner.partner, owner.key);
+            (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
+        }
+    }
+
+    /// Solves the problem of a fine step, and gives every member its impulses (eq. 19).
+    fn solve(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        let Self { solver, search, springs, progress, members, .. } = self;
+        let mut list = emptied(std::mem::take(members));
+        list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
+            blocks: one.member.blocks(),
+            free: &state.seen,
+            share: f64::from(state.part),
+        }));
+        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows };
+        let outcome = solver.solve(&problem);
+        *members = emptied(list);
+        let solution = outcome.map_err(|error| refused(&error, h_s))?;
+        for (member, state) in progress.iter_mut().enumerate() {
+            state.take(solution.velocities(member));
+        }
+        let pushed = |impulse: &DVec3| *impulse != DVec3::ZERO;
+        for (owner, _) in search.owners.iter().zip(&solution.contacts_n_s).filter(|(_, impulse)| pushed(impulse)) {
+            progress[owner.member].touched = true;
+            owner.other.into_iter().for_each(|other| progress[other].touched = true);
+        }
+        for row in &springs.rows {
+            let moving = row.sides.iter().filter(|side| !side.terms().is_empty());
+            moving.for_each(|side| progress[side.member].touched = true);
+        }
+        report.contacts = search.contacts.len() as u32;
+        report.factors += solution.report.factors as u32;
+        report.passes += solution.report.passes as u32;
+        report.cut += u32::from(solution.report.cut);
+        report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
+        Ok(())
+    }
+
+    /// Notes what the next step starts from.
+    fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+        let Self { solver, search, springs, .. } = self;
+        let solution = solver.solution();
+        for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
+            let impulse = solution.contacts_n_s[k];
+            let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
+            let place = Remembered { key: owner.key, force_n: impulse / h_s, owed_slip_m };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+            if impulse != DVec3::ZERO {
+                add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);
+            }
+        }
+        for (owner, impulse) in springs.owners.iter().zip(&solution.rows_n_s) {
+            let place = Remembered { key: 0, force_n: *impulse / h_s, owed_slip_m: DVec3::ZERO };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+        }
+        let part = SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
+        for &[a, b] in &search.near {
+            let until = all[a].context.time + dt + part;
+            let partner = Partner::Agent(all[b].id);
+            all[a].memory.pair(partner).near_until = until;
+        }
+        for (member, one) in all.iter_mut().enumerate() {
+            one.memory.turn(one.context.time + dt);
+            if last {
+                springs.grips(member, &solution.rows_n_s, h_s, one.grips);
+            }
+        }
+    }
+
+    /// Moves all members; the step of some ends (eq. 20).
+    fn end(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            let since_s = h_s * f64::from(state.part);
+            if state.part < state.share {
+                one.member.move_to(&state.before, since_s);
+            } else {
+                one.member.end(&state.before, since_s, state.touched)?;
+                state.part = 0;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Progress {
+    /// Begins a step from velocities `now` that would be `free` at its end.
+    fn start(&mut self, now: &[DVec3], free: &[DVec3]) {
+        self.start.clear();
+        self.start.extend_from_slice(now);
+        self.gain.clear();
+        self.gain.extend(free.iter().zip(now).map(|(free, now)| *free - *now));
+        self.given.clear();
+        self.given.resize(now.len(), DVec3::ZERO);
+        self.before.clone_from(&self.start);
+        self.touched = false;
+    }
+
+    /// Finds v̄(p) and û of the fine step that begins (eq. 18).
+    fn look(&mut self) {
+        let Self { share, part, start, gain, given, before, known, seen, .. } = self;
+        let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
+        known.clear();
+        known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
+        seen.clear();
+        seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
+    }
+
+    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 19).
+    fn take(&mut self, moved: &[DVec3]) {
+        let p = f64::from(self.part);
+        for (at, moved) in moved.iter().enumerate() {
+            let change = (*moved - self.seen[at]) / p;
+            self.given[at] += change;
+            self.before[at] = self.known[at] + change;
+        }
+    }
+}
+
+/// How many steps of its own each of some bodies makes within a macro step, and how long that is, seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// The macro step, seconds.
+    pub macro_s: f64,
+    /// Steps of what bends and wants the longest ones are this long, seconds.
+    pub longest_s: f64,
+    /// The most steps that a member makes.
+    pub parts: u32,
+}
+
+impl Plan {
+    /// The plan for members with these roles and wanted steps, seconds (eq. 17a).
+    #[must_use]
+    pub fn of(members: impl Iterator<Item = (Role, f64)> + Clone) -> Self {
+        let bent = members.clone().filter(|(role, _)| *role == Role::Deformable).map(|(_, wanted_s)| wanted_s);
+        let all = members.clone().map(|(_, wanted_s)| wanted_s);
+        let longest_s = bent.reduce(f64::max).or_else(|| all.reduce(f64::max)).unwrap_or(1.0);
+        let mut plan = Self { macro_s: f64::INFINITY, longest_s, parts: 1 };
+        for (_, wanted_s) in members {
+            let parts = plan.parts_of(wanted_s);
+            plan.parts = plan.parts.max(parts);
+            plan.macro_s = plan.macro_s.min(f64::from(parts) * wanted_s);
+        }
+        plan
+    }
+
+    /// How many steps a member that bends makes.
+    #[must_use]
+    pub fn parts_of(&self, wanted_s: f64) -> u32 {
+        let ratio = self.longest_s / wanted_s;
+        let mut parts = 1;
+        // the nearest power of two, by ratios
+        while parts < PARTS_MAX && ratio > f64::from(parts) * SQRT_2 {
+            parts *= 2;
+        }
+        parts
+    }
+
+    /// How many steps a member of this role makes.
+    #[must_use]
+    pub fn parts_in(&self, role: Role, wanted_s: f64) -> u32 {
+        if role == Role::Deformable { self.parts_of(wanted_s) } else { self.parts }
+    }
+}
+
+/// Adds a contact's impulse to the total of its pair.
+fn add_up(totals: &mut Vec<PairTotal>, member: usize, partner: Partner, impulse_n_s: DVec3, depth_m: f64) {
+    let order = |total: &PairTotal| (total.member, total.partner);
+    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
+        let none = PairTotal { member, partner, impulse_n_s: DVec3::ZERO, contacts: 0, depth_m: 0.0 };
+        totals.insert(at, none);
+        at
+    });
+    let total = &mut totals[at];
+    total.impulse_n_s += impulse_n_s;
+    total.depth_m = total.depth_m.max(depth_m);
+    total.contacts += 1;
+}
+
+fn refused(error: &ProblemError, dt_s: f64) -> StepError {
+    StepError::Diverged { model: "cluster", dt_s, what: error.to_string() }
+}
+
+/// The storage of `members` for other ones.
+fn emptied<'b>(mut members: Vec<Member<'_>>) -> Vec<Member<'b>> {
+    members.clear();
+    // nothing is left to be mapped; the standard library collects in place, so that the storage stays
+    members.into_iter().map(|_| unreachable!("cleared above")).collect()
+}

@@ -1,0 +1,142 @@
+//! A rigid body in a contact cluster: two blocks, the velocity of its centre of mass and its spin.
+//!
+//! In: steps and velocities. Out: its inertia, its free flight, its skin. Never here: contacts. Theory: docs/theory/clusters.md, section 7.
+
+use super::RigidBody;
+use super::company::placed;
+use super::motion::Motion;
+use glam::{DMat3, DVec3};
+use metachron_contact::cluster::{Block, Side};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_core::{Anchor, StepError};
+use metachron_geometry::{ContactSide, Place, PlacedShape};
+
+/// Its unknowns in a cluster.
+#[derive(Debug, Clone)]
+pub(super) struct Unknowns {
+    blocks: [Block; 2],
+    /// Velocity and spin at the end of the step without contact, and now.
+    free: [DVec3; 2],
+    now: [DVec3; 2],
+}
+
+impl Default for Unknowns {
+    fn default() -> Self {
+        let block = |at| Block { row: at, column: at, value: DMat3::IDENTITY };
+        Self { blocks: [block(0), block(1)], free: [DVec3::ZERO; 2], now: [DVec3::ZERO; 2] }
+    }
+}
+
+impl RigidBody {
+    /// The inertia tensor in world axes, kg·m².
+    fn inertia(&self) -> DMat3 {
+        let to_world = DMat3::from_quat(self.motion.rotation * self.spread.axes);
+        to_world * DMat3::from_diagonal(self.spread.moments) * to_world.transpose()
+    }
+
+    fn diverged(&self, dt_s: f64, what: &str) -> StepError {
+        StepError::Diverged { model: "rigid", dt_s, what: what.to_owned() }
+    }
+}
+
+impl ClusterMember for RigidBody {
+    fn role(&self) -> Role {
+        Role::Rigid
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        let mut flight = self.motion;
+        flight.fly(&self.spread, self.gravity, h_s);
+        let inertia = self.inertia();
+        let Unknowns { blocks, free, now } = &mut self.unknowns;
+        *now = [self.motion.velocity, self.motion.spin(&self.spread)];
+        *free = [flight.velocity, flight.spin(&self.spread)];
+        blocks[0].value = DMat3::from_diagonal(DVec3::splat(self.spread.mass_kg));
+        blocks[1].value = inertia;
+        if flight.is_sane(&self.spread) {
+            Ok(())
+        } else {
+            Err(self.diverged(h_s, "the body left the coordinate range"))
+        }
+    }
+
+    fn blocks(&self) -> &[Block] {
+        &self.unknowns.blocks
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &self.unknowns.free
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &self.unknowns.now
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        Some(placed(&self.company.form, &self.motion))
+    }
+
+    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
+        match *place {
+            Place::Point(point) => Side::rigid(0, point - self.motion.position),
+            Place::Chain { .. } | Place::Surface { .. } => Side::FIXED,
+        }
+    }
+
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        let arm = self.motion.rotation * local;
+        Some(MaterialPoint { position: self.motion.position + arm, side: Side::rigid(0, arm) })
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        v[0].length() + v[1].length() * self.world.mover.radius_m
+    }
+
+    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
+        // its steps are the shortest of its cluster: it is never within one
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
+        let before = self.motion;
+        if touched {
+            let turned = self.motion.inertia_times(&self.spread, v[1] - self.unknowns.free[1]);
+            self.motion.angular += turned;
+            self.motion.velocity = v[0];
+            self.motion.position += v[0] * h_s;
+            self.motion.turn(&self.spread, h_s);
+        } else {
+            self.motion.fly(&self.spread, self.gravity, h_s);
+        }
+        if !self.motion.is_sane(&self.spread) {
+            self.motion = before;
+            return Err(self.diverged(h_s, "the body left the coordinate range"));
+        }
+        self.steps += 1;
+        self.at_rest = false;
+        self.count_calm(&before, h_s, touched);
+        self.world.moved();
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        self.may_sleep && self.calm_s >= super::body::REST_S
+    }
+
+    fn rest(&mut self) {
+        self.at_rest = true;
+        (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
+        self.world.moved();
+    }
+}
+
+impl RigidBody {
+    /// Counts calm time after a step from `before`.
+    fn count_calm(&mut self, before: &Motion, h_s: f64, touched: bool) {
+        let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
+        let still = self.motion.velocity.length() + swing < super::body::CALM_M_S;
+        // one that hovers at the top of its flight is not at rest
+        let held = touched || (self.gravity == DVec3::ZERO && *before == self.motion);
+        self.calm_s = if still && held { self.calm_s + h_s } else { 0.0 };
+    }
+}

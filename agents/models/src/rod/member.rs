@@ -1,0 +1,190 @@
+//! A tube in a contact cluster: blocks for nodes and spins in turn, as in its own system.
+//!
+//! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
+//! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 7.
+
+use super::banded_ldl::Row;
+use super::step::{Divergence, Setting, TURN_MAX_RAD};
+use super::system::{Iterate, SubstepProblem, assemble};
+use super::tube::Tube;
+use glam::{DMat3, DVec3};
+use metachron_contact::cluster::{Block, Side, SideTerm};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_core::{Anchor, SimSpan, StepError};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+
+/// Its unknowns in a cluster: one for each slot.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Unknowns {
+    blocks: Vec<Block>,
+    free: Vec<DVec3>,
+    /// Positions of its nodes where its skin is now, and the radius there, metres.
+    places: Vec<DVec3>,
+    radii_m: Vec<f64>,
+    quiet_before: bool,
+}
+
+impl Tube {
+    /// Whether the node at this slot is held in place.
+    fn is_held(&self, slot: usize) -> bool {
+        (slot == 0 && self.matter.held[0]) || (slot + 1 == self.now.u.len() && self.matter.held[1])
+    }
+
+    /// The side of a point a share along a segment, `radius` from the centre line (a vector, metres).
+    fn point_side(&self, segment: usize, share: f64, radius: DVec3) -> Side {
+        let mut terms = [SideTerm::weighted(0, 0.0); 3];
+        let mut count = 0;
+        for (slot, weight) in [(2 * segment, 1.0 - share), (2 * segment + 2, share)] {
+            if weight != 0.0 && !self.is_held(slot) {
+                terms[count] = SideTerm::weighted(slot, weight);
+                count += 1;
+            }
+        }
+        if radius != DVec3::ZERO {
+            terms[count] = SideTerm::spin(2 * segment + 1, radius);
+            count += 1;
+        }
+        Side::new(0, &terms[..count]).unwrap_or(Side::FIXED)
+    }
+}
+
+impl ClusterMember for Tube {
+    fn role(&self) -> Role {
+        Role::Deformable
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        self.dt_s = h_s;
+        let solved = self.step_by(h_s, |stepper, now, setting, _| {
+            let problem = whole_step(setting, h_s);
+            assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut stepper.rows, &mut stepper.rhs);
+            stepper.factor.factor(&stepper.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
+            stepper.factor.solve(&mut stepper.rhs);
+            Ok(())
+        });
+        solved.map_err(|divergence| self.diverged(divergence, h_s))?;
+        let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        let mut unknowns = std::mem::take(&mut self.unknowns);
+        unknowns.take(&self.stepper.rows, &self.stepper.rhs, &self.now.x);
+        unknowns.radii_m.clear();
+        unknowns.radii_m.extend(self.division.arc_m.iter().map(|&arc_m| self.radius_at_time_m(arc_m, then)));
+        self.unknowns = unknowns;
+        Ok(())
+    }
+
+    fn blocks(&self) -> &[Block] {
+        &self.unknowns.blocks
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &self.unknowns.free
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &self.now.u
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        let Unknowns { places, radii_m, .. } = &self.unknowns;
+        let form = self.stepper.company.form()?;
+        (!places.is_empty()).then(|| PlacedShape { form, view: ShapePose::Chain { positions: places, radii_m } })
+    }
+
+    fn side(&self, place: &Place, contact: ContactSide) -> Side {
+        match *place {
+            Place::Chain { segment, share, radius_m } => {
+                self.point_side(segment as usize, share, contact.outward * radius_m)
+            }
+            Place::Point(_) | Place::Surface { .. } => Side::FIXED,
+        }
+    }
+
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Arc(arc_m) = anchor else { return None };
+        let (segment, share) = self.division.locate(arc_m);
+        let places = &self.unknowns.places;
+        let position = places.get(segment)?.lerp(*places.get(segment + 1)?, share);
+        Some(MaterialPoint { position, side: self.point_side(segment, share, DVec3::ZERO) })
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let nodes = v.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
+        nodes + spins * self.widest_m()
+    }
+
+    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
+        spins * h_s / TURN_MAX_RAD
+    }
+
+    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
+        let Self { unknowns, now, .. } = self;
+        for ((place, x), v) in unknowns.places.iter_mut().zip(&now.x).zip(v.iter().step_by(2)) {
+            *place = *x + *v * t_s;
+        }
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        let finite = self.step_by(h_s, |stepper, now, setting, _| {
+            stepper.rhs.clear();
+            stepper.rhs.extend_from_slice(v);
+            stepper.advance(now, &whole_step(setting, h_s), true);
+            let finite = stepper.next.is_finite();
+            if finite {
+                std::mem::swap(now, &mut stepper.next);
+            }
+            finite
+        });
+        if !finite {
+            return Err(self.diverged(Divergence { slot: None }, h_s));
+        }
+        self.unknowns.places.clone_from(&self.now.x);
+        self.time = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        self.unknowns.quiet_before = self.observe_rest(h_s);
+        self.at_rest = false;
+        self.steps += 1;
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        self.unknowns.quiet_before
+    }
+
+    fn rest(&mut self) {
+        self.at_rest = true;
+        self.stop();
+    }
+
+    fn work(&self) -> f64 {
+        self.division.segments() as f64
+    }
+}
+
+/// A step of `h_s` seconds in one piece. Springs on the tube are rows of the cluster's problem.
+fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
+    let Setting { matter, division, springs, integrator, .. } = *setting;
+    SubstepProblem { matter, division, springs, ties: &[], h: h_s, until: h_s, integrator }
+}
+
+impl Unknowns {
+    /// Takes over a system with its solution, and the places of the nodes.
+    fn take(&mut self, rows: &[Row], free: &[DVec3], places: &[DVec3]) {
+        self.blocks.clear();
+        for (row, numbers) in rows.iter().enumerate() {
+            let Row { diag, near, far } = *numbers;
+            let mut add = |back: usize, value: DMat3| {
+                if back <= row && value != DMat3::ZERO {
+                    self.blocks.push(Block { row, column: row - back, value });
+                }
+            };
+            add(0, diag.full());
+            add(1, near);
+            add(2, far.full());
+        }
+        self.free.clear();
+        self.free.extend_from_slice(free);
+        self.places.clear();
+        self.places.extend_from_slice(places);
+    }
+}

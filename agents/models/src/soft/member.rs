@@ -1,0 +1,143 @@
+//! A soft body in a contact cluster: one block for each vertex that is not held.
+//!
+//! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
+//! Theory: docs/theory/soft.md, eq. 1–4; docs/theory/clusters.md, section 7.
+
+use super::body::SoftBody;
+use super::step::EDGE_CHANGE_MAX;
+use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
+use glam::DVec3;
+use metachron_contact::cluster::{Block, Side, SideTerm};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_core::{Anchor, StepError};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+
+/// Its unknowns in a cluster: those of the moving vertices.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Unknowns {
+    free: Vec<DVec3>,
+    now: Vec<DVec3>,
+    /// Positions at the start of the step begun, of all vertices.
+    start: Vec<DVec3>,
+}
+
+impl SoftBody {
+    /// Adds to each moving vertex of `to` the matching one of `v` times `factor`.
+    fn add_moving(&mut self, v: &[DVec3], factor: f64) {
+        let Self { system, positions, .. } = self;
+        for (position, row) in positions.iter_mut().zip(system.rows()) {
+            if let Some(row) = *row {
+                *position += v[row as usize] * factor;
+            }
+        }
+    }
+
+    /// The side of a point of some vertices with shares.
+    fn shared_side(&self, vertices: [u32; 3], shares: [f64; 3]) -> Side {
+        let rows = self.system.rows();
+        let mut terms = [SideTerm::weighted(0, 0.0); 3];
+        let mut count = 0;
+        for (vertex, share) in vertices.into_iter().zip(shares) {
+            if let (Some(row), true) = (rows[vertex as usize], share != 0.0) {
+                terms[count] = SideTerm::weighted(row as usize, share);
+                count += 1;
+            }
+        }
+        Side::new(0, &terms[..count]).unwrap_or(Side::FIXED)
+    }
+}
+
+impl ClusterMember for SoftBody {
+    fn role(&self) -> Role {
+        Role::Deformable
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        self.ties.clear();
+        self.given.clear();
+        self.predict(h_s).map_err(|what| self.diverged(what, h_s))?;
+        let Self { system, free, velocities, positions, unknowns, .. } = self;
+        let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
+            into.clear();
+            into.extend(system.rows().iter().zip(list).filter_map(|(row, v)| row.map(|_| *v)));
+        };
+        moving(free, &mut unknowns.free);
+        moving(velocities, &mut unknowns.now);
+        unknowns.start.clone_from(positions);
+        Ok(())
+    }
+
+    fn blocks(&self) -> &[Block] {
+        self.system.blocks()
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &self.unknowns.free
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &self.unknowns.now
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) })
+    }
+
+    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
+        match *place {
+            Place::Surface { vertices, shares } => self.shared_side(vertices, shares),
+            Place::Point(_) | Place::Chain { .. } => Side::FIXED,
+        }
+    }
+
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Vertex(vertex) = anchor else { return None };
+        let position = *self.positions.get(vertex as usize)?;
+        Some(MaterialPoint { position, side: self.shared_side([vertex; 3], [1.0, 0.0, 0.0]) })
+    }
+
+    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let rows = self.system.rows();
+        let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);
+        self.mesh.edge_change(of, h_s) / EDGE_CHANGE_MAX
+    }
+
+    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
+        self.positions.clone_from(&self.unknowns.start);
+        self.add_moving(v, t_s);
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        self.move_to(v, h_s);
+        let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
+        if !finite {
+            self.positions.clone_from(&self.unknowns.start);
+            return Err(self.diverged("a vertex left the coordinate range", h_s));
+        }
+        let Self { system, velocities, unknowns, .. } = self;
+        for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
+            *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
+        }
+        let quiet = v
+            .iter()
+            .zip(&unknowns.now)
+            .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
+        self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
+        self.at_rest = false;
+        self.steps += 1;
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        self.spec.sleep && self.quiet_s >= QUIET_S
+    }
+
+    fn rest(&mut self) {
+        self.at_rest = true;
+        self.velocities.fill(DVec3::ZERO);
+    }
+
+    fn work(&self) -> f64 {
+        SoftBody::work(self)
+    }
+}

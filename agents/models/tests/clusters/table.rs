@@ -1,0 +1,182 @@
+//! A table on which bodies are put and stepped as one cluster, and what is measured of them.
+
+use glam::DVec3;
+use metachron_contact::stepper::{
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
+};
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Obstacle, Solid};
+
+/// Gravity, m/s².
+pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+
+/// A body on the table.
+pub struct Placed {
+    pub agent: Box<dyn Agent>,
+    pub rate_hz: f64,
+    /// Whether a part of it is held in place.
+    pub held: bool,
+    memory: ContactMemory,
+    grips: Vec<metachron_core::Grip>,
+}
+
+/// Bodies on a floor at z = 0.
+pub struct Table {
+    pub bodies: Vec<Placed>,
+    pub time: SimTime,
+    scene: ClusterScene,
+    stepper: ClusterStepper,
+    snapshot: Snapshot,
+}
+
+/// What a run showed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Findings {
+    /// The deepest overlap before and within the last half second, metres.
+    pub landing_m: f64,
+    pub rest_m: f64,
+    /// The energy above its running minimum, J.
+    pub gain_j: f64,
+    /// What the floor, or what is held, bears in the last half second, in weights of all that is free.
+    pub weight: f64,
+    pub steps: u32,
+    pub factors: u32,
+    pub cut: u32,
+    /// The most contacts of a step.
+    pub contacts: u32,
+    /// The highest place of any centre of mass at the end, and the lowest, metres.
+    pub highest_m: f64,
+    pub lowest_m: f64,
+    /// Factors of the last half second for each fine step.
+    pub factors_at_rest: f64,
+}
+
+/// A body with its rate.
+pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
+    Placed { agent: Box::new(agent), rate_hz: 60.0, held, memory: ContactMemory::default(), grips: vec![] }
+}
+
+impl Table {
+    pub fn new(bodies: Vec<Placed>) -> Self {
+        let floor = Obstacle {
+            name: "floor".into(),
+            solid: Solid::Plane,
+            position: DVec3::ZERO,
+            rotation: glam::DQuat::IDENTITY,
+            friction: 0.5,
+            restitution: 0.0,
+        };
+        Self::among(bodies, &[floor])
+    }
+
+    pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
+        let scene = ClusterScene::new(obstacles).unwrap();
+        Self { bodies, time: SimTime::ZERO, scene, stepper: ClusterStepper::new(20e-6), snapshot: Snapshot::default() }
+    }
+
+    /// Gives the lowest body one rate and all others another.
+    pub fn at_rates(mut self, lowest_hz: f64, others_hz: f64) -> Self {
+        for (at, body) in self.bodies.iter_mut().enumerate() {
+            body.rate_hz = if at == 0 { lowest_hz } else { others_hz };
+        }
+        self
+    }
+
+    /// Makes one macro step; how long it was, seconds.
+    pub fn step(&mut self) -> (ClusterReport, f64) {
+        let mut wishes = vec![];
+        for body in &mut self.bodies {
+            wishes.push((body.agent.member().unwrap().role(), 1.0 / body.rate_hz));
+        }
+        let plan = Plan::of(wishes.iter().copied());
+        let dt = SimSpan::from_secs_f64(plan.macro_s).unwrap();
+        let mut all = vec![];
+        for ((id, body), (role, wanted_s)) in (0..).zip(&mut self.bodies).zip(wishes) {
+            let Placed { agent, memory, grips, .. } = body;
+            let context = StepContext::alone(AgentId(id), self.time);
+            let member = agent.member().unwrap();
+            let parts = plan.parts_in(role, wanted_s);
+            all.push(Participant { id: AgentId(id), member, context, memory, parts, grips });
+        }
+        let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
+        self.time = self.time + dt;
+        (report, dt.as_secs_f64())
+    }
+
+    pub fn energy_j(&mut self) -> f64 {
+        let Self { bodies, snapshot, .. } = self;
+        let of = |body: &Placed| {
+            body.agent.write_snapshot(snapshot);
+            snapshot.energy_j
+        };
+        bodies.iter().map(of).collect::<Vec<_>>().iter().sum()
+    }
+
+    /// Position and velocity of the middle of a body.
+    pub fn middle(&mut self, body: usize) -> (DVec3, DVec3) {
+        self.bodies[body].agent.write_snapshot(&mut self.snapshot);
+        use metachron_core::Body;
+        let mean = |list: &[DVec3]| list.iter().sum::<DVec3>() / list.len() as f64;
+        match &self.snapshot.body {
+            Body::Rigid(state) => (state.position, state.velocity),
+            Body::Soft(soft) => (mean(&soft.positions), mean(&soft.velocities)),
+            Body::Curve(curve) => (mean(&curve.positions), mean(&curve.velocities)),
+            _ => (DVec3::ZERO, DVec3::ZERO),
+        }
+    }
+
+    /// The upward impulse of the last macro step by the floor, or by what is held.
+    fn borne_n_s(&self) -> f64 {
+        let holds = self.bodies.iter().any(|body| body.held);
+        let of = |total: &metachron_contact::stepper::PairTotal| {
+            let mine = total.impulse_n_s.z;
+            match total.partner {
+                Partner::Static(_) if !holds => mine,
+                Partner::Agent(other) if holds => {
+                    match (self.bodies[total.member].held, self.bodies[other.0 as usize].held) {
+                        (true, false) => -mine,
+                        (false, true) => mine,
+                        _ => 0.0,
+                    }
+                }
+                _ => 0.0,
+            }
+        };
+        self.stepper.totals().iter().map(of).sum()
+    }
+
+    /// Plays for some seconds.
+    pub fn play(&mut self, seconds: f64) -> Findings {
+        let mut findings = Findings::default();
+        let mut least_j = self.energy_j();
+        let (mut borne_n_s, mut last_s, mut last_factors, mut last_steps) = (0.0, 0.0, 0, 0);
+        while self.time.as_secs_f64() < seconds {
+            let rests = self.time.as_secs_f64() > seconds - 0.5;
+            let (report, dt_s) = self.step();
+            let energy_j = self.energy_j();
+            findings.gain_j = findings.gain_j.max(energy_j - least_j);
+            least_j = least_j.min(energy_j);
+            findings.steps += report.fine_steps;
+            findings.factors += report.factors;
+            findings.cut += report.cut;
+            findings.contacts = findings.contacts.max(report.contacts);
+            if rests {
+                findings.rest_m = findings.rest_m.max(report.depth_m);
+                borne_n_s += self.borne_n_s();
+                last_s += dt_s;
+                last_factors += report.factors;
+                last_steps += report.fine_steps;
+            } else {
+                findings.landing_m = findings.landing_m.max(report.depth_m);
+            }
+        }
+        let free_kg: f64 = self.bodies.iter().filter(|body| !body.held).map(|body| body.agent.mass_kg()).sum();
+        findings.weight = borne_n_s / (last_s * free_kg * -GRAVITY.z);
+        findings.factors_at_rest = f64::from(last_factors) / f64::from(last_steps);
+        let heights: Vec<f64> = (0..self.bodies.len()).map(|body| self.middle(body).0.z).collect();
+        findings.highest_m = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        findings.lowest_m = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        findings
+    }
+}
