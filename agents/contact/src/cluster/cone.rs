@@ -1,4 +1,4 @@
-//! Projections on Coulomb's disc, on the friction cone and on a ball, with their slopes.
+//! Projections on Coulomb's disc, on the friction cone, on a ball and on an interval, with their slopes.
 //!
 //! In: an impulse in the frame of a contact (x along the normal). Out: the nearest allowed one, and how it changes with the first.
 //! Never here: velocities, compliance. Theory: `docs/theory/clusters.md`, eq. 7.
@@ -13,12 +13,17 @@ pub(super) enum Law {
         /// The coefficient μ.
         friction: f64,
     },
-    /// All.
-    Free,
     /// All up to a length.
     Bounded {
-        /// The length, N·s.
+        /// The length, N·s; infinite for all.
         limit: f64,
+    },
+    /// Those along the first axis between two bounds.
+    Between {
+        /// The least, ≤ 0.
+        low: f64,
+        /// The most, ≥ 0.
+        high: f64,
     },
     /// None: nothing that the row touches moves.
     Idle,
@@ -51,8 +56,12 @@ impl Law {
         match (*self, form) {
             (Self::Coulomb { friction }, Form::Disc) => disc(friction, z),
             (Self::Coulomb { friction }, Form::Cone) => cone(friction, z),
-            (Self::Free, _) => Projection::whole(z),
             (Self::Bounded { limit }, _) => ball(limit, z),
+            (Self::Between { low, high }, _) => Projection {
+                value: DVec3::X * z.x.clamp(low, high),
+                axes: DMat3::IDENTITY,
+                slopes: if z.x >= low && z.x <= high { DVec3::X } else { DVec3::ZERO },
+            },
             (Self::Idle, _) => Projection::NONE,
         }
     }

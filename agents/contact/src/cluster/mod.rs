@@ -1,6 +1,6 @@
 //! Contact clusters: one frictional contact problem over all bodies that touch, solved to its end in every step.
 //!
-//! In: members (a matrix, free velocities), contacts and bilateral rows as plain data ([`Problem`]). Out: impulses, velocities and a
+//! In: members (a matrix, free velocities), contacts and rows of joints as plain data ([`Problem`]). Out: impulses, velocities and a
 //! report ([`Solution`]). Never here: search for contacts, clocks, models. Theory: `docs/theory/clusters.md`. No agent uses it yet.
 //!
 //! ```
@@ -23,12 +23,16 @@
 //!     tangents: [DVec3::X, DVec3::Y],
 //!     gap_m: 0.0,
 //!     friction: 0.3,
+//!     restitution: 0.0,
+//!     approach_m_s: 0.0,
+//!     surface_m_s: DVec3::ZERO,
 //!     owed_slip_m: DVec3::ZERO,
 //!     warm_n_s: DVec3::ZERO,
 //! };
 //! let contacts = [corner(0, -0.1, -0.1), corner(1, 0.1, -0.1), corner(2, -0.1, 0.1), corner(3, 0.1, 0.1)];
 //! let mut solver = Solver::default();
-//! let solution = solver.solve(&Problem { h_s, members: &members, contacts: &contacts, rows: &[] })?;
+//! let (members, rebound_from_m_s) = (&members, 9.81 * h_s);
+//! let solution = solver.solve(&Problem { h_s, members, contacts: &contacts, rows: &[], rebound_from_m_s })?;
 //!
 //! let given: DVec3 = solution.contacts_n_s.iter().sum();
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
@@ -44,11 +48,13 @@ mod error;
 mod factor;
 mod gradients;
 mod iterate;
+mod joint;
 mod members;
 mod newton;
 mod order;
 mod passivity;
 mod problem;
+mod rebound;
 mod rows;
 mod scale;
 mod side;
@@ -57,7 +63,8 @@ mod system;
 mod validate;
 
 pub use error::ProblemError;
-pub use problem::{BilateralRow, Block, Contact, Member, Problem, Spring};
+pub use joint::{Hold, JointRow, Spring};
+pub use problem::{Block, Contact, Member, Problem};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};
 pub use system::StepForm;

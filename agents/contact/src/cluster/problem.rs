@@ -1,8 +1,9 @@
 //! One frictional contact problem over several bodies, as plain data.
 //!
-//! In: what members, contacts and joints are at the start of a step. Out: the same with names. Never here: search for contacts,
-//! state between steps, the solve. Theory: `docs/theory/clusters.md`, section 2.
+//! In: what members and contacts are at the start of a step. Out: the same with names. Never here: joints (`joint.rs`), search for
+//! contacts, state between steps, the solve. Theory: `docs/theory/clusters.md`, section 2.
 
+use super::joint::JointRow;
 use super::side::Side;
 use crate::contact::push_out_m_s;
 use glam::{DMat3, DVec3};
@@ -49,38 +50,18 @@ pub struct Contact {
     pub gap_m: f64,
     /// Coulomb's coefficient μ ≥ 0.
     pub friction: f64,
+    /// Newton's coefficient of restitution e, 0 to 1.
+    pub restitution: f64,
+    /// The speed at which the sides closed along the normal when the step began, that of the surface included, m/s; below zero where
+    /// they parted. Without meaning where nothing rebounds.
+    pub approach_m_s: f64,
+    /// The velocity of side 1's surface beyond that of its blocks, as of a conveyor or of a solid that is led along a path, world axes,
+    /// m/s.
+    pub surface_m_s: DVec3,
     /// The way that a sticking contact has crept and owes back (eq. 13), world axes, metres.
     pub owed_slip_m: DVec3,
     /// The impulse of the last step, world axes, N·s; zero where there is none.
     pub warm_n_s: DVec3,
-}
-
-/// A joint, an attachment or a drive: three equations without a cone. Velocities are those of side 0 against side 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BilateralRow {
-    /// What the row is called from step to step; the solver only hands it on.
-    pub key: u64,
-    /// The two points; one at least must move.
-    pub sides: [Side; 2],
-    /// The velocity that the row asks for, world axes, m/s.
-    pub target_m_s: DVec3,
-    /// The velocity by which the row gives way for each N·s, 1/kg, > 0; `None` for the compliance of contacts (eq. 5).
-    pub compliance_per_kg: Option<f64>,
-    /// The most impulse that it gives, N·s, ≥ 0; `None` for as much as it takes.
-    pub limit_n_s: Option<f64>,
-    /// The impulse of the last step, world axes, N·s; zero where there is none.
-    pub warm_n_s: DVec3,
-}
-
-/// A spring with a damper between two points.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spring {
-    /// Stiffness k, N/m, ≥ 0.
-    pub stiffness_n_m: f64,
-    /// Damping c, N s/m, ≥ 0; one of both above zero.
-    pub damping_n_s_m: f64,
-    /// From the point of side 1 to that of side 0, less the rest length, world axes, metres.
-    pub stretch_m: DVec3,
 }
 
 /// All that touch or are joined, at one moment.
@@ -93,7 +74,10 @@ pub struct Problem<'a> {
     /// Where they may touch.
     pub contacts: &'a [Contact],
     /// Where they are joined.
-    pub rows: &'a [BilateralRow],
+    pub rows: &'a [JointRow],
+    /// Contacts that close more slowly than this do not rebound, m/s, ≥ 0: gravity over the longest step of a member, or what rests
+    /// hops.
+    pub rebound_from_m_s: f64,
 }
 
 impl Contact {
@@ -111,6 +95,12 @@ impl Contact {
         DVec3::new(normal, self.tangents[0].dot(owed), self.tangents[1].dot(owed))
     }
 
+    /// The speed at which the sides must part (eq. 3b): of a contact that closes within the step, and faster than what rests.
+    pub(super) fn rebound_m_s(&self, problem: &Problem<'_>) -> Option<f64> {
+        let closes = self.approach_m_s > problem.rebound_from_m_s && self.gap_m <= self.approach_m_s * problem.h_s;
+        (closes && self.restitution > 0.0).then_some(self.restitution * self.approach_m_s)
+    }
+
     /// The slip owed after a step that gave `impulse_n_s` and left the sides `velocity_m_s` against each other (eq. 13).
     #[must_use]
     pub fn owed_slip_after(&self, impulse_n_s: DVec3, velocity_m_s: DVec3, h_s: f64) -> DVec3 {
@@ -122,15 +112,5 @@ impl Contact {
         } else {
             DVec3::ZERO
         }
-    }
-}
-
-impl BilateralRow {
-    /// The same row as a spring that is implicit at both ends (eq. 14).
-    #[must_use]
-    pub fn with_spring(self, spring: Spring, h_s: f64) -> Self {
-        let Spring { stiffness_n_m: k, damping_n_s_m: c, stretch_m } = spring;
-        let compliance = 1.0 / (h_s * h_s * k + h_s * c);
-        Self { compliance_per_kg: Some(compliance), target_m_s: stretch_m * (-h_s * k * compliance), ..self }
     }
 }

@@ -1,10 +1,11 @@
-//! The rows of a contact problem: Jacobian, free velocities, laws, scales and compliances of all contacts and bilateral rows.
+//! The rows of a contact problem: Jacobian, free velocities, laws, scales and compliances of all contacts and rows of joints.
 //!
 //! In: a problem. Out: products with J and Jᵀ, and what each row needs for its law, in its own frame (x along the normal).
 //! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
 
 use super::cone::{Form, Law, Projection, tangential};
-use super::problem::Problem;
+use super::joint::{Hold, JointRow};
+use super::problem::{Contact, Problem};
 use super::side::Side;
 use glam::{DMat3, DVec3};
 
@@ -25,14 +26,20 @@ pub(super) struct Term {
     pub map: DMat3,
 }
 
-/// One contact or bilateral row.
+/// One contact or row of a joint.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     pub law: Law,
     /// Columns in world axes.
     pub frame: DMat3,
-    /// What gap, slip owed or target add to the velocity.
+    /// 1 for each axis that the law is about; along the others nothing is given or seen.
+    pub held: DVec3,
+    /// What gap, slip owed, rebound or target add to the velocity.
     pub bias: DVec3,
+    /// The velocity of a surface beyond that of its blocks, taken from the velocity.
+    surface: DVec3,
+    /// Along the normal, the bias without the rebound; `None` where nothing rebounds.
+    pub calm: Option<f64>,
     /// b of eq. 1: velocity without impulses, bias included.
     pub free: DVec3,
     /// w of eq. 6, 1/kg.
@@ -61,8 +68,51 @@ pub(super) struct Rows {
 
 impl Row {
     fn new(law: Law, frame: DMat3, bias: DVec3) -> Self {
-        let free = DVec3::ZERO;
-        Self { law, frame, bias, free, scale: 0.0, compliance: 0.0, given: None, start: 0, end: 0 }
+        Self {
+            law,
+            frame,
+            held: DVec3::ONE,
+            bias,
+            surface: DVec3::ZERO,
+            calm: None,
+            free: DVec3::ZERO,
+            scale: 0.0,
+            compliance: 0.0,
+            given: None,
+            start: 0,
+            end: 0,
+        }
+    }
+
+    /// Of a contact, with its rebound where it has one (eq. 3b).
+    fn of_contact(contact: &Contact, problem: &Problem<'_>) -> Self {
+        let frame = contact.frame();
+        let mut bias = contact.bias_m_s(problem.h_s);
+        let calm = contact.rebound_m_s(problem).map(|parting| {
+            let calm = bias.x;
+            bias.x = calm.min(-parting);
+            calm
+        });
+        let surface = frame.transpose() * contact.surface_m_s;
+        Self { calm, surface, ..Self::new(Law::Coulomb { friction: contact.friction }, frame, bias) }
+    }
+
+    fn of_joint(joint: &JointRow) -> Self {
+        let (frame, held) = (joint.hold.frame(), joint.hold.held());
+        let law = match joint.hold {
+            Hold::All { limit_n_s } | Hold::Across { limit_n_s, .. } => Law::Bounded { limit: limit_n_s },
+            Hold::Along { low_n_s, high_n_s, .. } => Law::Between { low: low_n_s, high: high_n_s },
+        };
+        let bias = frame.transpose() * -joint.target_m_s * held;
+        Self { held, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
+    }
+
+    /// Takes the rebound back.
+    pub fn calm_down(&mut self) {
+        if let Some(calm) = self.calm.take() {
+            self.free.x += calm - self.bias.x;
+            self.bias.x = calm;
+        }
     }
 
     /// The velocity that a law sees: what the row gives way by is part of it.
@@ -120,24 +170,20 @@ impl Rows {
         self.rows.clear();
         self.terms.clear();
         for contact in problem.contacts {
-            let law = Law::Coulomb { friction: contact.friction };
-            let row = Row::new(law, contact.frame(), contact.bias_m_s(problem.h_s));
-            self.push(row, &contact.sides, offsets);
+            self.push(Row::of_contact(contact, problem), &contact.sides, offsets);
         }
-        for given in problem.rows {
-            let law = given.limit_n_s.map_or(Law::Free, |limit| Law::Bounded { limit });
-            let row = Row::new(law, DMat3::IDENTITY, -given.target_m_s);
-            self.push(Row { given: given.compliance_per_kg, ..row }, &given.sides, offsets);
+        for joint in problem.rows {
+            self.push(Row::of_joint(joint), &joint.sides, offsets);
         }
         for k in 0..self.rows.len() {
-            self.rows[k].free = self.rows[k].bias + self.velocity(k, free);
+            self.rows[k].free = self.rows[k].bias - self.rows[k].surface + self.velocity(k, free);
         }
     }
 
     /// Appends a row; of two terms with one block the sum.
     fn push(&mut self, row: Row, sides: &[Side; 2], offsets: &[usize]) {
         let start = self.terms.len();
-        let to_frame = row.frame.transpose();
+        let to_frame = DMat3::from_diagonal(row.held) * row.frame.transpose();
         for (side, sign) in sides.iter().zip([1.0, -1.0]) {
             for term in side.terms() {
                 let (block, map) = (offsets[side.member] + term.block, to_frame * term.map * sign);
@@ -150,9 +196,10 @@ impl Rows {
         self.rows.push(Row { start, end: self.terms.len(), ..row });
     }
 
-    /// Sets the scale of a row; one that nothing answers is idle.
-    pub fn set_scale(&mut self, row: usize, scale: f64) {
+    /// Sets the scale of a row from the trace of its block of W; one that nothing answers is idle.
+    pub fn set_scale(&mut self, row: usize, trace: f64) {
         let row = &mut self.rows[row];
+        let scale = trace / row.held.element_sum();
         // also where it is not a number
         let moves = scale > SCALE_MIN;
         row.scale = if moves { scale } else { 1.0 };

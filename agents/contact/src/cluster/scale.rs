@@ -50,9 +50,9 @@ impl Scales {
         let members = &system.members;
         for row in 0..rows.len() {
             let terms = rows.terms(row).iter();
-            let scale: f64 =
+            let trace: f64 =
                 terms.map(|t| self.samples[members.owners[t.block]].ratio() * estimate(members, &t.map, t.block)).sum();
-            rows.set_scale(row, scale / 3.0);
+            rows.set_scale(row, trace);
         }
     }
 

@@ -10,6 +10,7 @@ use super::iterate::{Iterate, Kept, State};
 use super::newton::{self, Aim};
 use super::passivity;
 use super::problem::Problem;
+use super::rebound;
 use super::system::StepForm;
 use super::validate::validate;
 use crate::contact::PUSH_OUT_SHARE;
@@ -63,6 +64,8 @@ pub struct Report {
     pub products: usize,
     /// Convex passes that were finished.
     pub passes: usize,
+    /// Contacts that did not rebound, as they would have made energy (section 5).
+    pub refused: usize,
     /// The largest miss of a law by the answer given, m/s (eq. 9).
     pub residual_m_s: f64,
     /// The most work that the answer does but for push-out, J (eq. 12); above zero by rounding only.
@@ -78,9 +81,9 @@ pub struct Report {
 pub struct Solution {
     /// The impulse of each contact on side 0, world axes, N·s; side 1 gets its opposite.
     pub contacts_n_s: Vec<DVec3>,
-    /// The impulse of each bilateral row, likewise.
+    /// The impulse of each joint's row, likewise.
     pub rows_n_s: Vec<DVec3>,
-    /// The velocity of side 0 against side 1 of each contact, world axes, m/s.
+    /// The velocity of side 0 against side 1 of each contact, its surface included, world axes, m/s.
     pub contacts_m_s: Vec<DVec3>,
     /// The velocity by which each contact gives way for an impulse, 1/kg: R of eq. 5.
     pub compliances_per_kg: Vec<f64>,
@@ -156,7 +159,7 @@ impl Solver {
         self.warm.clear();
         self.compliances.clear();
         for (row, warm) in rows.rows.iter().zip(given) {
-            let warm = row.law.project(Form::Disc, row.frame.transpose() * warm).value;
+            let warm = row.law.project(Form::Disc, row.frame.transpose() * warm * row.held).value;
             self.warm.push(warm);
             self.compliances.push(row.compliance_under(warm, yield_m_s));
         }
@@ -171,7 +174,7 @@ impl Solver {
         self.iterate.respond();
     }
 
-    /// The ways in their order, then the guard.
+    /// The ways in their order, again without rebounds that make energy, then the guard.
     fn run(&mut self, problem: &Problem<'_>) -> Report {
         let rigid = self.iterate.system.members.rigid.iter().all(|rigid| *rigid);
         let aim = Aim {
@@ -179,18 +182,35 @@ impl Solver {
             tolerance_m_s: self.settings.tolerance_m_s,
             yield_m_s: self.settings.yield_m_s(problem.h_s),
         };
-        let mut report = Report::resting();
-        if !self.settings.convex_only && self.primal_dual(&aim) {
-            report.way = if self.iterate.steps > 0 { Way::PrimalDual } else { Way::Kept };
-        } else {
-            let passes = self.convex(&aim);
-            report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
-        }
-        report.cut |= !self.settle() || !self.iterate.answered();
+        let mut refused = 0;
+        let mut report = loop {
+            let report = self.find(&aim);
+            // each time there are fewer, so this ends
+            match rebound::refuse(&mut self.iterate, aim.tolerance_m_s) {
+                0 => break Report { refused, ..report },
+                more => refused += more,
+            }
+            self.warm.clone_from(&self.iterate.state.lambda);
+            self.compliances.clear();
+            self.compliances.extend(self.iterate.rows.rows.iter().map(|row| row.compliance));
+        };
         let ray = passivity::guard(&mut self.iterate, &self.solution.velocities);
         (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
         report.residual_m_s = newton::largest_miss(&self.iterate, Form::Disc);
+        report
+    }
+
+    /// Impulses in their cones by the first way that finds them.
+    fn find(&mut self, aim: &Aim) -> Report {
+        let mut report = Report::resting();
+        if !self.settings.convex_only && self.primal_dual(aim) {
+            report.way = if self.iterate.steps > 0 { Way::PrimalDual } else { Way::Kept };
+        } else {
+            let passes = self.convex(aim);
+            report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
+        }
+        report.cut |= !self.settle() || !self.iterate.answered();
         report
     }
 

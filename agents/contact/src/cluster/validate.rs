@@ -3,9 +3,10 @@
 //! In: a problem. Out: nothing, or what is wrong. Never here: whether matrices are positive definite (their factor tells).
 
 use super::error::ProblemError;
-use super::problem::{BilateralRow, Block, Contact, Member, Problem};
+use super::joint::{Hold, JointRow};
+use super::problem::{Block, Contact, Member, Problem};
 use super::side::Side;
-use glam::DMat3;
+use glam::{DMat3, DVec3};
 
 /// By how much a frame may miss being orthonormal, and a diagonal block being symmetric against its largest entry.
 const SLACK: f64 = 1e-6;
@@ -18,6 +19,10 @@ pub(super) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
     let h_s = problem.h_s;
     if !(h_s.is_finite() && h_s > 0.0) {
         return Err(ProblemError::Step { h_s });
+    }
+    let rebound_from_m_s = problem.rebound_from_m_s;
+    if rebound_from_m_s.is_nan() || rebound_from_m_s < 0.0 {
+        return Err(ProblemError::Rebound { rebound_from_m_s });
     }
     for (place, member) in problem.members.iter().enumerate() {
         named(member_fault(member), |reason| ProblemError::Member { member: place, reason })?;
@@ -74,20 +79,33 @@ fn contact_fault(contact: &Contact) -> Option<&'static str> {
     if !(contact.friction.is_finite() && contact.friction >= 0.0) {
         return Some("its friction must be finite and not below zero");
     }
+    if !(0.0..=1.0).contains(&contact.restitution) {
+        return Some("its restitution must be between 0 and 1");
+    }
+    if !(contact.approach_m_s.is_finite() && contact.surface_m_s.is_finite()) {
+        return Some("its approach or the velocity of its surface is not finite");
+    }
     let vectors = contact.owed_slip_m.is_finite() && contact.warm_n_s.is_finite();
     (!vectors).then_some("its slip owed or its impulse of the last step is not finite")
 }
 
-fn row_fault(row: &BilateralRow) -> Option<&'static str> {
+fn row_fault(row: &JointRow) -> Option<&'static str> {
     if !(row.target_m_s.is_finite() && row.warm_n_s.is_finite()) {
         return Some("its target or its impulse of the last step is not finite");
     }
     if row.compliance_per_kg.is_some_and(|r| !(r.is_finite() && r > 0.0)) {
         return Some("its compliance must be finite and above zero");
     }
-    row.limit_n_s
-        .is_some_and(|limit| !(limit.is_finite() && limit >= 0.0))
-        .then_some("its limit must be finite and not below zero")
+    let (axis, bounded) = match row.hold {
+        Hold::All { limit_n_s } => (DVec3::X, limit_n_s >= 0.0),
+        Hold::Across { axis, limit_n_s } => (axis, limit_n_s >= 0.0),
+        Hold::Along { axis, low_n_s, high_n_s } => (axis, low_n_s <= 0.0 && high_n_s >= 0.0),
+    };
+    // also where one is not a number
+    if !((axis.length() - 1.0).abs() <= SLACK) {
+        return Some("its axis is not of length 1");
+    }
+    (!bounded).then_some("zero must lie within the bounds of its impulse")
 }
 
 fn sides_fault(sides: &[Side; 2], members: &[Member<'_>]) -> Option<&'static str> {

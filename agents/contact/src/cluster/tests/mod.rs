@@ -3,12 +3,14 @@
 mod cone;
 mod factor;
 mod iterative;
+mod joints;
 mod promises;
 mod random;
+mod rebounds;
 mod scenes;
 mod slow;
 
-use super::{BilateralRow, Block, Contact, Member, Problem, Side, SideTerm};
+use super::{Block, Contact, JointRow, Member, Problem, Side, SideTerm};
 use glam::{DMat3, DVec3};
 
 /// Numbers of a fixed seed: xorshift.
@@ -54,7 +56,7 @@ pub struct Case {
     pub h_s: f64,
     pub bodies: Vec<Body>,
     pub contacts: Vec<Contact>,
-    pub rows: Vec<BilateralRow>,
+    pub rows: Vec<JointRow>,
 }
 
 impl Case {
@@ -62,7 +64,13 @@ impl Case {
     pub fn with<T>(&self, work: impl FnOnce(&Problem<'_>) -> T) -> T {
         let members: Vec<_> =
             self.bodies.iter().map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0 }).collect();
-        work(&Problem { h_s: self.h_s, members: &members, contacts: &self.contacts, rows: &self.rows })
+        work(&Problem {
+            h_s: self.h_s,
+            members: &members,
+            contacts: &self.contacts,
+            rows: &self.rows,
+            rebound_from_m_s: 0.0,
+        })
     }
 }
 
@@ -124,6 +132,9 @@ pub fn contact(sides: [Side; 2], normal: DVec3) -> Contact {
         tangents: [first, normal.cross(first)],
         gap_m: 0.0,
         friction: 0.5,
+        restitution: 0.0,
+        approach_m_s: 0.0,
+        surface_m_s: DVec3::ZERO,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
     }

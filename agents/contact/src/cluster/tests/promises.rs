@@ -1,7 +1,7 @@
 //! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
 
 use super::{Case, contact, rigid};
-use crate::cluster::{Block, ProblemError, Side, SideTerm, Solver, Way};
+use crate::cluster::{Block, Hold, JointRow, ProblemError, Side, SideTerm, Solver, Way};
 use glam::{DMat3, DVec3};
 
 /// A box that falls on the floor on three points.
@@ -26,6 +26,10 @@ fn what_is_wrong_is_named() {
         (refusal(|c| c.h_s = f64::NAN), "step is NaN"),
         (refusal(|c| c.contacts[2].gap_m = f64::NAN), "contact 2: its gap"),
         (refusal(|c| c.contacts[1].friction = -0.1), "contact 1: its friction"),
+        (refusal(|c| c.contacts[1].restitution = 1.1), "contact 1: its restitution"),
+        (refusal(|c| c.contacts[1].surface_m_s.x = f64::NAN), "contact 1: its approach or"),
+        (refusal(|c| c.rows = vec![JointRow::new(0, c.contacts[0].sides, Hold::along(DVec3::ONE))]), "row 0: its axis"),
+        (refusal(|c| c.rows = vec![JointRow::new(0, c.contacts[0].sides, Hold::motor(DVec3::X, -1.0))]), "row 0: zero"),
         (refusal(|c| c.contacts[0].normal = DVec3::ZERO), "contact 0: normal and tangents"),
         (refusal(|c| c.contacts[0].sides = [Side::FIXED; 2]), "contact 0: neither side moves"),
         (refusal(|c| c.contacts[0].sides[0].member = 4), "contact 0: a side names a member"),
@@ -110,7 +114,13 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
     let case = Case { contacts: vec![contact([Side::node(0, 0), Side::FIXED], DVec3::Z)], ..case() };
     let impulse = |share: f64| {
         let members = [crate::cluster::Member { blocks: &case.bodies[0].blocks, free: &case.bodies[0].free, share }];
-        let problem = crate::cluster::Problem { h_s: 0.01, members: &members, contacts: &case.contacts, rows: &[] };
+        let problem = crate::cluster::Problem {
+            h_s: 0.01,
+            members: &members,
+            contacts: &case.contacts,
+            rows: &[],
+            rebound_from_m_s: 0.0,
+        };
         Solver::default().solve(&problem).unwrap().contacts_n_s[0].z
     };
     assert!((impulse(1.0) / impulse(2.0) - 2.0).abs() < 1e-3, "{} {}", impulse(1.0), impulse(2.0));

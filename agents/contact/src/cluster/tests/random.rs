@@ -1,8 +1,8 @@
 //! Random problems of rigid and soft bodies: laws, passivity, both ways, and a slow method that shares data and biases with them.
 
 use super::slow::gauss_seidel;
-use super::{BilateralRow, Body, Case, Lattice, Seeded, contact, rigid, side_velocity};
-use crate::cluster::{Contact, Settings, Side, SideTerm, Solution, Solver, StepForm, Way};
+use super::{Body, Case, JointRow, Lattice, Seeded, contact, rigid, side_velocity};
+use crate::cluster::{Contact, Hold, Settings, Side, SideTerm, Solution, Solver, StepForm, Way};
 use glam::DVec3;
 
 pub const COUNT: u64 = 200;
@@ -18,7 +18,7 @@ pub fn random_case(seed: u64) -> Case {
         let sides = random_sides(&mut numbers, &bodies);
         let compliance_per_kg = Some(10.0_f64.powf(numbers.between(-5.0, -1.0)));
         let target_m_s = numbers.vector() * 0.1;
-        BilateralRow { key: 0, sides, target_m_s, compliance_per_kg, limit_n_s: None, warm_n_s: DVec3::ZERO }
+        JointRow { target_m_s, compliance_per_kg, ..JointRow::new(0, sides, Hold::ALL) }
     });
     let rows = rows.collect();
     Case { h_s, bodies, contacts, rows }

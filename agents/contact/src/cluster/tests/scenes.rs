@@ -1,7 +1,7 @@
 //! Scenes with an answer in closed form: rest, slopes, stacks, collisions.
 
 use super::{Body, Case, Lattice, contact, rigid};
-use crate::cluster::{BilateralRow, Contact, Settings, Side, Solution, Solver, Spring};
+use crate::cluster::{Contact, Hold, JointRow, Settings, Side, Solution, Solver, Spring};
 use glam::DVec3;
 
 const G: f64 = 9.81;
@@ -246,17 +246,10 @@ pub fn momentum_gained(case: &Case, solution: &Solution, nodes: usize) -> DVec3 
     soft_change * (0.3 / nodes as f64) + plate_change * 2.0
 }
 
-fn tip(spring: Option<Spring>, limit_n_s: Option<f64>) -> (DVec3, DVec3) {
+fn tip(spring: Option<Spring>, limit_n_s: f64) -> (DVec3, DVec3) {
     let mut body = rigid(0.5, DVec3::splat(HALF));
     body.free[0] = DVec3::new(1.0, 0.0, 0.0);
-    let row = BilateralRow {
-        key: 0,
-        sides: [Side::rigid(0, DVec3::ZERO), Side::FIXED],
-        target_m_s: DVec3::ZERO,
-        compliance_per_kg: None,
-        limit_n_s,
-        warm_n_s: DVec3::ZERO,
-    };
+    let row = JointRow::new(0, [Side::rigid(0, DVec3::ZERO), Side::FIXED], Hold::All { limit_n_s });
     let row = spring.map_or(row, |spring| row.with_spring(spring, 0.01));
     let case = Case { h_s: 0.01, bodies: vec![body], contacts: Vec::new(), rows: vec![row] };
     case.with(|problem| {
@@ -268,20 +261,20 @@ fn tip(spring: Option<Spring>, limit_n_s: Option<f64>) -> (DVec3, DVec3) {
 
 #[test]
 fn a_joint_stops_what_it_holds() {
-    let (velocity, impulse) = tip(None, None);
+    let (velocity, impulse) = tip(None, f64::INFINITY);
     assert!(velocity.length() < 1e-3 && (impulse.x + 0.5).abs() < 1e-3, "{velocity} {impulse}"); // its compliance
 }
 
 #[test]
 fn a_drive_gives_no_more_than_its_limit() {
-    let (velocity, impulse) = tip(None, Some(0.2));
+    let (velocity, impulse) = tip(None, 0.2);
     assert!((impulse.x + 0.2).abs() < 1e-9 && (velocity.x - 0.6).abs() < 1e-8, "{velocity} {impulse}");
 }
 
 #[test]
 fn a_spring_is_implicit_at_its_end() {
     let spring = Spring { stiffness_n_m: 300.0, damping_n_s_m: 2.0, stretch_m: DVec3::X * 0.01 };
-    let (velocity, _) = tip(Some(spring), None);
+    let (velocity, _) = tip(Some(spring), f64::INFINITY);
     // m (v − 1) = −h k (d + h v) − h c v
     let wanted = (0.5 - 0.01 * 300.0 * 0.01) / (0.5 + 0.01 * 0.01 * 300.0 + 0.01 * 2.0);
     assert!((velocity.x - wanted).abs() < 1e-6, "{} is not {wanted}", velocity.x);
