@@ -155,7 +155,7 @@ impl ClusterStepper {
             self.search.find(scene, all, &self.progress, h_s);
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(all, h_s, &mut report)?;
+            self.solve(all, h_s, scene.gravity_m_s2 * dt.as_secs_f64(), &mut report)?;
             self.remember(all, h_s, fine + 1 == parts, dt);
             self.end(all, h_s)?;
         }
@@ -195,7 +195,13 @@ impl ClusterStepper {
     }
 
     /// Solves the problem of a fine step, and gives every member its impulses (eq. 19).
-    fn solve(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+    fn solve(
+        &mut self,
+        all: &[Participant<'_>],
+        h_s: f64,
+        rebound_from_m_s: f64,
+        report: &mut ClusterReport,
+    ) -> Result<(), StepError> {
         let Self { solver, search, springs, progress, members, .. } = self;
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
@@ -203,7 +209,8 @@ impl ClusterStepper {
             free: &state.seen,
             share: f64::from(state.part),
         }));
-        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows };
+        let problem =
+            Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s };
         let outcome = solver.solve(&problem);
         *members = emptied(list);
         let solution = outcome.map_err(|error| refused(&error, h_s))?;

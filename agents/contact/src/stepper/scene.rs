@@ -11,6 +11,8 @@ use metachron_geometry::{
 /// The surroundings that all clusters of a scene share.
 #[derive(Debug, Default)]
 pub struct ClusterScene {
+    /// The strength of gravity, m/s², ≥ 0: what closes no faster than it does within a macro step does not rebound.
+    pub gravity_m_s2: f64,
     statics: Vec<StaticSolid>,
 }
 
@@ -19,8 +21,11 @@ impl ClusterScene {
     ///
     /// # Errors
     /// [`ShapeError`] for an invalid solid.
-    pub fn new(obstacles: &[Obstacle]) -> Result<Self, ShapeError> {
-        Ok(Self { statics: obstacles.iter().map(StaticSolid::new).collect::<Result<_, _>>()? })
+    pub fn new(obstacles: &[Obstacle], gravity: DVec3) -> Result<Self, ShapeError> {
+        Ok(Self {
+            gravity_m_s2: gravity.length(),
+            statics: obstacles.iter().map(StaticSolid::new).collect::<Result<_, _>>()?,
+        })
     }
 
     /// The static solids, by their numbers.

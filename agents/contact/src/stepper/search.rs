@@ -110,7 +110,7 @@ impl Search {
         }
         let reach_m = LOOK_M + (self.speed(a) + self.speed(b)) * h_s;
         touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
-        let friction = friction_of(here.form, there.form);
+        let skins = [here.form, there.form];
         let partner = Partner::Agent(all[b].id);
         for touch in &self.touches {
             let side = |member: usize, place, contact| all[member].member.side(place, contact).of_member(member);
@@ -120,7 +120,7 @@ impl Search {
             ];
             if closes(touch, &sides, progress, h_s) {
                 self.owners.push(Owner { member: a, partner, other: Some(b), key: touch.key });
-                self.contacts.push(contact(touch, sides, friction));
+                self.contacts.push(contact(touch, sides, skins, progress));
             }
         }
     }
@@ -142,14 +142,14 @@ impl Search {
                 continue;
             }
             solid.touches(&skin, reach_m, &mut self.scratch, &mut self.touches);
-            let friction = friction_of(skin.form, solid.form());
+            let skins = [skin.form, solid.form()];
             for touch in &self.touches {
                 let place = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
                 let sides = [place.of_member(member), Side::FIXED];
                 if closes(touch, &sides, progress, h_s) {
                     let partner = Partner::Static(number);
                     self.owners.push(Owner { member, partner, other: None, key: touch.key });
-                    self.contacts.push(contact(touch, sides, friction));
+                    self.contacts.push(contact(touch, sides, skins, progress));
                 }
             }
         }
@@ -185,7 +185,7 @@ fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> 
     })
 }
 
-fn contact(touch: &Touch, sides: [Side; 2], friction: f64) -> Contact {
+fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {
         key: touch.key,
@@ -193,13 +193,17 @@ fn contact(touch: &Touch, sides: [Side; 2], friction: f64) -> Contact {
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
-        friction,
+        // a pair takes the geometric mean of both frictions, and the larger restitution
+        friction: (skins[0].friction * skins[1].friction).sqrt(),
+        restitution: skins[0].restitution.max(skins[1].restitution),
+        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal),
+        surface_m_s: DVec3::ZERO,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
     }
 }
 
-/// Coulomb's coefficient of a pair: the geometric mean.
-fn friction_of(a: &CollisionShape, b: &CollisionShape) -> f64 {
-    (a.friction * b.friction).sqrt()
+/// The velocity of a side along a normal when the fine step begins, m/s.
+fn along(side: &Side, progress: &[Progress], normal: DVec3) -> f64 {
+    if side.terms().is_empty() { 0.0 } else { side.velocity(&progress[side.member].before).dot(normal) }
 }

@@ -6,7 +6,7 @@
 use super::Participant;
 use super::memory::Partner;
 use crate::AnchorSpring;
-use crate::cluster::{BilateralRow, Side, Spring};
+use crate::cluster::{Hold, JointRow, Side, Spring};
 use glam::DVec3;
 use metachron_core::{AgentId, Grip};
 
@@ -23,7 +23,7 @@ pub(super) struct RowOwner {
 /// The rows of a fine step.
 #[derive(Debug, Default)]
 pub(super) struct Springs {
-    pub rows: Vec<BilateralRow>,
+    pub rows: Vec<JointRow>,
     /// One for each row.
     pub owners: Vec<RowOwner>,
 }
@@ -65,10 +65,8 @@ impl Springs {
         let partner = Partner::Tie(number);
         let sides = [point.side.of_member(member), Side::FIXED];
         let warm_n_s = all[member].memory.recall(partner, 0).force_n * h_s;
-        let row =
-            BilateralRow { key: 0, sides, target_m_s: DVec3::ZERO, compliance_per_kg: None, limit_n_s: None, warm_n_s };
-        let row = row.with_spring(law, h_s);
-        self.rows.push(BilateralRow { target_m_s: row.target_m_s + spring.target_velocity, ..row });
+        let row = JointRow { warm_n_s, ..JointRow::new(0, sides, Hold::ALL) }.with_spring(law, h_s);
+        self.rows.push(JointRow { target_m_s: row.target_m_s + spring.target_velocity, ..row });
         self.owners.push(RowOwner { member, partner, by: spring.by });
     }
 

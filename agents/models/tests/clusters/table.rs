@@ -71,7 +71,7 @@ impl Table {
     }
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
-        let scene = ClusterScene::new(obstacles).unwrap();
+        let scene = ClusterScene::new(obstacles, GRAVITY).unwrap();
         Self { bodies, time: SimTime::ZERO, scene, stepper: ClusterStepper::new(20e-6), snapshot: Snapshot::default() }
     }
 
