@@ -9,6 +9,8 @@ pub enum PairKind {
     /// Contact by impulse ledger.
     #[default]
     Ledger,
+    /// Contact within one cluster.
+    Cluster,
     /// Contact by penalty forces from stale states.
     Penalty,
     /// Contact by penalty forces from states that are brought forward.
@@ -39,6 +41,7 @@ impl PairKind {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ledger => "ledger",
+            Self::Cluster => "cluster",
             Self::Penalty => "penalty",
             Self::PenaltyExtrapolated => "penalty-extrapolated",
             Self::Tlm => "tlm",

@@ -11,6 +11,7 @@
 use super::agent_clock::Timeline;
 use super::agent_clock::{AgentClock, LAG_CAP, Start};
 use super::broad_phase::PlannedStep;
+use super::cluster::{ClusterSeat, Span};
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -41,6 +42,8 @@ pub(super) struct AgentRunner {
     pub observer: Observer,
     pub links: Vec<Link>,
     pub hands: Vec<AnchorSpring>,
+    /// Its place in a contact cluster; `None` where it steps by itself.
+    pub cluster: Option<Box<ClusterSeat>>,
     /// The agents it leads.
     pub company: Company,
     pub metrics: MetricsWriter,
@@ -149,7 +152,7 @@ impl AgentRunner {
     /// Reads the neighbours before the first step and publishes the result, if the agent has links; to be called after [`Self::publish_initial`] of all
     /// agents.
     pub fn observe(&mut self) {
-        if self.links.is_empty() || self.is_parked() {
+        if self.links.is_empty() || self.is_parked() || self.cluster.is_some() {
             return;
         }
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
@@ -279,12 +282,30 @@ impl AgentRunner {
         let is_met = self.peers.broad_phase.is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
-        let (StepOutcome { report, dt }, led) =
-            if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };
+        let (StepOutcome { report, dt }, led) = if self.cluster.is_some() {
+            let stretched = wanted.as_secs_f64() / self.pace.wanted().as_secs_f64();
+            let led = self.company.seats_at(self.pace.time()).count() as u32;
+            match self.step_cluster(Span::Wanted(stretched.max(1.0))) {
+                Ok(outcome) => (outcome, led),
+                Err(reason) if led == 0 => return Err(reason),
+                // they part: one of them will fail alone, the others find together again
+                Err(_) => {
+                    self.scatter();
+                    (self.step_cluster(Span::Wanted(1.0))?, 0)
+                }
+            }
+        } else if self.company.is_empty() {
+            (self.step(wanted)?, 0)
+        } else {
+            self.lead(wanted)?
+        };
         self.pace.shorten(wanted, dt);
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work * f64::from(1 + led));
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
+        if rests && self.cluster.is_some() {
+            self.rest_members();
+        }
         let mut open = PendingTurn { start, dt, resolution, errors_m: [0.0; 2], rests };
         self.write_led(&open);
         self.write_snapshot(self.pace.time() + dt, rests)?;

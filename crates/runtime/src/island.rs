@@ -19,6 +19,7 @@ use super::agent_clock::Start;
 use super::agent_clock::Timeline;
 use super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
+use super::cluster::Span;
 use super::fellows::Fellows;
 use super::metrics::Entry;
 use metachron_contact::{IslandMember, StepContext};
@@ -59,7 +60,8 @@ impl AgentRunner {
         let mut steps = 0;
         while self.pace.time() < time {
             let span = portion(time.since(self.pace.time()), self.pace.dt());
-            let StepOutcome { dt, .. } = self.step(span)?;
+            let StepOutcome { dt, .. } =
+                if self.cluster.is_some() { self.step_cluster(Span::AtMost(span))? } else { self.step(span)? };
             self.write_snapshot(self.pace.time() + dt, false)?;
             self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();

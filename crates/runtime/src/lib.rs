@@ -30,6 +30,7 @@ mod agent_clock;
 mod agent_runner;
 mod broad_phase;
 mod clock;
+mod cluster;
 mod cpu;
 mod dirty_set;
 mod faults;

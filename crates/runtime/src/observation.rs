@@ -118,6 +118,16 @@ impl Peers {
 }
 
 impl Observer {
+    /// The agent whose view it is.
+    pub const fn me(&self) -> AgentId {
+        self.me
+    }
+
+    /// The agents so near that they may touch it, as they were at the last update, by rising numbers.
+    pub fn near(&self) -> &[AgentId] {
+        self.neighbour_list.as_ref().map_or(&[], |list| list.near())
+    }
+
     /// Its neighbours, as they were at the last update.
     pub fn neighbours(&self) -> &[Neighbour] {
         &self.neighbours

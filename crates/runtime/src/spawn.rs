@@ -6,6 +6,7 @@
 use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::broad_phase::BroadPhase;
+use super::cluster::ClusterSeat;
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
@@ -18,6 +19,7 @@ use super::probe::{Trace, WatchedPoint};
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use metachron_contact::Agent;
+use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -45,6 +47,8 @@ pub struct AgentSpawn {
     pub attached: Vec<Link>,
     /// An agent with which it shares an island from the first step on: the lower number leads.
     pub together: Option<AgentId>,
+    /// The surroundings in whose contact clusters it is stepped; `None` for an agent that steps by itself.
+    pub clusters: Option<Arc<ClusterScene>>,
     /// Faults injected on purpose.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
@@ -70,6 +74,7 @@ impl AgentSpawn {
             laws: Vec::new(),
             attached: Vec::new(),
             together: None,
+            clusters: None,
             faults: Faults::default(),
             watches: Vec::new(),
             governor: None,
@@ -212,11 +217,15 @@ fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<S
     let rigid =
         |form: &Option<Arc<CollisionShape>>| form.as_ref().is_some_and(|form| matches!(form.kind, ShapeKind::Solid(_)));
     let led = forms.iter().filter(|form| rigid(form)).count() > 1;
+    let clustered = spawns.iter().filter(|spawn| spawn.clusters.is_some()).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
     for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
         let writer = SlotWriter::new(Snapshot::default());
-        let seated = led && rigid(&form);
+        let seated = match spawn.clusters {
+            Some(_) => clustered && spawn.agent.member().is_some(),
+            None => led && rigid(&form),
+        };
         let shared = Arc::new(shared(id, spawn, sleep, &writer, seated));
         writers.push(writer);
         all.push(Peer { shared, form, laws: Vec::new() });
@@ -280,7 +289,7 @@ fn shared(
     }
 }
 
-fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> AgentRunner {
+fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> AgentRunner {
     let me = &peers.all[id.0 as usize];
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
@@ -288,6 +297,8 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
             links.push(link);
         }
     }
+    let scene = spawn.clusters.filter(|_| spawn.agent.member().is_some());
+    let cluster = scene.map(|scene| Box::new(ClusterSeat::new(scene)));
     AgentRunner {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
@@ -301,6 +312,7 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         observer: peers.observer(id, &links),
         links: spawn.attached,
         hands: Vec::with_capacity(1),
+        cluster,
         company: Led::default(),
         metrics: MetricsWriter::new(),
         turn_period: TurnPeriod::default(),

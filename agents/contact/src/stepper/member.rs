@@ -10,7 +10,7 @@ use metachron_geometry::{ContactSide, Place, PlacedShape};
 /// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
 ///
 /// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was.
-pub trait ClusterMember {
+pub trait ClusterMember: Send {
     /// How it takes part.
     fn role(&self) -> Role;
 

@@ -42,6 +42,8 @@ pub struct Participant<'a> {
     pub member: &'a mut dyn ClusterMember,
     /// What it sees at the start of the macro step.
     pub context: StepContext<'a>,
+    /// The laws of its pairs other than [`Law::Ledger`], by rising numbers: a pair with one is not the cluster's.
+    pub laws: &'a [(AgentId, Law)],
     /// What it remembers of others.
     pub memory: &'a mut ContactMemory,
     /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
@@ -51,9 +53,9 @@ pub struct Participant<'a> {
 }
 
 impl Participant<'_> {
-    /// Whether it touches `other` where the two meet.
+    /// Whether the cluster keeps it and `other` apart.
     fn may_touch(&self, other: AgentId) -> bool {
-        !self.context.neighbours.iter().any(|n| n.id == other && n.law == Law::Off)
+        self.laws.binary_search_by_key(&other, |(id, _)| *id).is_err()
     }
 }
 
@@ -111,6 +113,8 @@ pub(crate) struct Progress {
     seen: Vec<DVec3>,
     /// Whether anything has acted on it since its step began.
     touched: bool,
+    /// Work of its steps within the macro step, in the unit of its model.
+    work: f64,
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
@@ -145,7 +149,7 @@ impl ClusterStepper {
         let h_s = dt.as_secs_f64() / f64::from(parts);
         self.progress.resize_with(all.len(), Progress::default);
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
-            (state.share, state.part) = (parts / one.parts, 0);
+            (state.share, state.part, state.work) = (parts / one.parts, 0, 0.0);
             one.grips.clear();
         }
         self.totals.clear();
@@ -167,6 +171,12 @@ impl ClusterStepper {
         &self.totals
     }
 
+    /// Work of a participant's own steps in the last macro step, in the unit of its model.
+    #[must_use]
+    pub fn work_of(&self, member: usize) -> f64 {
+        self.progress.get(member).map_or(0.0, |state| state.work)
+    }
+
     /// Pairs of participants of the last step that are near each other, by their places in its list.
     pub fn near(&self) -> &[[usize; 2]] {
         &self.search.near
@@ -177,6 +187,7 @@ impl ClusterStepper {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             if state.part == 0 {
                 one.member.begin(h_s * f64::from(state.share))?;
+                state.work += one.member.work();
                 report.work += one.member.work();
                 state.start(one.member.velocities(), one.member.free());
             }
@@ -203,6 +214,12 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         let Self { solver, search, springs, progress, members, .. } = self;
+        report.contacts = search.contacts.len() as u32;
+        if search.contacts.is_empty() && springs.rows.is_empty() {
+            // what touches nothing moves as it would
+            progress.iter_mut().for_each(Progress::go_on);
+            return Ok(());
+        }
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
             blocks: one.member.blocks(),
@@ -226,7 +243,6 @@ impl ClusterStepper {
             let moving = row.sides.iter().filter(|side| !side.terms().is_empty());
             moving.for_each(|side| progress[side.member].touched = true);
         }
-        report.contacts = search.contacts.len() as u32;
         report.factors += solution.report.factors as u32;
         report.passes += solution.report.passes as u32;
         report.cut += u32::from(solution.report.cut);
@@ -301,6 +317,11 @@ impl Progress {
         known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
         seen.clear();
         seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
+    }
+
+    /// Takes the velocities that it has without impulses.
+    fn go_on(&mut self) {
+        self.before.clone_from(&self.known);
     }
 
     /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 19).

@@ -97,7 +97,7 @@ impl Table {
             let context = StepContext::alone(AgentId(id), self.time);
             let member = agent.member().unwrap();
             let parts = plan.parts_in(role, wanted_s);
-            all.push(Participant { id: AgentId(id), member, context, memory, parts, grips });
+            all.push(Participant { id: AgentId(id), member, context, laws: &[], memory, parts, grips });
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
         self.time = self.time + dt;

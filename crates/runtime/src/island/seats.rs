@@ -40,9 +40,11 @@ pub(in super::super) struct Company {
     /// All that step as one in this turn.
     pub(super) fellows: Fellows,
     /// What became of them, as the model says it.
-    pub(super) apart: Vec<u32>,
+    pub(in super::super) apart: Vec<u32>,
     /// Storage, empty between turns.
     pub(super) companions: Vec<IslandMember<'static>>,
+    /// The numbers of all members of a cluster's step: storage.
+    pub(in super::super) ids: Vec<AgentId>,
 }
 
 /// One that is led.
@@ -110,6 +112,23 @@ impl Company {
         self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor, &self.fellows));
     }
 
+    /// Those at `time`, by rising numbers.
+    pub fn seats_at(&mut self, time: SimTime) -> impl Iterator<Item = &mut AgentRunner> {
+        self.seats.iter_mut().map(|seat| &mut *seat.actor).filter(move |actor| actor.pace.time() == time)
+    }
+
+    /// Visits those at `time`, each with all that step as one.
+    pub fn each_at(&mut self, time: SimTime, mut visit: impl FnMut(&mut AgentRunner, &Fellows)) {
+        let Self { seats, fellows, .. } = self;
+        let here = seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
+        here.for_each(|seat| visit(&mut seat.actor, fellows));
+    }
+
+    /// All that stepped as one, its leader among them, when that was last found out.
+    pub const fn all_fellows(&self) -> &Fellows {
+        &self.fellows
+    }
+
     /// Those at `time`.
     pub(super) fn at(&self, time: SimTime) -> impl Iterator<Item = &Seat> {
         self.seats.iter().filter(move |seat| seat.actor.pace.time() == time)
@@ -121,7 +140,7 @@ impl Company {
     }
 
     /// Notes for those at `time` what the model said became of them.
-    pub(super) fn note_apart(&mut self, time: SimTime) {
+    pub fn note_apart(&mut self, time: SimTime) {
         let said = self.apart.iter().copied().chain(std::iter::repeat(0));
         let seats = self.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
         seats.zip(said).for_each(|(seat, apart)| seat.apart = apart);
@@ -190,7 +209,7 @@ impl AgentRunner {
     }
 
     /// Sends home all it leads, each by itself: who belongs together finds together again.
-    pub(super) fn scatter(&mut self) {
+    pub fn scatter(&mut self) {
         self.company.seats.drain(..).for_each(|seat| seat.actor.go_home());
     }
 
