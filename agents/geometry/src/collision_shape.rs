@@ -3,7 +3,7 @@
 //! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, fixed for an agent's life and shared, and [`PlacedShape`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
 
-use super::narrow_phase::VoronoiRegions;
+use super::narrow_phase::{TouchKey, VoronoiRegions};
 use crate::{Aabb, ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
 use metachron_core::ContactJacobian;
@@ -202,7 +202,7 @@ pub enum Place {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Its name from step to step, unique among the places of the pair.
-    pub key: u64,
+    pub key: TouchKey,
     /// Unit normal, from b towards a.
     pub normal: DVec3,
     /// Distance of the skins, metres; below zero they overlap.

@@ -54,6 +54,7 @@ pub use generate::{Generator, generate};
 pub use geodesic::geodesic_edges;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
 pub use model::{Extent, Model, Placement, proxy};
+pub use narrow_phase::{StaticSolid, StaticSolidError, TouchKey, TouchKind};
 pub use parry_shapes::ShapeError;
 pub use parry_shapes::{Triangles, hull_triangles, mesh_triangles};
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};

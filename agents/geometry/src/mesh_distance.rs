@@ -82,6 +82,21 @@ impl MeshField {
         (low - point).max(point - high).max(DVec3::ZERO).length()
     }
 
+    /// Visits the triangles whose boxes meet `region`: number, corners and normal.
+    pub fn triangles_in(&self, region: crate::Aabb, mut visit: impl FnMut(u32, [DVec3; 3], DVec3)) {
+        let (middle, half) = ((region.low + region.high) * 0.5, (region.high - region.low) * 0.5);
+        self.face_tree.traverse(|node| {
+            if misses(node, middle, half) {
+                return TraversalAction::Prune;
+            }
+            if let Some(leaf) = node.leaf_data() {
+                let face = &self.faces[leaf as usize];
+                visit(leaf, face.corners, face.normal);
+            }
+            TraversalAction::Continue
+        });
+    }
+
     /// Every wall within `reach_m` of `centre`, nearest first (eq. 13).
     pub fn touches(&self, centre: DVec3, reach_m: f64, found: &mut Touches) {
         let mut planes = [(DVec3::ZERO, DVec3::ZERO); crate::signed_distance::TOUCHES_MAX];

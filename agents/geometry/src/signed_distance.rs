@@ -158,6 +158,11 @@ impl Field {
         Ok(Self { kind, position, rotation })
     }
 
+    /// The triangles of a mesh or hull, in the axes of the field; `None` for a primitive.
+    pub fn mesh(&self) -> Option<&MeshField> {
+        if let Kind::Mesh(mesh) = &self.kind { Some(mesh) } else { None }
+    }
+
     /// Contact points of `point` within `reach_m` of the surface, nearest first.
     ///
     /// A convex primitive has one, at any depth. A mesh or hull has one for each wall of a corner, and is detected only to the depth

@@ -6,7 +6,9 @@
 use super::agent_runner::{AgentRunner, StepOutcome};
 use super::broad_phase::PlannedStep;
 use super::observation::Observer;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role};
+use metachron_contact::stepper::{
+    ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
+};
 use metachron_contact::{Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport};
 use std::sync::Arc;
@@ -39,6 +41,14 @@ pub(super) struct ClusterSeat {
 struct Wish {
     role: Role,
     step_s: f64,
+}
+
+/// What the steps of a member cost in a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MemberCost {
+    pub model: &'static str,
+    /// In the unit of the model.
+    pub work: f64,
 }
 
 /// How long the step of a cluster may be.
@@ -75,11 +85,6 @@ impl ClusterSeat {
             wishes: Vec::new(),
             groups: Vec::new(),
         }
-    }
-
-    /// Work of its own steps in the last turn.
-    pub const fn work(&self) -> f64 {
-        self.work
     }
 
     /// Completes a state that its agent has just written.
@@ -271,6 +276,13 @@ impl AgentRunner {
         if let Some(seat) = &mut self.cluster {
             seat.groups = groups;
         }
+    }
+
+    /// What the last turn cost of its own body and of each that it leads.
+    pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
+        std::iter::once(self).chain(self.company.all()).filter_map(|actor| {
+            Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work })
+        })
     }
 
     /// Stops all that step with it: they rest.

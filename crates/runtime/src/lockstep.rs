@@ -167,9 +167,14 @@ impl Lockstep {
         let Some(actor) = &mut entry.actor else { return };
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
-                let model = actor.shared.model;
-                let step_s = self.machine.step_s(model, work, agent as u64, entry.turns);
-                let seconds = f64::from(steps) * step_s * self.machine.slower(self.now);
+                let price = |model, work| self.machine.step_s(model, work, agent as u64, entry.turns);
+                // each member of a cluster costs what its model does
+                let seconds = if actor.cluster.is_some() && steps > 0 {
+                    actor.member_costs().map(|cost| price(cost.model, cost.work)).sum()
+                } else {
+                    f64::from(steps) * price(actor.shared.model, work)
+                };
+                let seconds = seconds * self.machine.slower(self.now);
                 self.cores.start(agent as u32, duration(seconds));
                 entry.turns += 1;
                 entry.phase = Phase::Busy(self.now);

@@ -38,7 +38,7 @@ use build::{Objects, SceneContext};
 use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
-use format::{SceneFile, WorldFile};
+use format::{ContactPath, ContactsFile, SceneFile, WorldFile};
 use glam::DVec3;
 use metachron_models::rigid::Joint;
 use metachron_world::Scene;
@@ -119,6 +119,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     objects.set_joints(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
+    let contacts = file.world.as_ref().and_then(|world| world.contacts);
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
@@ -134,7 +135,8 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         obstacle_appearances: objects.obstacle_appearances,
         scenery: objects.scenery,
         groups,
-        contacts: file.world.as_ref().and_then(|w| w.contacts).unwrap_or(true),
+        contacts: contacts != Some(ContactsFile::Whether(false)),
+        clusters: contacts == Some(ContactsFile::By(ContactPath::Clusters)),
         joints,
         couplings,
         probes,

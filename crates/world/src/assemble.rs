@@ -7,6 +7,8 @@ use super::kinds::{ExecutorKind, PriorityKind};
 use super::world::WorldError;
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
+use metachron_contact::stepper::ClusterScene;
+use metachron_geometry::narrow_phase::StaticSolidError;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -14,6 +16,7 @@ use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
 use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, WatchedPoint};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps what it has.
 pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
@@ -24,7 +27,20 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 /// [`WorldError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    scene.agents.iter().map(|member| spawn(scene, member, executor, &mut *govern, &mut ties)).collect()
+    let clusters = if scene.clusters {
+        let built = ClusterScene::new(&scene.obstacles, scene.gravity);
+        let failed =
+            |error: StaticSolidError| WorldError::Build { name: "world".to_owned(), reason: error.to_string() };
+        Some(Arc::new(built.map_err(failed)?))
+    } else {
+        None
+    };
+    let all = scene.agents.iter();
+    all.map(|member| {
+        let spawn = spawn(scene, member, executor, &mut *govern, &mut ties)?;
+        Ok(AgentSpawn { clusters: clusters.clone(), ..spawn })
+    })
+    .collect()
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.
@@ -66,6 +82,7 @@ fn spawn(
         laws: ties.laws(member.id),
         attached: ties.attached(member.id),
         together: ties.together(member.id),
+        clusters: None,
         faults: faults(member.faults),
         watches: watches.collect(),
         governor: govern(member),

@@ -53,6 +53,8 @@ pub struct Scene {
     pub groups: Vec<Group>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
+    /// Whether all that touch is solved as one problem.
+    pub clusters: bool,
     /// Joints between rigid agents; the spec of each rigid agent has all of them.
     pub joints: Arc<[Joint]>,
     /// Pairs that interact otherwise than by the default contact.

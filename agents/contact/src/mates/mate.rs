@@ -273,7 +273,8 @@ impl Mate {
     /// The contact of a place: the owner is the first of the two.
     fn contact(&self, touch: &Touch) -> Contact {
         let slots = self.slots_of(touch);
-        let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
+        let key = touch.key.packed();
+        let place = key & ((1 << PART_SHIFT) - 1) | (key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
         Contact {
             key: self.key() | place,
             jacobian: slots,

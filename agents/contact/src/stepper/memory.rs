@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 use metachron_core::{AgentId, SimTime};
+use metachron_geometry::narrow_phase::TouchKey;
 
 /// The other side of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -23,7 +24,7 @@ pub enum Partner {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Remembered {
     /// The name of the place within its pair.
-    pub key: u64,
+    pub key: TouchKey,
     /// The impulse of one second at the rate of the last step: its mean force, world axes, N.
     pub force_n: DVec3,
     /// The slip owed, world axes, metres.
@@ -62,7 +63,7 @@ impl ContactMemory {
     }
 
     /// What the place `key` of the pair with `partner` remembers; nothing of a new one.
-    pub(super) fn recall(&self, partner: Partner, key: u64) -> Remembered {
+    pub(super) fn recall(&self, partner: Partner, key: TouchKey) -> Remembered {
         let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok().map(|at| &self.pairs[at]);
         let place = pair.and_then(|pair| {
             let at = pair.places.binary_search_by_key(&key, |place| place.key).ok()?;
@@ -102,14 +103,15 @@ mod tests {
     fn a_place_is_recalled_after_one_turn_and_forgotten_after_two() {
         let mut memory = ContactMemory::default();
         let (partner, now) = (Partner::Static(3), SimTime::ZERO);
-        let place = Remembered { key: 70_000, force_n: DVec3::Z, owed_slip_m: DVec3::X };
+        let key = |vertex: u32| TouchKey { features: [vertex, 0], ..TouchKey::default() };
+        let place = Remembered { key: key(70_000), force_n: DVec3::Z, owed_slip_m: DVec3::X };
         memory.pair(partner).next.push(place);
         memory.turn(now);
-        assert_eq!(memory.recall(partner, 70_000), place);
-        assert_eq!(memory.recall(partner, 70_000 - 32_768).force_n, DVec3::ZERO, "another place of the same pair");
-        assert_eq!(memory.recall(Partner::Static(3 + 32_768), 70_000).force_n, DVec3::ZERO, "another pair");
+        assert_eq!(memory.recall(partner, key(70_000)), place);
+        assert_eq!(memory.recall(partner, key(70_000 - 32_768)).force_n, DVec3::ZERO, "another place of the same pair");
+        assert_eq!(memory.recall(Partner::Static(3 + 32_768), key(70_000)).force_n, DVec3::ZERO, "another pair");
         memory.turn(now);
-        assert_eq!(memory.recall(partner, 70_000).force_n, DVec3::ZERO);
+        assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
     }
 

@@ -264,7 +264,7 @@ impl ClusterStepper {
             }
         }
         for (owner, impulse) in springs.owners.iter().zip(&solution.rows_n_s) {
-            let place = Remembered { key: 0, force_n: *impulse / h_s, owed_slip_m: DVec3::ZERO };
+            let place = Remembered { force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         let part = SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);

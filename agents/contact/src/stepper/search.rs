@@ -8,7 +8,7 @@ use super::scene::ClusterScene;
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
 use glam::DVec3;
-use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, touches};
 use metachron_geometry::{Aabb, CollisionShape, ContactSide, Touch};
 
 /// A place is taken up if its gap may close below this within the step, metres.
@@ -27,7 +27,7 @@ pub(super) struct Owner {
     /// The participant on side 1, where there is one.
     pub other: Option<usize>,
     /// The name of the place within its pair.
-    pub key: u64,
+    pub key: TouchKey,
 }
 
 /// Reusable storage, and what was found.
@@ -90,7 +90,7 @@ impl Search {
                     break;
                 }
                 let theirs = grown(other);
-                if mine.low.cmple(theirs.high).all() && theirs.low.cmple(mine.high).all() {
+                if mine.meets(theirs) {
                     self.near.push([reach.member.min(other.member), reach.member.max(other.member)]);
                 }
             }
@@ -138,11 +138,11 @@ impl Search {
         let reach_m = LOOK_M + self.speed(member) * h_s;
         let bounds = skin.bounds().grown(reach_m);
         for (number, solid) in (0..).zip(scene.statics()) {
-            if !solid.may_meet(&bounds) {
+            if !solid.bounds().meets(bounds) {
                 continue;
             }
             solid.touches(&skin, reach_m, &mut self.scratch, &mut self.touches);
-            let skins = [skin.form, solid.form()];
+            let skins = [skin.form, &solid.form];
             for touch in &self.touches {
                 let place = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
                 let sides = [place.of_member(member), Side::FIXED];
@@ -188,7 +188,7 @@ fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> 
 fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {
-        key: touch.key,
+        key: 0,
         sides,
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],

@@ -9,6 +9,7 @@ use crate::AnchorSpring;
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use glam::DVec3;
 use metachron_core::{AgentId, Grip};
+use metachron_geometry::narrow_phase::TouchKey;
 
 /// Where a row belongs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +65,7 @@ impl Springs {
         }
         let partner = Partner::Tie(number);
         let sides = [point.side.of_member(member), Side::FIXED];
-        let warm_n_s = all[member].memory.recall(partner, 0).force_n * h_s;
+        let warm_n_s = all[member].memory.recall(partner, TouchKey::default()).force_n * h_s;
         let row = JointRow { warm_n_s, ..JointRow::new(0, sides, Hold::ALL) }.with_spring(law, h_s);
         self.rows.push(JointRow { target_m_s: row.target_m_s + spring.target_velocity, ..row });
         self.owners.push(RowOwner { member, partner, by: spring.by });

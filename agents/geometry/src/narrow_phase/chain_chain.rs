@@ -4,6 +4,7 @@
 //! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
 
 use super::primitives::{Strand, StrandPoint};
+use super::touch_key::{TouchKey, TouchKind};
 use crate::Touch;
 use crate::capsule_chain::facing;
 use crate::signed_distance;
@@ -17,7 +18,7 @@ const FEW: usize = 4;
 /// are represented by their nodes, which stay where they are while a crossing jumps from end to end.
 const CROSSING_SHARE: f64 = 1e-3;
 /// The place of a crossing in keys, after those of nodes.
-const CROSSING: u64 = 4;
+const CROSSING: u32 = 4;
 /// Maximum number of rounds of the search for the nearest places of tapered spans: for nearly parallel spans each round brings them only
 /// a little nearer.
 const TAPER_ROUNDS: usize = 200;
@@ -175,7 +176,7 @@ impl SpanPair<'_> {
     }
 
     /// Adds a place, unless it is too far or already added.
-    fn report(&self, place: u64, shares: [f64; 2], reported: &mut ReportedContact, into: &mut Vec<Touch>) {
+    fn report(&self, place: u32, shares: [f64; 2], reported: &mut ReportedContact, into: &mut Vec<Touch>) {
         let ([a, b], [i, j], [s, t]) = (self.strands, self.spans, shares);
         if reported.shares[..reported.count].contains(&shares) {
             return;
@@ -187,7 +188,7 @@ impl SpanPair<'_> {
         reported.least_m = reported.least_m.min(touch.distance_m);
         if touch.distance_m <= self.reach_m {
             into.push(Touch {
-                key: (i as u64) << 28 | (j as u64) << 4 | place,
+                key: TouchKey { place, ..TouchKey::new(TouchKind::Spans, [i as u32, j as u32]) },
                 normal: touch.normal,
                 gap_m: touch.distance_m,
                 on_a: a.place(i, s, ends_a[0].toward(ends_a[1], s), touch.normal),
@@ -198,7 +199,7 @@ impl SpanPair<'_> {
 }
 
 /// The nodes that a span reports: its first, and for the last span also the strand's last, with the even one of their two place numbers.
-fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u64, usize)> {
+fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u32, usize)> {
     let is_last = strand.count() > 1 && span + 1 == strand.spans();
     [(0, span), (2, span + 1)].into_iter().take(1 + usize::from(is_last))
 }

@@ -4,6 +4,7 @@
 //! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
 
 use super::primitives::{Block, Strand, StrandPoint};
+use super::touch_key::{TouchKey, TouchKind};
 use crate::Touch;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
@@ -16,7 +17,7 @@ const APART_RADII: f64 = 0.25;
 /// Halvings of the search for such an edge: a thousandth of a span.
 const EDGE_HALVINGS: usize = 10;
 /// The places of a span in keys, after those of nodes: the lowest, and the edges before and after it.
-const LOWEST: u64 = 8;
+const LOWEST: u32 = 8;
 
 /// Every place within `reach_m`, with normals from the block towards the strand.
 pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
@@ -55,6 +56,11 @@ pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Optio
     nearest.map(|near| (block.rotation * near.normal, near.distance_m))
 }
 
+/// The key of a place of a node or span.
+fn key(index: usize, place: u32) -> TouchKey {
+    TouchKey { place, ..TouchKey::new(TouchKind::SpanOnSolid, [index as u32, 0]) }
+}
+
 /// A strand and a block that may touch.
 struct StrandOnBlock<'a> {
     strand: &'a Strand<'a>,
@@ -70,11 +76,11 @@ impl StrandOnBlock<'_> {
         let mut places = self.field.touches(ball.centre, ball.radius_m + self.reach_m);
         if places.iter().next().is_none() {
             // a hull or mesh is searched as deep as the reach; for a node deeper inside the nearest way out is added
-            let deep = self.field.touches(ball.centre, 2.0 * self.block.around.radius_m).iter().next();
+            let deep = self.field.touches(ball.centre, self.block.deep_m).iter().next();
             deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
         }
         for (place, touch) in (0..).zip(places.iter()) {
-            let key = (node as u64) << 28 | place;
+            let key = key(node, place);
             self.report(key, self.strand.node(node), touch, into);
         }
         places.iter().next()
@@ -95,9 +101,8 @@ impl StrandOnBlock<'_> {
                     })
             })
         });
-        let key = (span as u64) << 28 | LOWEST;
         if let Some((share, touch)) = lowest {
-            self.report(key, StrandPoint { span, share }, touch, into);
+            self.report(key(span, LOWEST), StrandPoint { span, share }, touch, into);
         }
         let end_gap = |side: usize| near[side].map_or(f64::INFINITY, |near| near.distance_m - ends[side].radius_m);
         let (from, least_m) = match lowest {
@@ -107,7 +112,7 @@ impl StrandOnBlock<'_> {
         };
         for (place, to) in [(1, 0.0), (2, 1.0)] {
             if let Some((share, touch)) = self.edge(ends, from, to, least_m) {
-                self.report(key + place, StrandPoint { span, share }, touch, into);
+                self.report(key(span, LOWEST + place), StrandPoint { span, share }, touch, into);
             }
         }
     }
@@ -143,7 +148,7 @@ impl StrandOnBlock<'_> {
     }
 
     /// Adds a place, unless it is too far.
-    fn report(&self, key: u64, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+    fn report(&self, key: TouchKey, at: StrandPoint, touch: signed_distance::Touch, into: &mut Vec<Touch>) {
         let StrandPoint { span, share } = at;
         let [a, b] = self.strand.ends(span);
         let ball = if share == 1.0 { b } else { a.toward(b, share) };

@@ -7,6 +7,7 @@
 use super::epa::Hull;
 use super::gjk::{Difference, Part, Separation};
 use super::primitives::Block;
+use super::touch_key::{TouchKey, TouchKind};
 use crate::{Place, Touch};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::bounding_volume::BoundingVolume;
@@ -15,19 +16,15 @@ use rapier3d::parry::query::{ContactManifold, TrackedContact};
 use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature};
 
 /// Error of a place in single precision, as a share of the sizes: ten roundings.
-const SINGLE_SHARE: f64 = 1e-6;
+pub(super) const SINGLE_SHARE: f64 = 1e-6;
 /// Points of a manifold closer to each other than this share of the sizes count as one.
-const SAME_SHARE: f64 = 1e-4;
-/// Bits of a feature and of a part in keys.
-const FEATURE_BITS: u32 = 24;
-/// See [`FEATURE_BITS`].
-const PART_BITS: u32 = 5;
+pub(super) const SAME_SHARE: f64 = 1e-4;
 
 /// Storage for the search.
 #[derive(Default)]
 pub(super) struct ConvexScratch {
-    hull: Hull,
-    manifold: ContactManifold<(), ()>,
+    pub(super) hull: Hull,
+    pub(super) manifold: ContactManifold<(), ()>,
 }
 
 impl ConvexScratch {
@@ -71,15 +68,21 @@ fn each_pair(a: &Block<'_>, b: &Block<'_>, reach_m: f64, mut visit: impl FnMut(&
     }
 }
 
+/// A pose in single precision.
+pub(super) fn pose(position: DVec3, rotation: DQuat) -> Pose {
+    let q = rotation.as_quat();
+    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(q.x, q.y, q.z, q.w).normalize())
+}
+
 /// The convex parts of a block; a half space has none.
-fn parts<'a>(block: &'a Block<'a>) -> impl Iterator<Item = Part<'a>> {
-    let whole = Part { number: 0, shape: block.shape.as_ref(), origin: block.origin, rotation: block.rotation };
+pub(super) fn parts<'a>(block: &'a Block<'a>) -> impl Iterator<Item = Part<'a>> {
+    let whole = Part { number: 0, shape: block.shape, corners: None, origin: block.origin, rotation: block.rotation };
     let compound = block.shape.as_compound();
     let within = compound.into_iter().flat_map(|compound| (0..).zip(compound.shapes())).map(|(number, (at, shape))| {
         let turn = at.rotation;
         let turn = DQuat::from_xyzw(turn.x.into(), turn.y.into(), turn.z.into(), turn.w.into()).normalize();
         let origin = block.origin + block.rotation * at.translation.as_dvec3();
-        Part { number, shape: shape.as_ref(), origin, rotation: block.rotation * turn }
+        Part { number, shape: shape.as_ref(), corners: None, origin, rotation: block.rotation * turn }
     });
     let whole = Some(whole).filter(|whole| compound.is_none() && whole.shape.as_support_map().is_some());
     whole.into_iter().chain(within)
@@ -88,12 +91,11 @@ fn parts<'a>(block: &'a Block<'a>) -> impl Iterator<Item = Part<'a>> {
 /// The second part's pose in the first's axes: relative in double precision first.
 fn relative(first: &Part<'_>, second: &Part<'_>) -> Pose {
     let back = first.rotation.conjugate();
-    let (position, q) = (back * (second.origin - first.origin), (back * second.rotation).as_quat());
-    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(q.x, q.y, q.z, q.w).normalize())
+    pose(back * (second.origin - first.origin), back * second.rotation)
 }
 
 /// The points where the features that face each other along the normal meet.
-fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<'_>, apart: &Separation) {
+pub(super) fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<'_>, apart: &Separation) {
     manifold.points.clear();
     let maps = first.shape.as_polygonal_feature_map().zip(second.shape.as_polygonal_feature_map());
     let Some(((one, one_rim), (two, two_rim))) = maps else { return };
@@ -113,7 +115,7 @@ fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<
 
 /// A point where the facing features of two parts meet.
 struct ClippedPoint {
-    key: u64,
+    key: TouchKey,
     gap_m: f64,
     /// On the first part, relative to its origin, in world axes, metres.
     place: DVec3,
@@ -165,14 +167,8 @@ impl Facing<'_> {
     }
 
     /// The key of a point: the parts, and the corners, edges or faces that meet in it.
-    fn key(&self, one: PackedFeatureId, two: PackedFeatureId) -> u64 {
-        let part = |part: &Part<'_>| part.number & ((1 << PART_BITS) - 1);
-        // parry stores the kind of a feature in the two highest bits
-        let feature = |PackedFeatureId(id): PackedFeatureId| {
-            let (kind, number) = (u64::from(id >> 30), u64::from(id) & ((1 << (FEATURE_BITS - 2)) - 1));
-            kind << (FEATURE_BITS - 2) | number
-        };
-        let parts = part(self.first) << PART_BITS | part(self.second);
-        parts << (2 * FEATURE_BITS) | feature(one) << FEATURE_BITS | feature(two)
+    fn key(&self, one: PackedFeatureId, two: PackedFeatureId) -> TouchKey {
+        let parts = [self.first.number, self.second.number];
+        TouchKey { parts, ..TouchKey::new(TouchKind::Convex, [one.0, two.0]) }
     }
 }

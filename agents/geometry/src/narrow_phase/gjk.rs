@@ -11,9 +11,11 @@ use rapier3d::parry::shape::Shape;
 #[derive(Clone, Copy)]
 pub(super) struct Part<'a> {
     /// Its number in the block.
-    pub number: u64,
+    pub number: u32,
     /// Its parry shape.
     pub shape: &'a dyn Shape,
+    /// The corners of a triangle in its axes, in double precision, metres.
+    pub corners: Option<[DVec3; 3]>,
     /// Where its axes' origin is.
     pub origin: DVec3,
     /// From its axes to the world's.
@@ -58,13 +60,15 @@ impl Part<'_> {
     /// The point farthest along `way`, metres from `from`.
     fn support(&self, way: DVec3, from: DVec3) -> DVec3 {
         let way = self.rotation.conjugate() * way;
-        let corner = if let Some(cuboid) = self.shape.as_cuboid() {
+        let far = |best: DVec3, next: DVec3| if next.dot(way) > best.dot(way) { next } else { best };
+        let corner = if let Some([a, b, c]) = self.corners {
+            far(far(a, b), c)
+        } else if let Some(cuboid) = self.shape.as_cuboid() {
             cuboid.half_extents.as_dvec3().copysign(way)
         } else if let Some(round) = self.shape.as_cylinder() {
             let out = DVec3::new(way.x, 0.0, way.z).normalize_or_zero() * f64::from(round.radius);
             out.with_y(f64::from(round.half_height).copysign(way.y))
         } else if let Some(hull) = self.shape.as_convex_polyhedron() {
-            let far = |best: DVec3, next: DVec3| if next.dot(way) > best.dot(way) { next } else { best };
             hull.points().iter().map(|p| p.as_dvec3()).reduce(far).unwrap_or_default()
         } else {
             self.shape.as_support_map().map_or(DVec3::ZERO, |map| map.local_support_point(way.as_vec3()).as_dvec3())

@@ -13,11 +13,14 @@ mod chain_convex;
 mod convex_convex;
 mod epa;
 mod gjk;
+mod mesh_convex;
 mod primitives;
 mod shape_cache;
+mod static_solid;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod touch_key;
 mod voronoi_regions;
 
 #[cfg(test)]
@@ -29,16 +32,21 @@ use convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
 use shape_cache::ShapeCache;
+pub use static_solid::{StaticSolid, StaticSolidError};
 use surface::SurfaceScratch;
+pub use touch_key::{KEY_STEPS, TouchKey, TouchKind};
 pub use voronoi_regions::VoronoiRegions;
-
-/// The key difference between neighbouring segments in a contact between chains: of the second chain, and of the first.
-pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
 
 /// Reusable storage for contact searches: one for each agent.
 #[derive(Default)]
 pub struct NarrowPhaseScratch {
     known: ShapeCache,
+    searches: Searches,
+}
+
+/// The searches between kinds of pieces, with their storage.
+#[derive(Default)]
+struct Searches {
     chains: ChainScratch,
     blocks: ConvexScratch,
     surfaces: SurfaceScratch,
@@ -56,35 +64,67 @@ pub fn touches(
     into: &mut Vec<Touch>,
 ) {
     into.clear();
-    let NarrowPhaseScratch { known, chains, blocks, surfaces } = scratch;
+    let NarrowPhaseScratch { known, searches } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
-        for (j, other) in second.iter().filter(|(_, other)| piece.may_touch(other, reach_m)) {
-            let from = into.len();
-            match (piece, other) {
-                (Piece::Strand(a), Piece::Strand(b)) => chains.touches(a, b, reach_m, into),
-                (Piece::Strand(a), Piece::Block(b)) => chain_convex::touches(a, b, reach_m, into),
-                (Piece::Block(a), Piece::Strand(b)) => {
-                    chain_convex::touches(b, a, reach_m, into);
-                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
-                }
-                // clipping depends on the order: the larger block is first, whichever agent calls
-                (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
-                    blocks.touches(b, a, reach_m, into);
-                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
-                }
-                (Piece::Block(a), Piece::Block(b)) => blocks.touches(a, b, reach_m, into),
-                (Piece::Surface(a), other) => surfaces.touches(a, other, reach_m, into),
-                (other, Piece::Surface(b)) => {
-                    surfaces.touches(b, other, reach_m, into);
-                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
-                }
-            }
-            let pair = (i as u64 * shape_cache::PARTS as u64 + j as u64) << PAIR_SHIFT;
-            into[from..].iter_mut().for_each(|touch| touch.key |= pair);
+        for (j, other) in second.iter() {
+            searches.touches([(i, piece), (j, other)], reach_m, into);
         }
     }
+    finish(into);
+}
+
+impl Searches {
+    /// Adds every place within `reach_m` of two pieces, given with their numbers.
+    fn touches(&mut self, pieces: [(usize, &Piece<'_>); 2], reach_m: f64, into: &mut Vec<Touch>) {
+        let Self { chains, blocks, surfaces } = self;
+        let [(i, piece), (j, other)] = pieces;
+        if !piece.may_touch(other, reach_m) {
+            return;
+        }
+        let from = into.len();
+        match (piece, other) {
+            (Piece::Strand(a), Piece::Strand(b)) => chains.touches(a, b, reach_m, into),
+            (Piece::Strand(a), Piece::Block(b)) => chain_convex::touches(a, b, reach_m, into),
+            (Piece::Block(a), Piece::Strand(b)) => {
+                chain_convex::touches(b, a, reach_m, into);
+                into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+            }
+            // clipping depends on the order: the larger block is first, whichever agent calls
+            (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
+                blocks.touches(b, a, reach_m, into);
+                into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+            }
+            (Piece::Block(a), Piece::Block(b)) => blocks.touches(a, b, reach_m, into),
+            (Piece::Surface(a), other) => surfaces.touches(a, other, reach_m, into),
+            (other, Piece::Surface(b)) => {
+                surfaces.touches(b, other, reach_m, into);
+                into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+            }
+        }
+        into[from..].iter_mut().for_each(|touch| touch.key.pieces = [i as u8, j as u8]);
+    }
+
+    /// The nearest place of two pieces: its normal from the second towards the first, and a gap that is never larger than the true one.
+    fn gap(&mut self, piece: &Piece<'_>, other: &Piece<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
+        let Self { chains, blocks, .. } = self;
+        if !piece.may_touch(other, reach_m) {
+            return None;
+        }
+        match (piece, other) {
+            (Piece::Strand(a), Piece::Strand(b)) => chains.gap(a, b, reach_m),
+            (Piece::Strand(a), Piece::Block(b)) => chain_convex::gap(a, b, reach_m),
+            (Piece::Block(a), Piece::Strand(b)) => chain_convex::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m)),
+            (Piece::Block(a), Piece::Block(b)) => blocks.gap(a, b, reach_m),
+            (Piece::Surface(a), other) => Some(surface::gap(a, other)),
+            (other, Piece::Surface(b)) => Some(surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
+        }
+    }
+}
+
+/// Drops what is not finite, sorts by rising keys and makes equal keys differ.
+fn finish(into: &mut Vec<Touch>) {
     into.retain(|touch| touch.gap_m.is_finite() && touch.normal.is_finite());
     name(into);
 }
@@ -94,14 +134,14 @@ fn flipped(touch: Touch) -> Touch {
     Touch { normal: -touch.normal, on_a: touch.on_b, on_b: touch.on_a, ..touch }
 }
 
-/// Keys inside a pair of pieces stay below this bit.
-const PAIR_SHIFT: u32 = 58;
-
 /// Sorts contacts by their keys and makes equal keys differ.
 fn name(touches: &mut [Touch]) {
     touches.sort_unstable_by_key(|touch| touch.key);
     for i in 1..touches.len() {
-        touches[i].key = touches[i].key.max(touches[i - 1].key + 1);
+        let (before, key) = (touches[i - 1].key, &mut touches[i].key);
+        if *key <= before {
+            *key = TouchKey { place: before.place + 1, ..before };
+        }
     }
 }
 
@@ -113,24 +153,14 @@ pub fn gap(
     reach_m: f64,
     scratch: &mut NarrowPhaseScratch,
 ) -> Option<(DVec3, f64)> {
-    let NarrowPhaseScratch { known, chains, blocks, .. } = scratch;
+    let NarrowPhaseScratch { known, searches } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;
     for (_, piece) in first.iter() {
         for (_, other) in second.iter() {
             let reach_m = nearest.map_or(reach_m, |(_, gap_m)| gap_m.min(reach_m));
-            if !piece.may_touch(other, reach_m) {
-                continue;
-            }
-            let found = match (piece, other) {
-                (Piece::Strand(a), Piece::Strand(b)) => chains.gap(a, b, reach_m),
-                (Piece::Strand(a), Piece::Block(b)) => chain_convex::gap(a, b, reach_m),
-                (Piece::Block(a), Piece::Strand(b)) => chain_convex::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m)),
-                (Piece::Block(a), Piece::Block(b)) => blocks.gap(a, b, reach_m),
-                (Piece::Surface(a), other) => Some(surface::gap(a, other)),
-                (other, Piece::Surface(b)) => Some(surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
-            };
+            let found = searches.gap(piece, other, reach_m);
             nearest = found.filter(|&(_, gap_m)| nearest.is_none_or(|(_, least)| gap_m < least)).or(nearest);
         }
     }

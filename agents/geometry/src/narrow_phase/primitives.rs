@@ -9,7 +9,7 @@ use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use glam::{DQuat, DVec3};
-use rapier3d::parry::shape::SharedShape;
+use rapier3d::parry::shape::Shape;
 
 /// The pieces of a form.
 #[derive(Default)]
@@ -60,13 +60,15 @@ pub(super) struct Block<'a> {
     /// Its distance field, in its own axes; `None` where no strand is near.
     pub field: Option<&'a Field>,
     /// Its parry shape, in its own axes.
-    pub shape: &'a SharedShape,
+    pub shape: &'a dyn Shape,
     /// Where its axes' origin is.
     pub origin: DVec3,
     /// From its axes to the world's.
     pub rotation: DQuat,
     /// A ball around it.
     pub around: Ball,
+    /// How deep inside it a point of a chain or a skin is still pushed out, metres; a convex primitive has no limit.
+    pub deep_m: f64,
     /// Whether it is a part of a tool: thin, and driven with force.
     pub pierces: bool,
 }
@@ -91,8 +93,9 @@ impl<'a> Pieces<'a> {
                     _ => {
                         let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
                         let around = Ball { centre: position, radius_m };
-                        let (field, shape) = (known.field(solid), known.shape(form));
-                        Piece::Block(Block { field, shape, origin, rotation, around, pierces: false })
+                        let (field, shape) = (known.field(solid), known.shape(form).as_ref());
+                        let (deep_m, pierces) = (2.0 * radius_m, false);
+                        Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces })
                     }
                 });
             }
@@ -103,8 +106,9 @@ impl<'a> Pieces<'a> {
                     let rotation = rotation * part.rotation;
                     let around = Ball { centre: origin + rotation * solid.around.centre, ..solid.around };
                     let field = Some(&solid.field);
-                    let shape = &solid.shape;
-                    *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, pierces: true }));
+                    let (shape, deep_m) = (solid.shape.as_ref(), 2.0 * around.radius_m);
+                    let pierces = true;
+                    *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces }));
                 }
             }
             (ShapeKind::Surface(form), ShapePose::Surface(positions)) if !positions.is_empty() => {
@@ -160,6 +164,15 @@ impl Piece<'_> {
                 apart <= surface.form.radius_m + reach_m
             }
         }
+    }
+
+    /// A ball around it.
+    pub fn around(&self) -> Ball {
+        if let Self::Block(block) = self {
+            return block.around;
+        }
+        let Aabb { low, high } = self.bounds();
+        Ball { centre: (low + high) * 0.5, radius_m: 0.5 * low.distance(high) }
     }
 
     /// The box around it, including the thickness of a surface or strand.

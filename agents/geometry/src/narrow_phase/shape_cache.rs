@@ -36,12 +36,19 @@ impl ShapeCache {
         for (form, other) in [(a, b), (b, a)] {
             match &form.kind {
                 ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.kind) => self.prepare_solid(solid),
-                ShapeKind::Solid(SolidShape { solid, shape, .. }) if shape.as_trimesh().is_some() => {
-                    self.prepare_hull(solid)
-                }
-                ShapeKind::Tool(shape) => self.prepare_tool(shape),
-                _ => {}
+                _ => self.prepare_pieces(form),
             }
+        }
+    }
+
+    /// Caches the data that the pieces of a form need where its own field is not asked.
+    pub fn prepare_pieces(&mut self, form: &CollisionShape) {
+        match &form.kind {
+            ShapeKind::Solid(SolidShape { solid, shape, .. }) if shape.as_trimesh().is_some() => {
+                self.prepare_hull(solid)
+            }
+            ShapeKind::Tool(shape) => self.prepare_tool(shape),
+            _ => {}
         }
     }
 

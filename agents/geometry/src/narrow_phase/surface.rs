@@ -11,6 +11,7 @@ mod surface_convex;
 mod surface_surface;
 
 use super::primitives::{Piece, Strand, StrandPoint, Surface};
+use super::touch_key::{TouchKey, TouchKind};
 use super::voronoi_regions::{Feature, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
@@ -21,10 +22,6 @@ use surface_surface::SkinPair;
 
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
-/// Kinds of places in keys: a vertex of the surface, an edge, a triangle, a vertex of another surface.
-const KINDS: [u64; 4] = [0, 1 << 40, 2 << 40, 3 << 40];
-/// Shift of the part's number in its key.
-const PART_SHIFT: u32 = 20;
 
 /// Scratch storage for searches.
 #[derive(Default)]
@@ -78,7 +75,7 @@ impl SkinPoint {
 /// An edge of a skin, and where its ends are.
 #[derive(Clone, Copy)]
 struct Edge {
-    number: u64,
+    number: u32,
     vertices: [u32; 2],
     ends: [DVec3; 2],
 }
@@ -100,7 +97,7 @@ impl Edge {
 /// A triangle of a skin, and where its corners are.
 #[derive(Clone, Copy)]
 struct Triangle {
-    number: u64,
+    number: u32,
     vertices: [u32; 3],
     corners: [DVec3; 3],
 }
@@ -227,7 +224,7 @@ impl SurfaceQuery<'_> {
             let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
             if outside && Feature::Vertex(vertex).is_nearest(self.surface, core - at) {
                 let point = SkinPoint::vertex(vertex, at);
-                into.extend(self.strand_contact(KINDS[0] | u64::from(vertex), point, strand, nearest));
+                into.extend(self.strand_contact(vertex_key(vertex), point, strand, nearest));
             }
         }
         for edge in self.surface.edges_in(self.region) {
@@ -244,7 +241,7 @@ impl SurfaceQuery<'_> {
                     .iter()
                     .all(|vertex| self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0));
                 if outside && edge.feature().is_nearest(self.surface, way) {
-                    let key = KINDS[1] | edge.number << PART_SHIFT | span as u64;
+                    let key = TouchKey::new(TouchKind::Edge, [edge.number, span as u32]);
                     into.extend(self.strand_contact(key, point, strand, here));
                 }
             }
@@ -252,14 +249,14 @@ impl SurfaceQuery<'_> {
         for triangle in self.surface.triangles_in(self.region) {
             for node in 0..strand.count() {
                 let Some(point) = triangle.inside(strand.ball(node).centre) else { continue };
-                let key = KINDS[2] | triangle.number << PART_SHIFT | node as u64;
+                let key = TouchKey::new(TouchKind::Triangle, [triangle.number, node as u32]);
                 into.extend(self.strand_contact(key, point, strand, strand.node(node)));
             }
         }
     }
 
     /// The contact between a point of the skin and one of a strand, unless they are too far.
-    fn strand_contact(&self, key: u64, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
+    fn strand_contact(&self, key: TouchKey, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
         let SkinPoint { spot, position: point } = here;
         let ball = ball_at(strand, there);
         let way = point - ball.centre;
@@ -298,6 +295,11 @@ impl SurfaceQuery<'_> {
         let [a, b, c] = self.surface.corners(spot.vertices);
         (b - a).cross(c - a).try_normalize()
     }
+}
+
+/// The key of the place of a vertex.
+fn vertex_key(vertex: u32) -> TouchKey {
+    TouchKey::new(TouchKind::Vertex, [vertex, 0])
 }
 
 /// The ball of a strand at a point of it.

@@ -3,6 +3,7 @@
 mod blocks;
 mod promises;
 mod rounds;
+mod static_solids;
 mod surfaces;
 mod tubes;
 

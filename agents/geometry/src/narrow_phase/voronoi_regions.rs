@@ -57,7 +57,7 @@ impl VoronoiRegions {
     }
 
     /// Vectors along an edge both ways, and across it into the triangles that meet there.
-    fn at_edge(&self, surface: &Surface<'_>, number: u64, [a, b]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+    fn at_edge(&self, surface: &Surface<'_>, number: u32, [a, b]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
         let along = (b - a).normalize_or_zero();
         let corners = self.opposite[number as usize].into_iter().filter(|corner| *corner != NONE);
         let across = corners.map(move |corner| (surface.positions[corner as usize] - a).reject_from_normalized(along));
@@ -69,7 +69,7 @@ impl VoronoiRegions {
 #[derive(Clone, Copy)]
 pub(super) enum Feature {
     Vertex(u32),
-    Edge(u64, [DVec3; 2]),
+    Edge(u32, [DVec3; 2]),
 }
 
 impl Feature {

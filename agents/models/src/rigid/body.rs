@@ -16,7 +16,6 @@ use super::member::Unknowns;
 use super::motion::Motion;
 use super::sided::Sided;
 use super::spring_set::SpringSet;
-use super::static_shapes::StaticShapes;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, linear_spring};
 use crate::limits::PART_MAX_S;
@@ -33,7 +32,7 @@ use metachron_core::{
     check_span,
 };
 use metachron_core::{Impulse, Mat6, Twist};
-use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
+use metachron_geometry::{CollisionShape, ShapeKind, SolidShape, StaticSolid};
 use metachron_geometry::{Obstacle, Solid};
 use std::any::Any;
 use std::sync::Arc;
@@ -47,7 +46,7 @@ pub struct RigidBody {
     /// The static solids, for flights and for contact with them alone.
     pub(super) world: World,
     /// The same as forms, for simultaneous contact with them and other agents.
-    pub(super) obstacles: StaticShapes,
+    pub(super) obstacles: Vec<StaticSolid>,
     /// The neighbours that it meets.
     pub(super) company: Company,
     pub(super) meeting: Meeting,
@@ -135,7 +134,7 @@ impl RigidBody {
         motion.set_spin(&spread, spec.spin);
         let world = World::new(&spec, &spread)?;
         let form = form_of(&spec, &spread, &world);
-        let obstacles = StaticShapes::new(&spec.obstacles, world.mover.radius_m)?;
+        let obstacles = spec.obstacles.iter().map(StaticSolid::new).collect::<Result<_, _>>()?;
         let mut body = Self {
             spread,
             gravity: spec.gravity,

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/coupling.md, eq. 7a and 7n.
 
 use super::RigidBody;
-use super::static_shapes::Mine;
+use super::company::placed;
 use glam::DVec3;
 use metachron_core::Impulse;
 use metachron_core::snapshot::{Footprint, STANDING_M_S};
@@ -55,9 +55,9 @@ impl RigidBody {
     fn footprint(&mut self) -> Option<Footprint> {
         let Self { motion, world, company, meeting, obstacles, .. } = self;
         let (_, _, _, room, form) = company.split();
-        let mine = Mine { form, mover: &world.mover, motion };
+        let mine = placed(form, motion);
         let mut print = Footprint::default();
-        for solid in obstacles.iter_mut() {
+        for solid in obstacles.iter() {
             solid.touches(&mine, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
             for touch in &meeting.touches {
                 let Place::Point(point) = touch.on_a else { return None };

@@ -12,11 +12,10 @@ use super::conservative_advancement::MovingShape;
 use super::leant::Leant;
 use super::mass_properties::MassDistribution;
 use super::motion::Motion;
-use super::static_shapes::StaticShapes;
 use glam::{DMat3, DVec3};
 use metachron_contact::{Contact, Problem, Settings, Solver, inverse_mass};
 use metachron_core::Twist;
-use metachron_geometry::Touch;
+use metachron_geometry::{StaticSolid, Touch};
 
 /// The body itself, as a solve needs it.
 pub(super) struct Me<'a> {
@@ -101,7 +100,7 @@ impl Meeting {
         &mut self,
         me: &mut Me<'_>,
         company: &mut Company,
-        fixed: &mut StaticShapes,
+        fixed: &[StaticSolid],
         strike: Strike,
     ) -> bool {
         company.strike(true);
@@ -162,7 +161,7 @@ impl Meeting {
         &mut self,
         me: &mut Me<'_>,
         company: &mut Company,
-        (fixed, scope): (&mut StaticShapes, Scope),
+        (fixed, scope): (&[StaticSolid], Scope),
         (h, gravity): (f64, DVec3),
     ) -> Option<Pressed> {
         company.foresee_springs(h);

@@ -35,7 +35,6 @@ mod places;
 mod sided;
 mod spec;
 mod spring_set;
-mod static_shapes;
 mod world;
 
 pub use body::RigidBody;

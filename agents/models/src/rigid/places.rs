@@ -7,13 +7,12 @@ use super::advance::TOUCH_S;
 use super::company::{Company, Guest, placed};
 use super::footing::FEET_M;
 use super::meeting::{Found, Me, Meeting, Strike};
-use super::static_shapes::{Mine, StaticShapes};
 use glam::DVec3;
 use metachron_contact::tank::RESERVE_M_S;
 use metachron_contact::{Contact, PUSH_OUT_SHARE};
 use metachron_core::ContactJacobian;
 use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{ContactSide, Place, Touch};
+use metachron_geometry::{ContactSide, Place, StaticSolid, Touch};
 
 /// A contact farther than this from closing within the part is left out, metres.
 const SLACK_M: f64 = 1e-5;
@@ -27,7 +26,7 @@ const BOUND_SHARE: f64 = 2e-5;
 
 impl Meeting {
     /// Places within the skin of everything that takes part, for a blow.
-    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &mut StaticShapes, strike: Strike) {
+    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &[StaticSolid], strike: Strike) {
         let span = company.span;
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
@@ -43,10 +42,9 @@ impl Meeting {
             let law = (guest.friction, |closing_m_s| guest.restitution_at(closing_m_s, &span), owed);
             self.take_up(me, Some((i, guest)), law);
         }
-        let mine = Mine { form, mover: me.mover, motion: me.motion };
         // who stands and is struck down on one foot would turn over it, and be thrown up from the next
         let past = if strike.stood { past + FEET_M } else { past };
-        for solid in fixed.iter_mut() {
+        for solid in fixed {
             solid.touches(&mine, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
             let skin = &solid.form;
             let (friction, restitution) =
@@ -104,14 +102,14 @@ impl Meeting {
         &mut self,
         me: &Me<'_>,
         company: &mut Company,
-        fixed: &mut StaticShapes,
+        fixed: &[StaticSolid],
         (h, gravity): (f64, DVec3),
     ) {
         let (_, _, _, room, form) = company.split();
-        let mine = Mine { form, mover: me.mover, motion: me.motion };
+        let mine = placed(form, me.motion);
         let swing = self.before[1].length() * me.mover.swing_m;
         let reach = (me.motion.velocity.length() + swing + gravity.length() * h) * h + SLACK_M;
-        for solid in fixed.iter_mut() {
+        for solid in fixed {
             solid.touches(&mine, reach, room, &mut self.touches);
             let from = self.found.len();
             self.take_up(me, None, ((form.friction * solid.form.friction).sqrt(), still, 0.0));
@@ -138,7 +136,7 @@ impl Meeting {
             let rebound = restitution(approach_m_s) * approach_m_s.max(0.0);
             let rebound_m_s = (rebound * rebound - owed).max(0.0).sqrt();
             let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
-            let key = mixed(touch.key ^ mixed(with));
+            let key = mixed(touch.key.packed() ^ mixed(with));
             let (normal, gap_m) = (touch.normal, touch.gap_m);
             let contact = Contact {
                 key,

@@ -2,7 +2,7 @@
 
 use super::{Joint, JointError};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, ShapeError, Solid};
+use metachron_geometry::{Obstacle, ShapeError, Solid, StaticSolidError};
 use std::sync::Arc;
 
 /// A rigid body before it is built.
@@ -41,14 +41,9 @@ pub enum RigidError {
     /// The solid is invalid.
     #[error("the shape of the rigid body is invalid: {0}")]
     Shape(#[from] ShapeError),
-    /// An obstacle's solid is invalid.
-    #[error("the shape of the static solid `{name}` is invalid: {source}")]
-    Obstacle {
-        /// The obstacle's name.
-        name: String,
-        /// The error of its shape.
-        source: ShapeError,
-    },
+    /// A static solid is invalid.
+    #[error(transparent)]
+    Obstacle(#[from] StaticSolidError),
     /// A joint is invalid.
     #[error(transparent)]
     Joint(#[from] JointError),

@@ -10,6 +10,7 @@ use super::mass_properties::MassDistribution;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
 use glam::DVec3;
+use metachron_geometry::StaticSolidError;
 use rapier3d::dynamics::{
     CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
     SpringCoefficients,
@@ -46,7 +47,7 @@ impl World {
         let mut fixed = Vec::with_capacity(spec.obstacles.len());
         for obstacle in spec.obstacles.iter() {
             let solid = Fixed::new(&obstacle.solid, obstacle.position, obstacle.rotation)
-                .map_err(|source| RigidError::Obstacle { name: obstacle.name.clone(), source })?;
+                .map_err(|source| StaticSolidError::Shape { name: obstacle.name.clone(), source })?;
             let (shape, at) = solid.placed();
             // what bounces is struck before: lasting contact does not
             sim.colliders.insert(collider(shape, obstacle.friction, 0.0).position(at));

@@ -7,11 +7,11 @@ use super::company::Company;
 use super::initial_overlap::PassingVertices;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_contact::{Contact, Owner, Problem, Search, Settings, Solver};
 use metachron_core::ContactJacobian;
-use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
-use metachron_geometry::{CollisionShape, ContactSide, PlacedShape, ShapeKind, ShapePose, SolidShape, Touch};
+use metachron_geometry::narrow_phase::NarrowPhaseScratch;
+use metachron_geometry::{CollisionShape, ContactSide, PlacedShape, ShapePose, StaticSolid, Touch};
 use std::sync::Arc;
 
 /// Solver settings: 10 µm/s, a tenth of the limit for rest.
@@ -50,9 +50,7 @@ pub(super) struct Substep<'a> {
 
 /// A static solid at its place.
 struct Wall {
-    form: CollisionShape,
-    position: DVec3,
-    rotation: DQuat,
+    solid: StaticSolid,
     /// The vertices of the body that pass through it.
     passing: PassingVertices,
 }
@@ -63,13 +61,7 @@ impl Contacts {
     /// # Errors
     /// [`SoftError::Obstacle`] for an invalid static solid.
     pub fn new(spec: &SoftSpec, form: Arc<CollisionShape>, edge_m: f64) -> Result<Self, SoftError> {
-        let wall = |obstacle: &metachron_geometry::Obstacle| {
-            let solid = SolidShape::new(obstacle.solid.clone(), DVec3::ZERO)
-                .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
-            let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
-            let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
-            Ok(Wall { form, position, rotation, passing: PassingVertices::default() })
-        };
+        let wall = |obstacle| Ok(Wall { solid: StaticSolid::new(obstacle)?, passing: PassingVertices::default() });
         let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
         Ok(Self {
             form,
@@ -125,10 +117,9 @@ impl Contacts {
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         for (wall, number) in walls.iter_mut().zip(0_u64..) {
-            let view = ShapePose::Solid { position: wall.position, rotation: wall.rotation };
-            touches(&here, &PlacedShape { form: &wall.form, view }, *slack_m + speed * h, scratch, places);
+            wall.solid.touches(&here, *slack_m + speed * h, scratch, places);
             wall.passing.update(places, held, deep_m);
-            let friction = (form.friction * wall.form.friction).sqrt();
+            let friction = (form.friction * wall.solid.form.friction).sqrt();
             for place in places.iter().filter(|place| !wall.passing.contains(place)) {
                 let mut slots = ContactJacobian::default();
                 place.on_a.join(&mut slots, 0, DVec3::ZERO, ContactSide::first(place.normal));
@@ -139,7 +130,7 @@ impl Contacts {
                 stands = true;
                 // held vertices need no contact to stay
                 if slots.mobility(mobilities) > 0.0 {
-                    let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
+                    let key = (number & 0x7fff) << WALL_SHIFT | place.key.packed() & ((1 << WALL_SHIFT) - 1);
                     let Touch { normal, gap_m, .. } = *place;
                     list.push(Contact {
                         key,

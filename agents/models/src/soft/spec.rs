@@ -2,7 +2,7 @@
 
 use super::grid::Side;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, ShapeError};
+use metachron_geometry::{Obstacle, StaticSolidError};
 use std::sync::Arc;
 
 /// A soft body before it is built.
@@ -117,14 +117,9 @@ pub enum SoftError {
         /// The side's name.
         side: &'static str,
     },
-    /// An obstacle's shape is invalid.
-    #[error("the shape of the static solid `{name}` is invalid: {source}")]
-    Obstacle {
-        /// The obstacle's name.
-        name: String,
-        /// The error of its shape.
-        source: ShapeError,
-    },
+    /// A static solid is invalid.
+    #[error(transparent)]
+    Obstacle(#[from] StaticSolidError),
 }
 
 /// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.

@@ -60,9 +60,30 @@ pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
-    pub contacts: Option<bool>,
+    /// `"clusters"` and `"pairs"` also say how contact is solved.
+    pub contacts: Option<ContactsFile>,
     /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
+}
+
+/// Whether objects collide, and how contact is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ContactsFile {
+    /// Whether moving objects collide with each other.
+    Whether(bool),
+    /// They do, solved in this way.
+    By(ContactPath),
+}
+
+/// How contact is solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ContactPath {
+    /// Each pair by one of its two sides.
+    Pairs,
+    /// All that touch as one problem.
+    Clusters,
 }
 
 /// `[target]`: the target frame rate and how it is held.

@@ -4,8 +4,9 @@
 //! Theory: docs/theory/soft.md, eq. 15a.
 
 use super::super::primitives::Block;
+use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN_SHARE};
-use super::{BarycentricPoint, DEEP_SHARE, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
+use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::near_triangle;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
@@ -43,18 +44,12 @@ impl SurfaceQuery<'_> {
         let nearest = |at: DVec3| {
             let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
             // a hull or mesh is searched as deep as the reach; for a point deeper inside the nearest way out is used
-            near.or_else(|| {
-                field
-                    .touches(inward(at).centre, 2.0 * block.around.radius_m)
-                    .iter()
-                    .next()
-                    .filter(|t| t.distance_m < 0.0)
-            })
+            near.or_else(|| field.touches(inward(at).centre, block.deep_m).iter().next().filter(|t| t.distance_m < 0.0))
         };
         for (vertex, at) in self.surface.vertices_in(self.region) {
             let touch = nearest(at).and_then(|touch| self.out(Feature::Vertex(vertex), block, touch));
             if let Some(touch) = touch {
-                let key = KINDS[0] | u64::from(vertex);
+                let key = vertex_key(vertex);
                 into.extend(self.block_contact(key, SkinPoint::vertex(vertex, at), block, touch));
             }
         }
@@ -69,7 +64,8 @@ impl SurfaceQuery<'_> {
             let inner = (LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&share)
                 && ends.into_iter().all(|end| touch.distance_m + better_m < apart(end));
             if let Some(touch) = inner.then(|| self.out(edge.feature(), block, touch)).flatten() {
-                into.extend(self.block_contact(KINDS[1] | edge.number << PART_SHIFT, edge.at(share), block, touch));
+                let key = TouchKey::new(TouchKind::Edge, [edge.number, 0]);
+                into.extend(self.block_contact(key, edge.at(share), block, touch));
             }
         }
         for triangle in self.surface.triangles_in(self.region) {
@@ -79,7 +75,8 @@ impl SurfaceQuery<'_> {
             let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, field) else { continue };
             let share = if field.corners(DVec3::Z).is_some() { BETTER_SHARE } else { ROUNDING_SHARE };
             if triangle.corners.into_iter().all(|corner| touch.distance_m + share * size_m < apart(corner)) {
-                into.extend(self.block_contact(KINDS[2] | triangle.number << PART_SHIFT, point, block, touch));
+                let key = TouchKey::new(TouchKind::Triangle, [triangle.number, 0]);
+                into.extend(self.block_contact(key, point, block, touch));
             }
         }
     }
@@ -120,7 +117,7 @@ impl SurfaceQuery<'_> {
         let deep_m =
             self.surface.form.radius_m + if ahead { DEEP_SHARE } else { BETTER_SHARE } * self.surface.form.edge_m;
         let mut any = false;
-        for (corner, name) in field.corners(local).into_iter().flatten().zip(1_u64..) {
+        for (corner, name) in field.corners(local).into_iter().flatten().zip(1_u32..) {
             let at = block.rotation * corner + block.origin;
             let distance_m = out.dot(at - a);
             if distance_m < -deep_m || distance_m - self.surface.form.radius_m > self.reach_m {
@@ -134,7 +131,8 @@ impl SurfaceQuery<'_> {
             };
             let touch = signed_distance::Touch { normal: -local, distance_m };
             let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position: foot };
-            into.extend(self.block_contact(KINDS[2] | number << PART_SHIFT | name, point, block, touch));
+            let key = TouchKey::new(TouchKind::Triangle, [number, name]);
+            into.extend(self.block_contact(key, point, block, touch));
             any = true;
         }
         any
@@ -172,7 +170,7 @@ impl SurfaceQuery<'_> {
     /// The contact between a point of the skin and a block whose distance there is `touch`, unless they are too far.
     fn block_contact(
         &self,
-        key: u64,
+        key: TouchKey,
         point: SkinPoint,
         block: &Block<'_>,
         touch: signed_distance::Touch,

@@ -3,8 +3,9 @@
 //! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, round pieces.
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
+use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN_SHARE};
-use super::{BarycentricPoint, DEEP_SHARE, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
+use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::capsule_chain::CROSSING_M;
 use crate::{Aabb, Touch};
 use crate::{near_segments, near_triangle};
@@ -65,7 +66,7 @@ impl<'a> SkinPair<'a> {
         for (vertex, at) in here.surface.vertices_in(here.region) {
             let Some(SkinContact { spot, normal, distance_m }) = self.vertex(here, there, vertex, at) else { continue };
             let (on_a, on_b) = (BarycentricPoint::vertex(vertex).place(), spot.place());
-            into.push(Touch { key: KINDS[0] | u64::from(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
+            into.push(Touch { key: vertex_key(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
         }
     }
 
@@ -74,7 +75,8 @@ impl<'a> SkinPair<'a> {
         for (vertex, at) in there.surface.vertices_in(there.region) {
             let Some(SkinContact { spot, normal, distance_m }) = self.vertex(there, here, vertex, at) else { continue };
             let (on_a, on_b, gap_m) = (spot.place(), BarycentricPoint::vertex(vertex).place(), distance_m - thick_m);
-            into.push(Touch { key: KINDS[3] | u64::from(vertex), normal: -normal, gap_m, on_a, on_b });
+            let key = TouchKey::new(TouchKind::SecondVertex, [vertex, 0]);
+            into.push(Touch { key, normal: -normal, gap_m, on_a, on_b });
         }
     }
 
@@ -90,7 +92,7 @@ impl<'a> SkinPair<'a> {
                 }
                 let (a, b) = (edge.at(s), other.at(t));
                 if let Some((normal, distance_m)) = self.crossing([a, b], [edge.feature(), other.feature()]) {
-                    let key = KINDS[1] | edge.number << PART_SHIFT | other.number;
+                    let key = TouchKey::new(TouchKind::Edge, [edge.number, other.number]);
                     let (on_a, on_b) = (a.spot.place(), b.spot.place());
                     into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a, on_b });
                 }

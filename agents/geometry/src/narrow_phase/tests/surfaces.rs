@@ -20,22 +20,43 @@ fn sheet() -> (CollisionShape, Vec<DVec3>) {
     let halves =
         |(i, j): (u32, u32)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
     let triangles: Vec<[u32; 3]> = cells.flat_map(halves).collect();
-    let mut edges: Vec<[u32; 2]> =
-        triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    (skin_of(&triangles, (CELLS + 1).pow(2), 1e-3, false), places.map(point).collect())
+}
+
+/// The same grid at z = 0.
+pub(super) fn flat_sheet() -> (CollisionShape, Vec<DVec3>) {
+    let (form, mut positions) = sheet();
+    positions.iter_mut().for_each(|at| at.z = 0.0);
+    (form, positions)
+}
+
+/// The closed skin of a block of 10 cm about (0, 0, 5 cm), two triangles a side, and its corners.
+pub(super) fn block_skin() -> (CollisionShape, Vec<DVec3>) {
+    let corner = |i: u32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - DVec3::splat(0.5);
+    let positions: Vec<_> = (0..8).map(|i| corner(i) * 0.1 + DVec3::Z * 0.05).collect();
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<_> = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    (skin_of(&triangles, 8, 0.0, true), positions)
+}
+
+/// The skin of these triangles over so many vertices.
+pub(super) fn skin_of(triangles: &[[u32; 3]], vertices: u32, radius_m: f64, closed: bool) -> CollisionShape {
+    let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<[u32; 2]> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
     edges.sort_unstable();
     edges.dedup();
     let surface = SurfaceShape {
-        fans: VoronoiRegions::of(&edges, &triangles).into(),
-        vertices: (0..(CELLS + 1).pow(2)).collect(),
+        fans: VoronoiRegions::of(&edges, triangles).into(),
+        vertices: (0..vertices).collect(),
         edges: edges.into(),
         triangles: triangles.into(),
-        radius_m: 1e-3,
+        radius_m,
         edge_m: EDGE,
         height_j_kg: 0.0,
-        closed: false,
+        closed,
         held: false,
     };
-    (CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
+    CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }
 }
 
 /// The distance of a point from the nearest triangle.

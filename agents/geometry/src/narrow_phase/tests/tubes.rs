@@ -118,7 +118,7 @@ fn tested_pairs_grow_linearly_with_the_length_of_the_tubes() {
         let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
         touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
         assert!(found.len() > segments, "the strands of a double helix lie side by side");
-        scratch.chains.tried
+        scratch.searches.chains.tried
     };
     let (short, long) = (tried(100), tried(400));
     assert!(long < 5 * short, "{short} pairs for 100 spans, {long} for 400");
@@ -133,7 +133,7 @@ fn tubes_far_apart_test_no_pairs() {
     let b: Vec<_> = a.iter().map(|p| *p + DVec3::X).collect();
     let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
     touches(&along(&form, &a, &radii), &along(&form, &b, &radii), 2e-3, &mut scratch, &mut found);
-    assert!(found.is_empty() && scratch.chains.tried == 0);
+    assert!(found.is_empty() && scratch.searches.chains.tried == 0);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::super::{RigidBody, RigidError};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_core::{Mat6, Twist};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid, StaticSolidError};
 use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
 use rapier3d::parry::shape::SharedShape;
@@ -133,7 +133,7 @@ impl Ground {
         let shape = obstacle
             .solid
             .to_shared_shape()
-            .map_err(|source| RigidError::Obstacle { name: obstacle.name.clone(), source })?;
+            .map_err(|source| StaticSolidError::Shape { name: obstacle.name.clone(), source })?;
         let rotation = obstacle.rotation.normalize();
         let bounds = shape.compute_aabb(&pose_about(DVec3::ZERO, obstacle.position, rotation));
         Ok(Self {

@@ -1,0 +1,139 @@
+//! Names of contacts from step to step: which features of two shapes meet.
+//!
+//! In: numbers of features. Out: keys that are equal only where all of them are. Never here: where the features are.
+
+/// The name of a contact among those of a pair of shapes. It holds whole numbers of features: no two features share a name, however many
+/// there are. Keys rise by pieces, kind, parts, features and place.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TouchKey {
+    /// The pieces of both shapes that meet: a tool has six, all else one.
+    pub pieces: [u8; 2],
+    /// What meets.
+    pub kind: TouchKind,
+    /// The convex parts of both sides, or the triangle of a static mesh and the part on it; zero for all else.
+    pub parts: [u32; 2],
+    /// The features of both sides, as the kind numbers them.
+    pub features: [u32; 2],
+    /// The number among the places of these features.
+    pub place: u32,
+}
+
+/// What meets in a contact.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum TouchKind {
+    /// Corners, edges or faces of convex parts, as parry packs them.
+    #[default]
+    Convex,
+    /// Corners, edges or faces of a triangle of a static mesh and of a convex part.
+    MeshTriangle,
+    /// Spans of two chains, or of one with itself.
+    Spans,
+    /// A node or span of a chain with a solid; the second feature is zero.
+    SpanOnSolid,
+    /// A vertex of a soft body's skin with anything; the second feature is zero.
+    Vertex,
+    /// An edge of a skin with an edge of another or of its own, with a span or with a solid.
+    Edge,
+    /// A triangle of a skin with a node or with a corner of a solid.
+    Triangle,
+    /// A vertex of the second of two skins with the first; the second feature is zero.
+    SecondVertex,
+}
+
+/// The differences of packed keys ([`TouchKey::packed`]) of a contact between chains to those of the neighbouring segments: of the second
+/// chain, and of the first.
+pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
+
+/// Bits of a convex part's feature in a packed key, and of the part.
+const PACKED_FEATURE_BITS: u32 = 24;
+/// See [`PACKED_FEATURE_BITS`].
+const PACKED_PART_BITS: u32 = 5;
+/// Bits of the features of a mesh's triangle in a packed key.
+const PACKED_MESH_BITS: u32 = 12;
+/// Bits of the second feature of a skin in a packed key.
+const PACKED_SKIN_BITS: u32 = 20;
+
+impl TouchKey {
+    /// The key of a contact of this kind between two features.
+    #[must_use]
+    pub fn new(kind: TouchKind, features: [u32; 2]) -> Self {
+        Self { kind, features, ..Self::default() }
+    }
+
+    /// The keys of the same contact between chains after it has passed to a neighbouring span of either; those before the first span and
+    /// after the last one exist nowhere.
+    #[must_use]
+    pub fn beside(self) -> [Self; 4] {
+        let [first, second] = self.features;
+        let to = |features: [u32; 2]| Self { features, ..self };
+        [
+            to([first, second.wrapping_add(1)]),
+            to([first, second.wrapping_sub(1)]),
+            to([first.wrapping_add(1), second]),
+            to([first.wrapping_sub(1), second]),
+        ]
+    }
+
+    /// The key in one word, for solvers that keep them so. Unique for up to 2²⁰ features of a skin, 2²² of a convex part and 32 parts;
+    /// past those it may be that of another contact.
+    #[must_use]
+    pub fn packed(self) -> u64 {
+        let Self { pieces, kind, parts, features, place } = self;
+        let ([first, second], place) = (features.map(u64::from), u64::from(place));
+        let key = match kind {
+            TouchKind::Convex => {
+                let [a, b] = parts.map(|part| u64::from(part) & ((1 << PACKED_PART_BITS) - 1));
+                // parry stores the kind of a feature in the two highest bits
+                let [one, two] = features.map(|id| {
+                    let number = u64::from(id) & ((1 << (PACKED_FEATURE_BITS - 2)) - 1);
+                    u64::from(id >> 30) << (PACKED_FEATURE_BITS - 2) | number
+                });
+                let features = one << PACKED_FEATURE_BITS | two;
+                (((a << PACKED_PART_BITS | b) << (2 * PACKED_FEATURE_BITS)) | features) + place
+            }
+            TouchKind::MeshTriangle => {
+                let [triangle, part] = parts.map(u64::from);
+                let parts = triangle << 32 | part << (2 * PACKED_MESH_BITS);
+                (parts ^ (first << PACKED_MESH_BITS | second)).wrapping_add(place)
+            }
+            TouchKind::Spans => (first * KEY_STEPS[1]) | (second * KEY_STEPS[0]) | place,
+            TouchKind::SpanOnSolid => (first * KEY_STEPS[1]) | place,
+            TouchKind::Vertex => first + place,
+            TouchKind::Edge => (1 << (2 * PACKED_SKIN_BITS)) | first << PACKED_SKIN_BITS | (second + place),
+            TouchKind::Triangle => (2 << (2 * PACKED_SKIN_BITS)) | first << PACKED_SKIN_BITS | (second + place),
+            TouchKind::SecondVertex => (3 << (2 * PACKED_SKIN_BITS)) | (first + place),
+        };
+        let [a, b] = pieces.map(u64::from);
+        key | (a * super::shape_cache::PARTS as u64 + b) << PACKED_PAIR_SHIFT
+    }
+}
+
+/// Packed keys inside a pair of pieces stay below this bit.
+const PACKED_PAIR_SHIFT: u32 = 58;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn features_a_power_of_two_apart_have_different_keys() {
+        for kind in [TouchKind::Convex, TouchKind::Spans, TouchKind::Vertex, TouchKind::Edge, TouchKind::Triangle] {
+            for bit in 0..32 {
+                let far = 1_u32 << bit;
+                let keys = [[0, 0], [far, 0], [0, far], [far, far]].map(|features| TouchKey::new(kind, features));
+                for (i, one) in keys.iter().enumerate() {
+                    assert!(keys[..i].iter().all(|other| other != one), "{kind:?}, 2^{bit}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn packed_keys_rise_with_the_keys_and_step_by_segments() {
+        let key = |first, second| TouchKey::new(TouchKind::Spans, [first, second]);
+        assert!(key(3, 900).packed() < key(4, 2).packed());
+        let beside = key(70, 80).beside().map(TouchKey::packed);
+        let here = key(70, 80).packed();
+        assert_eq!(beside, [here + KEY_STEPS[0], here - KEY_STEPS[0], here + KEY_STEPS[1], here - KEY_STEPS[1]]);
+    }
+}
