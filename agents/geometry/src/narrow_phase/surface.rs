@@ -7,6 +7,7 @@
 //! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in
 //! the surface itself, so that both sides are pushed at one point.
 
+mod surface_box;
 mod surface_convex;
 mod surface_surface;
 
@@ -172,8 +173,10 @@ impl SurfaceScratch {
         match other {
             Piece::Strand(strand) => query.strand(strand, into),
             Piece::Block(block) => {
-                if let Some(field) = block.field {
-                    query.block(block, field, into);
+                let Some(field) = block.field else { return };
+                match field.half_extents_m() {
+                    Some(half_m) if surface.form.closed && !block.pierces => query.box_touches(block, half_m, into),
+                    _ => query.block(block, field, into),
                 }
             }
             Piece::Surface(there) => {

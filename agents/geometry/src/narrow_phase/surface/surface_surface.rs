@@ -218,7 +218,7 @@ impl SurfaceQuery<'_> {
     }
 
     /// Whether a point is inside the skin, at a depth in this range, metres; for an open skin always true.
-    fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
+    pub(super) fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
         let deep = |near: NearestPoint| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
         !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
     }
