@@ -61,7 +61,7 @@ pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use progressive_mesh::{Cut, ProgressiveMesh, ProgressiveMeshError};
 pub use render_curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
 pub use solid::{Obstacle, Solid};
-pub use spatial_hash::Grid;
+pub use spatial_hash::{BoxGrid, Grid};
 pub use texture::{Pattern, Texture, Wrap};
 pub use topology::is_closed;
 pub use topology::{Branch, branch};

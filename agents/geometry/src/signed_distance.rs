@@ -228,6 +228,11 @@ impl Field {
         }
     }
 
+    /// Half the lengths of a box, metres; `None` for other solids.
+    pub fn half_extents_m(&self) -> Option<DVec3> {
+        if let Kind::Box(half) = self.kind { Some(half) } else { None }
+    }
+
     /// The corners at which a flat face with the normal `way` towards the solid may be nearest: all of a box; of each rim of a cylinder the
     /// nearest point and three at right angles. `None` for solids without corners and meshes.
     pub fn corners(&self, way: DVec3) -> Option<[DVec3; 8]> {

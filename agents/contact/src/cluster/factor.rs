@@ -1,10 +1,13 @@
-//! Sparse Cholesky factor of a symmetric positive definite matrix of 3 × 3 blocks (DAV06, ch. 4).
+//! Sparse Cholesky factor of a symmetric positive definite matrix of 3 × 3 blocks, front by front (DR83).
 //!
 //! In: which blocks there are, then their numbers. Out: solutions. Never here: where the matrix comes from.
-//! The order and the structure are kept while all blocks lie in it, fill included; numbers then change without allocation.
-//! The numeric part looks left: each column collects what the finished columns before it give.
+//! The order and the fronts are kept while all blocks lie in them, fill included; numbers then change without allocation, and only
+//! the fronts are factored again in or below which a number has changed.
 
+use super::fronts::{Front, Fronts};
 use super::order::minimum_degree;
+use super::problem::Block;
+use super::tiles::{TILE, TILE_SIZE, eliminate, filled, solve_down, solve_up, triangle};
 use glam::{DMat3, DVec3};
 
 /// Two blocks that are coupled, in either order; a block with itself is its diagonal.
@@ -17,37 +20,79 @@ pub(super) struct Pair {
 /// Where a block is stored, and whether as its transpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Place {
-    index: usize,
+    /// The front.
+    pub front: usize,
+    /// Its row and column of numbers within the front.
+    row: usize,
+    column: usize,
     transposed: bool,
 }
 
-/// No column, as the end of a list.
-const NONE: usize = usize::MAX;
-
-/// The matrix, or its factor: columns in the order of elimination, each from its diagonal down.
-#[derive(Debug, Clone, Default)]
-pub(super) struct BlockCholesky {
-    /// Where each block stands in the order.
-    rank: Vec<usize>,
-    /// Where each column starts in `rows` and `values`; one more for the end.
-    starts: Vec<usize>,
-    rows: Vec<usize>,
-    /// After [`Self::factor`] the diagonal blocks are the inverses of the factor's.
-    values: Vec<DMat3>,
-    /// For each column the first of the columns that give to it next, and the one after each in such a list.
-    heads: Vec<usize>,
-    nexts: Vec<usize>,
-    /// For each finished column the entry that gives next.
-    cursors: Vec<usize>,
-    /// Where each row is in the column that collects.
-    spots: Vec<usize>,
-    permuted: Vec<DVec3>,
+/// The numbers of one front's columns, to which blocks are added.
+#[derive(Debug)]
+pub(super) struct Entries<'a> {
+    values: &'a mut [f64],
+    /// From one chunk of rows to the next.
+    chunk: usize,
 }
 
-impl BlockCholesky {
-    /// Makes room for a matrix of `size` blocks with these couplings; returns whether a new order was needed.
+/// An order made for an earlier structure is kept while its factor costs up to this many times as much as it did then.
+const KEEP_ORDER: f64 = 1.5;
+
+/// Where the numbers of a front are.
+#[derive(Debug, Clone, Copy, Default)]
+struct Layout {
+    /// Columns and rows of numbers, in whole tiles.
+    columns: usize,
+    rows: usize,
+    /// The start of its columns, of the triangle that it hands on, and of the targets of its rows in its parent.
+    lower: usize,
+    update: usize,
+    targets: usize,
+    /// How many of its rows are columns of its parent.
+    inner: usize,
+}
+
+/// Where a row of numbers of a front goes in its parent: as a row among eliminated columns and among others, and as a column.
+#[derive(Debug, Clone, Copy, Default)]
+struct Target {
+    near: usize,
+    far: usize,
+    column: usize,
+}
+
+/// A matrix with its factor.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Cholesky {
+    /// The order as it was made, and what its factor cost then.
+    order: Vec<usize>,
+    fresh_cost: f64,
+    fronts: Fronts,
+    layouts: Vec<Layout>,
+    children: Vec<Vec<usize>>,
+    targets: Vec<Target>,
+    /// The front of each place in the order.
+    owners: Vec<usize>,
+    /// The matrix, and the one before while a new one is filled in.
+    base: Vec<f64>,
+    before: Vec<f64>,
+    lower: Vec<f64>,
+    update: Vec<f64>,
+    /// Fronts whose numbers are no longer those of the matrix.
+    stale: Vec<bool>,
+    permuted: Vec<DVec3>,
+    local: Vec<f64>,
+}
+
+impl Cholesky {
+    /// Whether there is room for a matrix of `size` blocks with these couplings.
+    pub fn fits(&self, size: usize, pairs: &[Pair]) -> bool {
+        self.fronts.rank.len() == size && pairs.iter().all(|&pair| self.place(pair).is_some())
+    }
+
+    /// Makes room for a matrix of `size` blocks with these couplings; returns whether the structure is a new one.
     pub fn shape(&mut self, size: usize, pairs: &[Pair]) -> bool {
-        if self.rank.len() == size && pairs.iter().all(|&pair| self.place(pair).is_some()) {
+        if self.fits(size, pairs) {
             return false;
         }
         let mut neighbours = vec![Vec::new(); size];
@@ -59,151 +104,240 @@ impl BlockCholesky {
             list.sort_unstable();
             list.dedup();
         }
-        let order = minimum_degree(neighbours.clone());
-        self.rank = vec![0; size];
-        order.iter().enumerate().for_each(|(rank, &block)| self.rank[block] = rank);
-        self.structure(&order, &neighbours);
-        for list in [&mut self.heads, &mut self.nexts, &mut self.cursors, &mut self.spots] {
-            *list = vec![NONE; size];
-        }
-        self.values = vec![DMat3::ZERO; self.rows.len()];
-        self.permuted = vec![DVec3::ZERO; size];
+        let kept = (self.order.len() == size).then(|| Fronts::new(&neighbours, &self.order));
+        self.fronts = kept.filter(|fronts| fronts.cost <= KEEP_ORDER * self.fresh_cost).unwrap_or_else(|| {
+            self.order = minimum_degree(&neighbours);
+            let fronts = Fronts::new(&neighbours, &self.order);
+            self.fresh_cost = fronts.cost;
+            fronts
+        });
+        self.lay_out();
         true
     }
 
-    /// The rows of every column of the factor: those of the matrix, and those of all columns whose first row it is.
-    fn structure(&mut self, order: &[usize], neighbours: &[Vec<usize>]) {
-        let mut children: Vec<Vec<usize>> = vec![Vec::new(); order.len()];
-        self.starts = vec![0];
-        self.rows.clear();
-        for (rank, &block) in order.iter().enumerate() {
-            let mut column: Vec<usize> =
-                neighbours[block].iter().map(|&other| self.rank[other]).filter(|&row| row > rank).collect();
-            for &child in &children[rank] {
-                let rows = &self.rows[self.starts[child] + 1..self.starts[child + 1]];
-                column.extend(rows.iter().copied().filter(|&row| row > rank));
+    /// Storage for the fronts as they are.
+    fn lay_out(&mut self) {
+        let Self { fronts, layouts, children, targets, .. } = self;
+        let count = fronts.fronts.len();
+        layouts.clear();
+        targets.clear();
+        *children = vec![Vec::new(); count];
+        self.owners = vec![0; fronts.rank.len()];
+        let mut next = Layout::default();
+        for (k, front) in fronts.fronts.iter().enumerate() {
+            self.owners[front.first..front.first + front.columns].fill(k);
+            let (columns, rows) = (filled(3 * front.columns), filled(3 * front.rows.len()));
+            layouts.push(Layout { columns, rows, ..next });
+            next.lower += columns * (columns + rows);
+            next.update += triangle(rows / TILE);
+            next.targets += 3 * front.rows.len();
+            if let Some(parent) = front.parent {
+                children[parent].push(k);
             }
-            column.sort_unstable();
-            column.dedup();
-            if let Some(&parent) = column.first() {
-                children[parent].push(rank);
-            }
-            self.rows.push(rank);
-            self.rows.extend(column);
-            self.starts.push(self.rows.len());
         }
+        targets.reserve(next.targets);
+        for k in 0..count {
+            let front = &fronts.fronts[k];
+            let Some(parent) = front.parent else { continue };
+            let (above, room) = (&fronts.fronts[parent], layouts[parent].columns);
+            layouts[k].inner = 3 * front.rows.iter().filter(|&&row| row < above.first + above.columns).count();
+            for &row in &front.rows {
+                let start = above.coordinate(row, room).unwrap_or_default();
+                targets.extend((start..start + 3).map(|at| Target::new(at, room)));
+            }
+        }
+        let longest = layouts.iter().map(|layout| layout.columns + layout.rows).max().unwrap_or_default();
+        self.local = vec![0.0; longest];
+        self.base = vec![0.0; next.lower];
+        self.before = vec![f64::NAN; next.lower];
+        self.lower = vec![0.0; next.lower];
+        self.update = vec![0.0; next.update];
+        self.stale = vec![true; count];
+        self.permuted = vec![DVec3::ZERO; self.owners.len()];
     }
 
     /// Where a block is stored; `None` where the structure has no room for it.
     pub fn place(&self, pair: Pair) -> Option<Place> {
-        let [row, column] = [self.rank.get(pair.row)?, self.rank.get(pair.column)?];
+        let rank = &self.fronts.rank;
+        let [row, column] = [*rank.get(pair.row)?, *rank.get(pair.column)?];
         let [low, high] = [row.min(column), row.max(column)];
-        let start = self.starts[*low];
-        let at = self.rows[start..self.starts[low + 1]].binary_search(high).ok()?;
-        Some(Place { index: start + at, transposed: row < column })
+        let front = self.owners[low];
+        let of = &self.fronts.fronts[front];
+        let row_at = of.coordinate(high, self.layouts[front].columns)?;
+        Some(Place { front, row: row_at, column: 3 * (low - of.first), transposed: row < column })
     }
 
-    /// Sets all blocks to zero.
-    pub fn clear(&mut self) {
-        self.values.fill(DMat3::ZERO);
+    /// How many fronts there are.
+    pub fn len(&self) -> usize {
+        self.layouts.len()
     }
 
-    /// The numbers as they stand, to be taken up again by [`Self::load`].
-    pub fn values(&self) -> &[DMat3] {
-        &self.values
+    /// A new matrix, of those blocks that there is room for. Fronts whose numbers are the last one's need no new factor.
+    pub fn set(&mut self, blocks: &[Block]) {
+        std::mem::swap(&mut self.base, &mut self.before);
+        self.base.fill(0.0);
+        for (front, layout) in self.fronts.fronts.iter().zip(&self.layouts) {
+            let mut entries = Entries::of(&mut self.base, layout);
+            (3 * front.columns..layout.columns).for_each(|at| *entries.at(at, at) = 1.0);
+        }
+        for block in blocks {
+            if let Some(place) = self.place(Pair { row: block.row, column: block.column }) {
+                Entries::of(&mut self.base, &self.layouts[place.front]).add(place, &block.value);
+            }
+        }
+        for (layout, stale) in self.layouts.iter().zip(&mut self.stale) {
+            // also where one is not a number
+            *stale |= layout.of(&self.base) != layout.of(&self.before);
+        }
     }
 
-    /// Takes numbers that [`Self::values`] gave.
-    pub fn load(&mut self, values: &[DMat3]) {
-        self.values.copy_from_slice(values);
+    /// Has a front factored again.
+    pub fn spoil(&mut self, front: usize) {
+        self.stale[front] = true;
     }
 
-    /// Adds to a block.
-    pub fn add(&mut self, place: Place, value: &DMat3) {
-        self.values[place.index] += if place.transposed { value.transpose() } else { *value };
-    }
-
-    /// Replaces the matrix by its factor.
+    /// Factors the matrix and what `more` adds to the columns of each front, where numbers have changed.
     ///
     /// # Errors
-    /// The block at which the matrix is not positive definite; the numbers are lost then.
-    pub fn factor(&mut self) -> Result<(), usize> {
-        self.heads.fill(NONE);
-        for column in 0..self.rank.len() {
-            self.collect(column);
-            let (start, end) = (self.starts[column], self.starts[column + 1]);
-            let Some(inverse) = inverse_of_lower(&self.values[start]) else {
-                return Err(self.rank.iter().position(|&rank| rank == column).unwrap_or_default());
-            };
-            self.values[start] = inverse;
-            let upper = inverse.transpose();
-            self.values[start + 1..end].iter_mut().for_each(|value| *value *= upper);
-            self.hand_on(column, start + 1);
+    /// A block at which the matrix is not positive definite.
+    pub fn factor(&mut self, mut more: impl FnMut(usize, &mut Entries<'_>)) -> Result<(), usize> {
+        for front in 0..self.layouts.len() {
+            if !self.stale[front] {
+                continue;
+            }
+            let layout = self.layouts[front];
+            let own = layout.lower..layout.lower + layout.columns * (layout.columns + layout.rows);
+            self.lower[own.clone()].copy_from_slice(&self.base[own.clone()]);
+            more(front, &mut Entries::of(&mut self.lower, &layout));
+            self.gather(front);
+            let update = &mut self.update[layout.update..layout.update + triangle(layout.rows / TILE)];
+            if let Err(at) = eliminate(&mut self.lower[own], update, layout.columns) {
+                self.stale.fill(true);
+                let rank = self.fronts.fronts[front].first + at / 3;
+                return Err(self.fronts.rank.iter().position(|&r| r == rank).unwrap_or_default());
+            }
+            self.stale[front] = false;
+            if let Some(parent) = self.fronts.fronts[front].parent {
+                self.stale[parent] = true;
+            }
         }
         Ok(())
     }
 
-    /// Takes from a column what all finished columns with a block in its row give.
-    fn collect(&mut self, column: usize) {
-        let (start, end) = (self.starts[column], self.starts[column + 1]);
-        self.rows[start..end].iter().enumerate().for_each(|(at, &row)| self.spots[row] = at);
-        let mut giver = self.heads[column];
-        while giver != NONE {
-            let following = self.nexts[giver];
-            let (from, to) = (self.cursors[giver], self.starts[giver + 1]);
-            let (done, rest) = self.values.split_at_mut(start);
-            let right = done[from].transpose();
-            for (row, left) in self.rows[from..to].iter().zip(&done[from..to]) {
-                rest[self.spots[*row]] -= *left * right;
+    /// Adds what the fronts right below one have left for it.
+    fn gather(&mut self, front: usize) {
+        let Self { fronts, layouts, children, targets, lower, update, .. } = self;
+        let layout = layouts[front];
+        let (below, own) = update.split_at_mut(layout.update);
+        let own = &mut own[..triangle(layout.rows / TILE)];
+        own.fill(0.0);
+        let lower = &mut lower[layout.lower..];
+        for child in &children[front] {
+            let Layout { rows, update, targets: start, inner, .. } = layouts[*child];
+            let count = 3 * fronts.fronts[*child].rows.len();
+            let goals = &targets[start..start + count];
+            for row in 0..rows / TILE {
+                let tiles = &below[update + triangle(row)..update + triangle(row + 1)];
+                let here = &goals[row * TILE..count.min((row + 1) * TILE)];
+                for (column, values) in tiles.as_chunks::<TILE>().0.iter().enumerate() {
+                    // of the tile on the diagonal the lower half alone
+                    let start = column.saturating_sub(row * TILE);
+                    let Some(goal) = goals.get(column) else { break };
+                    let pairs = here.iter().zip(values).skip(start);
+                    if column < inner {
+                        pairs.for_each(|(target, value)| lower[target.near + goal.column] += value);
+                    } else {
+                        pairs.for_each(|(target, value)| own[target.far + goal.column] += value);
+                    }
+                }
             }
-            self.hand_on(giver, from + 1);
-            giver = following;
-        }
-    }
-
-    /// Puts a finished column into the list of the column that its entry `at` belongs to.
-    fn hand_on(&mut self, giver: usize, at: usize) {
-        self.cursors[giver] = at;
-        if at < self.starts[giver + 1] {
-            let taker = self.rows[at];
-            self.nexts[giver] = self.heads[taker];
-            self.heads[taker] = giver;
         }
     }
 
     /// Replaces the right side, one vector for each block, by the solution; the matrix must be factored.
     pub fn solve(&mut self, x: &mut [DVec3]) {
-        let Self { rank, starts, rows, values, permuted, .. } = self;
-        rank.iter().zip(&*x).for_each(|(&rank, value)| permuted[rank] = *value);
-        for column in 0..rank.len() {
-            let (start, end) = (starts[column], starts[column + 1]);
-            let own = values[start] * permuted[column];
-            permuted[column] = own;
-            rows[start + 1..end].iter().zip(&values[start + 1..end]).for_each(|(&row, l)| permuted[row] -= *l * own);
+        let Self { fronts, layouts, lower, permuted, local, .. } = self;
+        fronts.rank.iter().zip(&*x).for_each(|(&rank, value)| permuted[rank] = *value);
+        for (front, layout) in fronts.fronts.iter().zip(&*layouts) {
+            let local = &mut local[..layout.columns + layout.rows];
+            local.fill(0.0);
+            front.load_columns(permuted, local);
+            solve_down(layout.of(lower), layout.columns, local);
+            front.store_columns(local, permuted);
+            for (&row, given) in front.rows.iter().zip(local[layout.columns..].as_chunks::<3>().0) {
+                permuted[row] += DVec3::from_array(*given);
+            }
         }
-        for column in (0..rank.len()).rev() {
-            let (start, end) = (starts[column], starts[column + 1]);
-            let below = rows[start + 1..end].iter().zip(&values[start + 1..end]);
-            let left = below.fold(permuted[column], |sum, (&row, l)| sum - l.mul_transpose_vec3(permuted[row]));
-            permuted[column] = values[start].mul_transpose_vec3(left);
+        for (front, layout) in fronts.fronts.iter().zip(&*layouts).rev() {
+            let local = &mut local[..layout.columns + layout.rows];
+            local.fill(0.0);
+            front.load_columns(permuted, local);
+            for (&row, known) in front.rows.iter().zip(local[layout.columns..].as_chunks_mut::<3>().0) {
+                *known = permuted[row].to_array();
+            }
+            solve_up(layout.of(lower), layout.columns, local);
+            front.store_columns(local, permuted);
         }
-        rank.iter().zip(x).for_each(|(&rank, value)| *value = permuted[rank]);
+        fronts.rank.iter().zip(x).for_each(|(&rank, value)| *value = permuted[rank]);
     }
 }
 
-/// The inverse of the lower Cholesky factor of a symmetric block; `None` where it is not positive definite.
-fn inverse_of_lower(m: &DMat3) -> Option<DMat3> {
-    let root = |left: f64| (left > 0.0 && left.is_finite()).then(|| left.sqrt());
-    let a = root(m.x_axis.x)?;
-    let (b, c) = (m.x_axis.y / a, m.x_axis.z / a);
-    let d = root(m.y_axis.y - b * b)?;
-    let e = (m.y_axis.z - b * c) / d;
-    let f = root(m.z_axis.z - c * c - e * e)?;
-    let (ia, id, inverse_f) = (1.0 / a, 1.0 / d, 1.0 / f);
-    let ba = -b * ia * id;
-    Some(DMat3::from_cols(
-        DVec3::new(ia, ba, -(c * ia + e * ba) * inverse_f),
-        DVec3::new(0.0, id, -e * id * inverse_f),
-        DVec3::new(0.0, 0.0, inverse_f),
-    ))
+impl Front {
+    /// The first row of numbers of a block, by its place in the order, where eliminated columns have this room.
+    fn coordinate(&self, rank: usize, room: usize) -> Option<usize> {
+        if rank < self.first + self.columns {
+            return rank.checked_sub(self.first).map(|at| 3 * at);
+        }
+        self.rows.binary_search(&rank).ok().map(|at| room + 3 * at)
+    }
+
+    fn load_columns(&self, from: &[DVec3], local: &mut [f64]) {
+        let own = &from[self.first..self.first + self.columns];
+        local.as_chunks_mut::<3>().0.iter_mut().zip(own).for_each(|(x, value)| *x = value.to_array());
+    }
+
+    fn store_columns(&self, local: &[f64], to: &mut [DVec3]) {
+        let own = &mut to[self.first..self.first + self.columns];
+        own.iter_mut().zip(local.as_chunks::<3>().0).for_each(|(value, x)| *value = DVec3::from_array(*x));
+    }
+}
+
+impl Layout {
+    fn of<'a>(&self, lower: &'a [f64]) -> &'a [f64] {
+        &lower[self.lower..self.lower + self.columns * (self.columns + self.rows)]
+    }
+}
+
+impl Target {
+    /// Of a row of numbers, in a front whose eliminated columns have this room.
+    fn new(at: usize, room: usize) -> Self {
+        let near = at / TILE * TILE * room + at % TILE;
+        match at.checked_sub(room) {
+            None => Self { near, far: 0, column: TILE * at },
+            Some(below) => {
+                let far = triangle(below / TILE) + below % TILE;
+                Self { near, far, column: below / TILE * TILE_SIZE + below % TILE * TILE }
+            }
+        }
+    }
+}
+
+impl Entries<'_> {
+    fn of<'a>(lower: &'a mut [f64], layout: &Layout) -> Entries<'a> {
+        Entries { values: &mut lower[layout.lower..], chunk: TILE * layout.columns }
+    }
+
+    fn at(&mut self, row: usize, column: usize) -> &mut f64 {
+        &mut self.values[row / TILE * self.chunk + TILE * column + row % TILE]
+    }
+
+    /// Adds to a block of this front.
+    pub fn add(&mut self, place: Place, value: &DMat3) {
+        let value = if place.transposed { value.transpose() } else { *value };
+        for (row, start) in (place.row..place.row + 3).map(|row| row / TILE * self.chunk + row % TILE).enumerate() {
+            for (k, number) in value.row(row).to_array().into_iter().enumerate() {
+                self.values[start + TILE * (place.column + k)] += number;
+            }
+        }
+    }
 }

@@ -3,8 +3,8 @@
 //! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6.
 
-use super::direct::fill;
-use super::factor::{BlockCholesky, Pair};
+use super::coupled::Coupled;
+use super::factor::Pair;
 use super::members::Members;
 use super::rows::Rows;
 use glam::{DMat3, DVec3};
@@ -49,9 +49,7 @@ pub(super) struct Stiffness<'a> {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gradients {
     /// The blocks near the diagonal: one of a node, 6 × 6 of a rigid member. Nothing fills in.
-    near: BlockCholesky,
-    /// ⊕ A/f in the structure of `near`.
-    base: Vec<DMat3>,
+    near: Coupled,
     pairs: Vec<Pair>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
@@ -92,28 +90,18 @@ impl Gradients {
                 self.pairs.push(Pair { row, column: row - 1 });
             }
         }
-        self.near.shape(size, &self.pairs);
-        fill(&mut self.near, &members.blocks);
-        self.base.clear();
-        self.base.extend_from_slice(self.near.values());
-        self.near.factor()
+        self.near.take(size, &members.blocks, &mut self.pairs, None);
+        self.near.factor_members()
+    }
+
+    /// Takes up which blocks the rows move.
+    pub fn couple(&mut self, rows: &Rows) {
+        self.near.meet(rows);
     }
 
     /// Makes the preconditioner that of ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without an inverse.
     pub fn precondition(&mut self, contacts: Stiffness<'_>) -> bool {
-        let Stiffness { rows, gains } = contacts;
-        self.near.load(&self.base);
-        for (row, gain) in gains.iter().enumerate().filter(|(_, gain)| **gain != DMat3::ZERO) {
-            let terms = rows.terms(row);
-            for (k, left) in terms.iter().enumerate() {
-                for right in &terms[..=k] {
-                    if let Some(place) = self.near.place(Pair { row: left.block, column: right.block }) {
-                        self.near.add(place, &(left.map.transpose() * (*gain * right.map)));
-                    }
-                }
-            }
-        }
-        self.near.factor().is_ok()
+        self.near.factor(contacts.rows, contacts.gains)
     }
 
     /// Solves until what is left is at its goal, or as far as products reach.

@@ -43,9 +43,11 @@
 
 mod cone;
 mod convex;
+mod coupled;
 mod direct;
 mod error;
 mod factor;
+mod fronts;
 mod gradients;
 mod iterate;
 mod joint;
@@ -60,6 +62,7 @@ mod scale;
 mod side;
 mod solver;
 mod system;
+mod tiles;
 mod validate;
 
 pub use error::ProblemError;

@@ -1,57 +1,86 @@
-//! The order in which a sparse matrix is eliminated: minimum degree on the quotient graph (GL89).
+//! The order in which a sparse matrix is eliminated: approximate minimum degree on the quotient graph (GL89), (ADD96).
 //!
 //! In: the neighbours of each node. Out: the nodes in their order. Never here: numbers of the matrix.
-//! Degrees are exact, and the lowest node of the least degree goes first, so the order depends on the graph alone.
+//! Nodes that cannot be told apart go together; of equal degrees the lowest node goes first, so the order depends on the graph alone.
 
 use std::collections::BTreeSet;
 
 /// The graph while it is eliminated: nodes that are left, and cliques that eliminated ones have left behind.
 struct Quotient {
-    /// The nodes that each node is joined to outside of cliques.
+    /// The nodes that each node is joined to outside of cliques; they may be gone.
     nodes: Vec<Vec<usize>>,
-    /// The cliques that each node is in, by the node that made them.
+    /// The cliques that each node is in, by the node that made them; they may be empty.
     cliques: Vec<Vec<usize>>,
-    /// The nodes of each clique.
+    /// The nodes of each clique, and how many they stand for.
     members: Vec<Vec<usize>>,
-    gone: Vec<bool>,
+    sizes: Vec<usize>,
+    /// How many nodes each one stands for; none once it is gone.
+    weights: Vec<usize>,
+    /// The nodes that go with each one, right after it.
+    followers: Vec<Vec<usize>>,
+    /// What nodes that stand for themselves or others are joined to, at most.
+    degrees: Vec<usize>,
+    /// Nodes left, by degree.
+    open: BTreeSet<Ranked>,
+    left: usize,
     marks: Vec<usize>,
     mark: usize,
+    /// How much of each clique lies outside of the newest one, where that has been counted in this turn.
+    outside: Vec<usize>,
+    counted: Vec<usize>,
 }
 
-/// The order of least degree of a graph, given by the neighbours of each node in any order.
-pub(super) fn minimum_degree(neighbours: Vec<Vec<usize>>) -> Vec<usize> {
-    let size = neighbours.len();
-    let mut graph = Quotient {
-        nodes: neighbours,
-        cliques: vec![Vec::new(); size],
-        members: vec![Vec::new(); size],
-        gone: vec![false; size],
-        marks: vec![0; size],
-        mark: 0,
-    };
-    let mut degrees: Vec<usize> = (0..size).map(|node| graph.reach(node).len()).collect();
-    let mut open: BTreeSet<_> = degrees.iter().copied().zip(0..size).collect();
-    let mut order = Vec::with_capacity(size);
-    while let Some((_, node)) = open.pop_first() {
-        order.push(node);
-        for touched in graph.eliminate(node) {
-            open.remove(&(degrees[touched], touched));
-            degrees[touched] = graph.reach(touched).len();
-            open.insert((degrees[touched], touched));
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Ranked {
+    degree: usize,
+    node: usize,
+}
+
+/// The order of least degree of a graph, given by the neighbours of each node by rising numbers.
+pub(super) fn minimum_degree(neighbours: &[Vec<usize>]) -> Vec<usize> {
+    let mut graph = Quotient::new(neighbours);
+    let mut order = Vec::with_capacity(neighbours.len());
+    let mut waiting = Vec::new();
+    while let Some(Ranked { node, .. }) = graph.open.pop_first() {
+        graph.eliminate(node);
+        waiting.push(node);
+        while let Some(node) = waiting.pop() {
+            order.push(node);
+            waiting.append(&mut graph.followers[node]);
         }
     }
     order
 }
 
 impl Quotient {
-    /// The nodes left that `node` is joined to, through cliques too.
+    fn new(neighbours: &[Vec<usize>]) -> Self {
+        let size = neighbours.len();
+        let degrees: Vec<_> = neighbours.iter().map(Vec::len).collect();
+        Self {
+            nodes: neighbours.to_vec(),
+            cliques: vec![Vec::new(); size],
+            members: vec![Vec::new(); size],
+            sizes: vec![0; size],
+            weights: vec![1; size],
+            followers: vec![Vec::new(); size],
+            open: degrees.iter().enumerate().map(|(node, &degree)| Ranked { degree, node }).collect(),
+            degrees,
+            left: size,
+            marks: vec![0; size],
+            mark: 0,
+            outside: vec![0; size],
+            counted: vec![0; size],
+        }
+    }
+
+    /// The nodes left that `node` is joined to, through cliques too; they bear the newest mark.
     fn reach(&mut self, node: usize) -> Vec<usize> {
         self.mark += 1;
         self.marks[node] = self.mark;
         let through = self.cliques[node].iter().flat_map(|&clique| &self.members[clique]);
         let mut found = Vec::new();
         for &other in self.nodes[node].iter().chain(through) {
-            if !self.gone[other] && self.marks[other] != self.mark {
+            if self.weights[other] > 0 && self.marks[other] != self.mark {
                 self.marks[other] = self.mark;
                 found.push(other);
             }
@@ -59,21 +88,102 @@ impl Quotient {
         found
     }
 
-    /// Takes a node out: those it reached become a clique, which takes up all cliques that it was in. Returns them.
-    fn eliminate(&mut self, node: usize) -> Vec<usize> {
-        let reached = self.reach(node);
-        self.gone[node] = true;
-        let taken = std::mem::take(&mut self.cliques[node]);
-        taken.iter().for_each(|&clique| self.members[clique].clear());
-        for &other in &reached {
-            let Self { nodes, cliques, members, marks, mark, .. } = self;
-            // what the new clique joins needs no edge of its own
-            nodes[other].retain(|&next| next != node && marks[next] != *mark);
-            cliques[other].retain(|&clique| !members[clique].is_empty());
-            cliques[other].push(node);
+    /// Takes a node out, with all that it stands for: those it reached become a clique, which takes up all cliques that it was in.
+    fn eliminate(&mut self, node: usize) {
+        let mut reached = self.reach(node);
+        self.left -= self.weights[node];
+        self.weights[node] = 0;
+        for clique in std::mem::take(&mut self.cliques[node]) {
+            self.members[clique].clear();
         }
-        self.members[node].clone_from(&reached);
-        reached
+        self.nodes[node].clear();
+        self.count_outside(&reached);
+        let reached_weight: usize = reached.iter().map(|&other| self.weights[other]).sum();
+        for &other in &reached {
+            self.open.remove(&Ranked { degree: self.degrees[other], node: other });
+            self.join(other, node, reached_weight);
+        }
+        self.merge_alike(&mut reached, node);
+        for &other in &reached {
+            self.open.insert(Ranked { degree: self.degrees[other], node: other });
+        }
+        self.sizes[node] = reached.iter().map(|&other| self.weights[other]).sum();
+        self.members[node] = reached;
+    }
+
+    /// How much of each clique of these nodes lies outside of them.
+    fn count_outside(&mut self, reached: &[usize]) {
+        for &other in reached {
+            for &clique in self.cliques[other].iter().filter(|&&clique| !self.members[clique].is_empty()) {
+                if self.counted[clique] != self.mark {
+                    self.counted[clique] = self.mark;
+                    self.outside[clique] = self.sizes[clique];
+                }
+                self.outside[clique] -= self.weights[other];
+            }
+        }
+    }
+
+    /// Puts a node that bears the newest mark into the new clique: cliques within that one go, and its degree is counted anew.
+    fn join(&mut self, other: usize, clique: usize, reached_weight: usize) {
+        let Self { nodes, cliques, members, weights, marks, mark, outside, .. } = self;
+        cliques[other].retain(|&known| {
+            if outside[known] == 0 {
+                members[known].clear();
+            }
+            !members[known].is_empty()
+        });
+        // what the new clique joins needs no edge of its own
+        nodes[other].retain(|&next| weights[next] > 0 && marks[next] != *mark);
+        let beside = reached_weight - weights[other];
+        let through: usize = cliques[other].iter().map(|&known| outside[known]).sum();
+        let straight: usize = nodes[other].iter().map(|&next| weights[next]).sum();
+        let degree = (beside + through + straight).min(self.degrees[other] + beside);
+        self.degrees[other] = degree.min(self.left - weights[other]);
+        cliques[other].push(clique);
+    }
+
+    /// Nodes with the same neighbours become one; those that are joined to the new clique alone go with the node that made it.
+    fn merge_alike(&mut self, reached: &mut Vec<usize>, made_by: usize) {
+        reached.sort_by_cached_key(|&node| (self.alike(node), node));
+        for (at, &first) in reached.iter().enumerate() {
+            if self.weights[first] == 0 {
+                continue;
+            }
+            if self.nodes[first].is_empty() && self.cliques[first] == [made_by] {
+                self.left -= self.weights[first];
+                self.follow(first, made_by);
+                continue;
+            }
+            for &second in &reached[at + 1..] {
+                if self.weights[second] == 0 {
+                    continue;
+                }
+                if self.alike(second) != self.alike(first) {
+                    break;
+                }
+                if self.nodes[second] == self.nodes[first] && self.cliques[second] == self.cliques[first] {
+                    self.weights[first] += self.weights[second];
+                    self.degrees[first] -= self.weights[second].min(self.degrees[first]);
+                    self.follow(second, first);
+                }
+            }
+        }
+        reached.retain(|&node| self.weights[node] > 0);
+    }
+
+    /// Equal for nodes with the same neighbours.
+    fn alike(&self, node: usize) -> [usize; 3] {
+        let sum = self.nodes[node].iter().chain(&self.cliques[node]).sum();
+        [sum, self.nodes[node].len(), self.cliques[node].len()]
+    }
+
+    /// Has a node go right after another.
+    fn follow(&mut self, node: usize, leader: usize) {
+        self.weights[node] = 0;
+        self.nodes[node].clear();
+        self.cliques[node].clear();
+        self.followers[leader].push(node);
     }
 }
 
@@ -83,13 +193,28 @@ mod tests {
 
     #[test]
     fn a_star_is_eliminated_from_its_points() {
-        let order = minimum_degree(vec![vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]]);
+        let order = minimum_degree(&[vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]]);
         assert_eq!(order[..3], [1, 2, 3]);
     }
 
     #[test]
     fn a_chain_is_eliminated_from_an_end() {
-        let order = minimum_degree(vec![vec![3], vec![2], vec![1, 3], vec![2, 0]]);
-        assert_eq!(order, [0, 1, 2, 3]);
+        let order = minimum_degree(&[vec![3], vec![2], vec![1, 3], vec![2, 0]]);
+        assert_eq!(order[..2], [0, 1]);
+    }
+
+    #[test]
+    fn every_node_of_a_lattice_goes_once() {
+        let side = 9;
+        let neighbours: Vec<Vec<usize>> = (0..side * side)
+            .map(|i| {
+                let near =
+                    |j: &usize| i != *j && (i % side).abs_diff(j % side) <= 1 && (i / side).abs_diff(j / side) <= 1;
+                (0..side * side).filter(near).collect()
+            })
+            .collect();
+        let mut order = minimum_degree(&neighbours);
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..side * side));
     }
 }

@@ -73,12 +73,15 @@ impl System {
 
     /// Solves with ⊕ A/f + Jᵀ G J: a Newton step; `false` where rounding leaves it without a solution.
     pub fn step(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) -> bool {
+        if !self.coupled {
+            match self.form {
+                StepForm::Direct => self.direct.couple(&self.members, contacts.rows),
+                StepForm::Iterative => self.gradients.couple(contacts.rows),
+            }
+            self.coupled = true;
+        }
         match self.form {
             StepForm::Direct => {
-                if !self.coupled {
-                    self.direct.couple(&self.members, contacts.rows);
-                    self.coupled = true;
-                }
                 if !self.direct.factor(contacts.rows, contacts.gains) {
                     return false;
                 }

@@ -15,6 +15,7 @@ mod epa;
 mod gjk;
 mod mesh_convex;
 mod primitives;
+mod self_chain;
 mod shape_cache;
 mod static_solid;
 mod surface;
@@ -24,13 +25,14 @@ mod touch_key;
 mod voronoi_regions;
 
 #[cfg(test)]
-use super::collision_shape::{CollisionShape, ShapeKind, ShapePose};
-use super::collision_shape::{PlacedShape, Touch};
+use super::collision_shape::{CollisionShape, ShapeKind};
+use super::collision_shape::{PlacedShape, ShapePose, Touch};
 use crate::signed_distance::Ball;
 use chain_chain::ChainScratch;
 use convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
+pub use self_chain::{FacingPoints, PLACES, RestedChain, SegmentPairs};
 use shape_cache::ShapeCache;
 pub use static_solid::{StaticSolid, StaticSolidError};
 use surface::SurfaceScratch;
@@ -50,6 +52,7 @@ struct Searches {
     chains: ChainScratch,
     blocks: ConvexScratch,
     surfaces: SurfaceScratch,
+    segments: SegmentPairs,
 }
 
 /// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; the previous contents of `into` are dropped.
@@ -78,7 +81,7 @@ pub fn touches(
 impl Searches {
     /// Adds every place within `reach_m` of two pieces, given with their numbers.
     fn touches(&mut self, pieces: [(usize, &Piece<'_>); 2], reach_m: f64, into: &mut Vec<Touch>) {
-        let Self { chains, blocks, surfaces } = self;
+        let Self { chains, blocks, surfaces, .. } = self;
         let [(i, piece), (j, other)] = pieces;
         if !piece.may_touch(other, reach_m) {
             return;
@@ -127,6 +130,46 @@ impl Searches {
 fn finish(into: &mut Vec<Touch>) {
     into.retain(|touch| touch.gap_m.is_finite() && touch.normal.is_finite());
     name(into);
+}
+
+/// What deforms, at rest: what of it is near itself there never touches.
+#[derive(Debug, Clone, Copy)]
+pub enum RestShape<'a> {
+    /// The arc length of each node of a tube, metres.
+    Chain(&'a [f64]),
+    /// The vertices of a soft body, in any axes, metres.
+    Surface(&'a [DVec3]),
+}
+
+/// Every contact of a deformable with itself with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; the previous contents of `into` are
+/// dropped. Both places are on the same shape; of two segments or edges the lower number is on the first side, of a vertex and a triangle the
+/// vertex. Nothing touches itself that is rigid, not finite or of another kind than its rest.
+pub fn self_touches(
+    placed: &PlacedShape<'_>,
+    rest: RestShape<'_>,
+    reach_m: f64,
+    scratch: &mut NarrowPhaseScratch,
+    into: &mut Vec<Touch>,
+) {
+    into.clear();
+    let NarrowPhaseScratch { known, searches } = scratch;
+    match (placed.view, rest) {
+        (ShapePose::Chain { positions, radii_m }, RestShape::Chain(arc_m)) => {
+            let chain = RestedChain { positions, radii_m, arc_m };
+            if chain.is_whole() {
+                searches.segments.touches(&chain, reach_m, into);
+            }
+        }
+        (ShapePose::Surface(positions), RestShape::Surface(rest)) if positions.len() == rest.len() => {
+            for (_, piece) in Pieces::of(placed, known).iter() {
+                if let Piece::Surface(surface) = piece {
+                    searches.surfaces.self_touches(surface, rest, reach_m, into);
+                }
+            }
+        }
+        _ => {}
+    }
+    finish(into);
 }
 
 /// The same contact seen from the other side.

@@ -1,12 +1,13 @@
 //! Contacts of soft bodies' skins with any other piece: their vertices, edges and triangles.
 //!
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
-//! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
+//! Theory: docs/theory/soft.md, eq. 15, 16.
 //!
 //! A place is reported by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): what lies ahead on a flat skin is
 //! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in
 //! the surface itself, so that both sides are pushed at one point.
 
+mod surface_box;
 mod surface_convex;
 mod surface_surface;
 
@@ -15,7 +16,7 @@ use super::touch_key::{TouchKey, TouchKind};
 use super::voronoi_regions::{Feature, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
-use crate::{Aabb, Place, Touch};
+use crate::{Aabb, BoxGrid, Place, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use surface_surface::SkinPair;
@@ -29,6 +30,51 @@ pub(super) struct SurfaceScratch {
     /// For a closed surface the outward normal at each vertex, of any length; `others` holds those of the other surface.
     normals: Vec<DVec3>,
     others: Vec<DVec3>,
+    /// The triangles and edges of both surfaces by place, where many are asked for.
+    indices: [SkinIndex; 2],
+}
+
+/// From so many vertices near another skin on its triangles and edges are sorted by place.
+const MANY: usize = 32;
+
+/// The triangles and edges of a skin within a region, by place.
+#[derive(Default)]
+struct SkinIndex {
+    triangles: FeatureIndex,
+    edges: FeatureIndex,
+}
+
+/// Features of one kind within a region, by place.
+#[derive(Default)]
+struct FeatureIndex {
+    numbers: Vec<u32>,
+    grid: BoxGrid,
+}
+
+impl FeatureIndex {
+    /// Sorts the features with these boxes, numbered from 0, that meet the region.
+    fn fill(&mut self, boxes: impl Iterator<Item = Aabb> + Clone, region: Aabb, cell_m: f64) {
+        let near = (0..).zip(boxes).filter(|(_, around)| around.meets(region));
+        self.numbers.clear();
+        self.numbers.extend(near.clone().map(|(number, _)| number));
+        self.grid.fill(near.map(|(_, around)| around), cell_m);
+    }
+
+    fn visit(&self, region: Aabb, mut visit: impl FnMut(u32)) {
+        self.grid.visit(region, |at| visit(self.numbers[at as usize]));
+    }
+}
+
+impl SkinIndex {
+    /// Sorts the features of a surface that meet the region.
+    fn fill(&mut self, surface: &Surface<'_>, region: Aabb) {
+        // twice an edge: a triangle is in eight cells at most
+        let cell_m = (2.0 * surface.form.edge_m).max(f64::MIN_POSITIVE);
+        let triangles = surface.form.triangles.iter().map(|corners| Aabb::of(&surface.corners(*corners)));
+        self.triangles.fill(triangles, region, cell_m);
+        let edges = surface.form.edges.iter().map(|ends| Aabb::of(&ends.map(|vertex| surface.at(vertex))));
+        self.edges.fill(edges, region, cell_m);
+    }
 }
 
 /// A point of a surface: three vertices with shares.
@@ -121,23 +167,27 @@ impl Surface<'_> {
         triangle.map(|vertex| self.at(vertex))
     }
 
+    fn edge(&self, number: u32) -> Edge {
+        let vertices = self.form.edges[number as usize];
+        Edge { number, vertices, ends: vertices.map(|vertex| self.at(vertex)) }
+    }
+
+    fn triangle(&self, number: u32) -> Triangle {
+        let vertices = self.form.triangles[number as usize];
+        Triangle { number, vertices, corners: self.corners(vertices) }
+    }
+
     /// The edges within `region`.
     fn edges_in(&self, region: Aabb) -> impl Iterator<Item = Edge> {
         let Aabb { low, high } = region;
-        let all = (0..).zip(self.form.edges.iter()).map(|(number, vertices)| {
-            let ends = vertices.map(|vertex| self.at(vertex));
-            Edge { number, vertices: *vertices, ends }
-        });
+        let all = (0..self.form.edges.len() as u32).map(|number| self.edge(number));
         all.filter(move |Edge { ends: [a, b], .. }| a.min(*b).cmple(high).all() && a.max(*b).cmpge(low).all())
     }
 
     /// The triangles within `region`.
     fn triangles_in(&self, region: Aabb) -> impl Iterator<Item = Triangle> {
         let Aabb { low, high } = region;
-        let all = (0..).zip(self.form.triangles.iter()).map(|(number, vertices)| {
-            let corners = self.corners(*vertices);
-            Triangle { number, vertices: *vertices, corners }
-        });
+        let all = (0..self.form.triangles.len() as u32).map(|number| self.triangle(number));
         all.filter(move |Triangle { corners: [a, b, c], .. }| {
             a.min(*b).min(*c).cmple(high).all() && a.max(*b).max(*c).cmpge(low).all()
         })
@@ -165,21 +215,41 @@ impl SurfaceScratch {
         let within_m = reach_m + surface.form.radius_m;
         let region = other.bounds().grown(within_m);
         compute_normals(surface, &mut self.normals);
-        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals };
+        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals, index: None };
         match other {
             Piece::Strand(strand) => query.strand(strand, into),
             Piece::Block(block) => {
-                if let Some(field) = block.field {
-                    query.block(block, field, into);
+                let Some(field) = block.field else { return };
+                match field.half_extents_m() {
+                    Some(half_m) if surface.form.closed && !block.pierces => query.box_touches(block, half_m, into),
+                    _ => query.block(block, field, into),
                 }
             }
             Piece::Surface(there) => {
                 compute_normals(there, &mut self.others);
                 let region = surface.bounds.grown(within_m + there.form.radius_m);
-                let back = SurfaceQuery { surface: there, reach_m, region, normals: &self.others };
+                let mut back = SurfaceQuery { surface: there, reach_m, region, normals: &self.others, index: None };
+                let mut query = query;
+                let look_m = SkinPair::new(&query, &back).look_m();
+                let [first, second] = &mut self.indices;
+                if query.is_many() || back.is_many() {
+                    first.fill(surface, there.bounds.grown(look_m));
+                    second.fill(there, surface.bounds.grown(look_m));
+                    (query.index, back.index) = (Some(&*first), Some(&*second));
+                }
                 SkinPair::new(&query, &back).touches(into);
             }
         }
+    }
+
+    /// Every place within `reach_m` of a surface with itself; `rest` holds its vertices at rest.
+    pub(super) fn self_touches(&mut self, surface: &Surface<'_>, rest: &[DVec3], reach_m: f64, into: &mut Vec<Touch>) {
+        compute_normals(surface, &mut self.normals);
+        let [index, _] = &mut self.indices;
+        index.fill(surface, surface.bounds);
+        let region = surface.bounds;
+        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals, index: Some(index) };
+        SkinPair::with_itself(&query, rest).self_touches(into);
     }
 }
 
@@ -213,9 +283,42 @@ struct SurfaceQuery<'a> {
     /// Nothing outside this box is near.
     region: Aabb,
     normals: &'a [DVec3],
+    /// Its triangles and edges by place, as far as they are near the other one.
+    index: Option<&'a SkinIndex>,
 }
 
 impl SurfaceQuery<'_> {
+    /// Whether many of its vertices are near the other.
+    fn is_many(&self) -> bool {
+        self.surface.vertices_in(self.region).take(MANY).count() == MANY
+    }
+
+    /// Visits the triangles within a region, in any order.
+    fn each_triangle(&self, region: Aabb, mut visit: impl FnMut(Triangle)) {
+        match self.index {
+            Some(index) => index.triangles.visit(region, |number| {
+                let triangle = self.surface.triangle(number);
+                if Aabb::of(&triangle.corners).meets(region) {
+                    visit(triangle);
+                }
+            }),
+            None => self.surface.triangles_in(region).for_each(visit),
+        }
+    }
+
+    /// Visits the edges within a region, in any order.
+    fn each_edge(&self, region: Aabb, mut visit: impl FnMut(Edge)) {
+        match self.index {
+            Some(index) => index.edges.visit(region, |number| {
+                let edge = self.surface.edge(number);
+                if Aabb::of(&edge.ends).meets(region) {
+                    visit(edge);
+                }
+            }),
+            None => self.surface.edges_in(region).for_each(visit),
+        }
+    }
+
     fn strand(&self, strand: &Strand<'_>, into: &mut Vec<Touch>) {
         for (vertex, at) in self.surface.vertices_in(self.region) {
             let nearest = nearest_on(strand, at);

@@ -3,6 +3,7 @@
 mod blocks;
 mod promises;
 mod rounds;
+mod self_touches;
 mod static_solids;
 mod surfaces;
 mod tubes;

@@ -89,6 +89,13 @@ impl Feature {
         nearest
     }
 
+    /// Whether the unit vector `out` leads out of the skin, and leans over no neighbouring part of it by more than `lean` radians.
+    pub fn faces(self, surface: &Surface<'_>, out: DVec3, lean: f64) -> bool {
+        let mut faces = true;
+        self.along(surface, |along| faces &= out.dot(along) <= lean * along.length());
+        faces
+    }
+
     /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.
     pub fn out(self, surface: &Surface<'_>, way: DVec3) -> Option<DVec3> {
         let mut out = way;

@@ -113,9 +113,31 @@ pub fn scene(name: &str) -> Table {
 
 #[test]
 fn scenes_at_60_hz() {
+    let rates: Vec<Vec<f64>> = std::env::var("RATES").map_or(vec![vec![60.0, 60.0]], |list| {
+        list.split(',').map(|pair| pair.split(':').map(|hz| hz.parse().unwrap()).collect()).collect()
+    });
     for name in NAMES {
-        let started = std::time::Instant::now();
-        let findings = scene(name).play(1.5);
-        println!("{name:36} {:?} {findings:?}", started.elapsed());
+        if std::env::var("ONLY").is_ok_and(|only| !name.starts_with(&only)) {
+            continue;
+        }
+        for pair in &rates {
+            let started = std::time::Instant::now();
+            let f = scene(name).at_rates(pair[0], pair[1]).play(1.5);
+            println!(
+                "{name:36} {:4}:{:4} land {:.4} rest {:.4} mm gain {:8.5} mJ weight {:.4} factors {:.2} at rest {:.2} cut {} contacts {} z {:.4} {:?}",
+                pair[0],
+                pair[1],
+                f.landing_m * 1e3,
+                f.rest_m * 1e3,
+                f.gain_j * 1e3,
+                f.weight,
+                f64::from(f.factors) / f64::from(f.steps),
+                f.factors_at_rest,
+                f.cut,
+                f.contacts,
+                f.highest_m,
+                started.elapsed()
+            );
+        }
     }
 }

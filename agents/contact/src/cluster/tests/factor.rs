@@ -2,7 +2,8 @@
 
 use super::Seeded;
 use super::slow::Dense;
-use crate::cluster::factor::{BlockCholesky, Pair};
+use crate::cluster::Block;
+use crate::cluster::factor::{Cholesky, Pair};
 use glam::{DMat3, DVec3};
 
 /// A random symmetric positive definite matrix of blocks: its couplings, and all of it.
@@ -30,9 +31,10 @@ fn random_matrix(size: usize, seed: u64) -> (Vec<Pair>, Dense) {
     (pairs, dense)
 }
 
-fn load(sparse: &mut BlockCholesky, pairs: &[Pair], dense: &mut Dense) {
-    sparse.clear();
+/// The blocks at these places.
+fn blocks(pairs: &[Pair], dense: &mut Dense) -> Vec<Block> {
     let mut seen = Vec::new();
+    let mut found = Vec::new();
     for pair in pairs {
         let key = (pair.row.max(pair.column), pair.row.min(pair.column));
         if seen.contains(&key) {
@@ -42,21 +44,22 @@ fn load(sparse: &mut BlockCholesky, pairs: &[Pair], dense: &mut Dense) {
         let mut column =
             |j| DVec3::from_array(std::array::from_fn(|i| *dense.at(3 * pair.row + i, 3 * pair.column + j)));
         let value = DMat3::from_cols(column(0), column(1), column(2));
-        sparse.add(sparse.place(*pair).unwrap(), &value);
+        found.push(Block { row: pair.row, column: pair.column, value });
     }
+    found
 }
 
 #[test]
 fn the_sparse_factor_solves_what_the_dense_one_solves() {
     for (seed, size) in [1, 2, 5, 12, 40, 90].into_iter().enumerate() {
         let (pairs, mut dense) = random_matrix(size, 3 + seed as u64);
-        let mut sparse = BlockCholesky::default();
+        let mut sparse = Cholesky::default();
         assert!(sparse.shape(size, &pairs));
-        load(&mut sparse, &pairs, &mut dense);
+        sparse.set(&blocks(&pairs, &mut dense));
         let mut numbers = Seeded::new(77);
         let mut x: Vec<_> = (0..size).map(|_| numbers.vector()).collect();
         let mut y: Vec<_> = x.iter().flat_map(|v| v.to_array()).collect();
-        sparse.factor().unwrap();
+        sparse.factor(|_, _| ()).unwrap();
         sparse.solve(&mut x);
         dense.factored().solve(&mut y);
         for (a, b) in x.iter().flat_map(|v| v.to_array()).zip(y) {
@@ -68,7 +71,7 @@ fn the_sparse_factor_solves_what_the_dense_one_solves() {
 #[test]
 fn the_order_is_kept_while_the_structure_holds_the_couplings() {
     let (pairs, _) = random_matrix(30, 9);
-    let mut sparse = BlockCholesky::default();
+    let mut sparse = Cholesky::default();
     assert!(sparse.shape(30, &pairs));
     assert!(!sparse.shape(30, &pairs[..40]));
     assert!(sparse.shape(31, &pairs));
@@ -77,16 +80,16 @@ fn the_order_is_kept_while_the_structure_holds_the_couplings() {
 #[test]
 fn refactoring_and_solving_allocate_nothing() {
     let (pairs, mut dense) = random_matrix(40, 5);
-    let mut sparse = BlockCholesky::default();
+    let mut sparse = Cholesky::default();
     sparse.shape(40, &pairs);
-    load(&mut sparse, &pairs, &mut dense);
-    let values = sparse.values().to_vec();
+    let (first, mut second) = (blocks(&pairs, &mut dense), blocks(&pairs, &mut dense));
+    second[7].value += DMat3::IDENTITY;
     let mut x = vec![DVec3::ONE; 40];
     let info = allocation_counter::measure(|| {
-        for _ in 0..3 {
+        for values in [&first, &second, &first] {
             assert!(!sparse.shape(40, &[Pair { row: 3, column: 3 }]));
-            sparse.load(&values);
-            sparse.factor().unwrap();
+            sparse.set(values);
+            sparse.factor(|_, _| ()).unwrap();
             sparse.solve(&mut x);
         }
     });
@@ -94,12 +97,66 @@ fn refactoring_and_solving_allocate_nothing() {
 }
 
 #[test]
+fn what_is_factored_again_in_part_has_the_bits_of_a_whole_factor() {
+    let (pairs, mut dense) = random_matrix(60, 21);
+    let mut values = blocks(&pairs, &mut dense);
+    let mut kept = Cholesky::default();
+    kept.shape(60, &pairs);
+    for (k, at) in [0, 17, 59, 3, 3].into_iter().enumerate() {
+        values[at].value += DMat3::from_diagonal(DVec3::splat(0.1 * (k + 1) as f64));
+        let mut whole = Cholesky::default();
+        whole.shape(60, &pairs);
+        let [partly, wholly] = [&mut kept, &mut whole].map(|matrix| {
+            let mut x: Vec<_> = (0..60).map(|i| DVec3::new(1.0, f64::from(i), -2.0)).collect();
+            matrix.set(&values);
+            matrix.factor(|_, _| ()).unwrap();
+            matrix.solve(&mut x);
+            x
+        });
+        assert_eq!(partly, wholly);
+    }
+}
+
+#[test]
+fn what_is_added_to_a_front_is_part_of_the_matrix() {
+    let (pairs, mut dense) = random_matrix(20, 8);
+    let (mut added, mut given) = (Cholesky::default(), Cholesky::default());
+    let mut values = blocks(&pairs, &mut dense);
+    [&mut added, &mut given].into_iter().for_each(|matrix| assert!(matrix.shape(20, &pairs)));
+    added.set(&values);
+    added.factor(|_, _| ()).unwrap();
+    let more = DMat3::from_cols(DVec3::new(3.0, 1.0, 0.0), DVec3::new(1.0, 2.0, 0.5), DVec3::new(0.0, 0.5, 4.0));
+    let place = added.place(Pair { row: 11, column: 11 }).unwrap();
+    added.spoil(place.front);
+    added
+        .factor(|front, entries| {
+            if front == place.front {
+                entries.add(place, &more)
+            }
+        })
+        .unwrap();
+    values.push(Block { row: 11, column: 11, value: more });
+    given.set(&values);
+    given.factor(|_, _| ()).unwrap();
+    let [a, b] = [added, given].map(|mut matrix| {
+        let mut x = vec![DVec3::new(1.0, 2.0, 3.0); 20];
+        matrix.solve(&mut x);
+        x
+    });
+    let apart = a.iter().zip(&b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(apart < 1e-12, "{apart}");
+}
+
+#[test]
 fn an_indefinite_matrix_is_refused_at_its_block() {
-    let mut sparse = BlockCholesky::default();
+    let mut sparse = Cholesky::default();
     let pairs = [0, 1, 2].map(|row| Pair { row, column: row });
     sparse.shape(3, &pairs);
-    for (pair, value) in pairs.iter().zip([1.0, -1.0, 1.0]) {
-        sparse.add(sparse.place(*pair).unwrap(), &DMat3::from_diagonal(DVec3::splat(value)));
-    }
-    assert_eq!(sparse.factor(), Err(1));
+    let values: Vec<_> = [1.0, -1.0, 1.0]
+        .iter()
+        .enumerate()
+        .map(|(k, value)| Block { row: k, column: k, value: DMat3::from_diagonal(DVec3::splat(*value)) })
+        .collect();
+    sparse.set(&values);
+    assert_eq!(sparse.factor(|_, _| ()), Err(1));
 }

@@ -10,6 +10,7 @@ use crate::capsule_chain::CROSSING_M;
 use crate::{Aabb, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
+use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
 /// A direction whose cosine with the normal of a triangle is above this comes from its face.
@@ -21,6 +22,11 @@ const PARALLEL: f64 = 1e-4;
 /// A place that has passed through a skin is pushed out as it came in, unless some face is nearer than this share of that distance: next
 /// to the edge of a box it is 0.7.
 const HALF: f64 = 0.5;
+
+/// The search depth of a closed skin behind itself, as a share of an edge.
+const OWN_DEEP_SHARE: f64 = 0.25;
+/// See [`SkinPair::with_itself`].
+const CRUSHED: f64 = 4.0;
 
 /// The place of a skin that is nearest to a point.
 #[derive(Clone, Copy)]
@@ -45,12 +51,64 @@ pub(super) struct SkinPair<'a> {
     /// Sum of both half thicknesses, and how deep the two may overlap (`deep_m`), metres.
     thick_m: f64,
     deep_m: f64,
+    /// Where both are one skin: what of it never touches.
+    own: Option<OwnSkin<'a>>,
+}
+
+/// A skin at rest: features that are near each other there never touch.
+#[derive(Clone, Copy)]
+struct OwnSkin<'a> {
+    /// Where the vertices are at rest, metres.
+    rest: &'a [DVec3],
+    /// Features nearer than this at rest never touch, metres.
+    apart_m: f64,
+}
+
+impl OwnSkin<'_> {
+    /// Whether a vertex and a triangle never touch.
+    fn is_one(&self, vertex: u32, triangle: [u32; 3]) -> bool {
+        let at = |vertex: u32| self.rest[vertex as usize];
+        triangle.contains(&vertex) || near_triangle(at(vertex), triangle.map(at)).distance(at(vertex)) < self.apart_m
+    }
+
+    /// Whether two edges never touch.
+    fn is_crossed(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
+        let at = |vertex: u32| self.rest[vertex as usize];
+        let (first, second) = ([a, b].map(at), [c, d].map(at));
+        let (s, t) = near_segments(first, second);
+        let apart_m = first[0].lerp(first[1], s).distance(second[0].lerp(second[1], t));
+        [a, b].iter().any(|vertex| [c, d].contains(vertex)) || apart_m < self.apart_m
+    }
 }
 
 impl<'a> SkinPair<'a> {
     pub fn new(here: &'a SurfaceQuery<'a>, there: &'a SurfaceQuery<'a>) -> Self {
         let (a, b) = (here.surface.form, there.surface.form);
-        Self { here, there, thick_m: a.radius_m + b.radius_m, deep_m: DEEP_SHARE * a.edge_m.min(b.edge_m) }
+        let deep_m = DEEP_SHARE * a.edge_m.min(b.edge_m);
+        Self { here, there, thick_m: a.radius_m + b.radius_m, deep_m, own: None }
+    }
+
+    /// A skin with itself. A sheet bent to the radius of its own skin comes back to itself after π times its half thickness; what is nearer at
+    /// rest touches only through it. What is behind a closed skin within the search depth must not be its own other side: that is farther
+    /// at rest, and stays so unless it is crushed to a quarter.
+    pub fn with_itself(query: &'a SurfaceQuery<'a>, rest: &'a [DVec3]) -> Self {
+        let form = query.surface.form;
+        let deep_m = if form.closed { OWN_DEEP_SHARE * form.edge_m } else { 0.0 };
+        let apart_m = (PI * form.radius_m).max(deep_m * CRUSHED);
+        let own = Some(OwnSkin { rest, apart_m });
+        Self { here: query, there: query, thick_m: 2.0 * form.radius_m, deep_m, own }
+    }
+
+    /// No feature farther than this from a place of the other is asked for, metres.
+    pub fn look_m(&self) -> f64 {
+        self.within_m().max(self.deep_m) + CROSSING_M
+    }
+
+    /// Every place of a skin with itself within reach.
+    pub fn self_touches(&self, into: &mut Vec<Touch>) {
+        self.vertices_here(into);
+        self.edges(into);
+        into.retain(|touch| touch.gap_m <= self.here.reach_m);
     }
 
     /// Every place within reach.
@@ -85,10 +143,13 @@ impl<'a> SkinPair<'a> {
         let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
         for edge in here.surface.edges_in(here.region) {
             let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
-            for other in there.surface.edges_in(around.grown(self.within_m())) {
+            there.each_edge(around.grown(self.within_m()), |other| {
                 let (s, t) = near_segments(edge.ends, other.ends);
-                if !(inner.contains(&s) && inner.contains(&t)) {
-                    continue;
+                // of two edges of one skin the lower number comes first
+                let own =
+                    |own: OwnSkin<'_>| edge.number >= other.number || own.is_crossed(edge.vertices, other.vertices);
+                if !(inner.contains(&s) && inner.contains(&t)) || self.own.is_some_and(own) {
+                    return;
                 }
                 let (a, b) = (edge.at(s), other.at(t));
                 if let Some((normal, distance_m)) = self.crossing([a, b], [edge.feature(), other.feature()]) {
@@ -96,7 +157,7 @@ impl<'a> SkinPair<'a> {
                     let (on_a, on_b) = (a.spot.place(), b.spot.place());
                     into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a, on_b });
                 }
-            }
+            });
         }
     }
 
@@ -109,18 +170,27 @@ impl<'a> SkinPair<'a> {
     /// Where a vertex of the skin `a` touches the skin `b`.
     fn vertex(&self, a: &SurfaceQuery<'_>, b: &SurfaceQuery<'_>, vertex: u32, at: DVec3) -> Option<SkinContact> {
         let out = BarycentricPoint::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
-        let near = b.nearest(at, self.within_m(), None)?;
-        if b.is_behind(near, at) {
-            // it is pushed out through a face that it can have come in by
-            let NearestPoint { spot, at: foot, face } = b.nearest(at, self.deep_m, out)?;
+        let others = |triangle: [u32; 3]| self.own.is_none_or(|own| !own.is_one(vertex, triangle));
+        let near = b.nearest(at, self.within_m(), None, others)?;
+        // it is pushed out through a face that it can have come in by
+        let way_out = || {
+            let NearestPoint { spot, at: foot, face } = b.nearest(at, self.deep_m, out, others)?;
             let distance_m = at.distance(foot);
             let normal = if distance_m > CROSSING_M { (foot - at) / distance_m } else { face? };
-            return Some(SkinContact { spot, normal, distance_m: -distance_m });
+            Some(SkinContact { spot, normal, distance_m: -distance_m })
+        };
+        if b.is_behind(near, at) {
+            return way_out();
         }
         let NearestPoint { spot, at: foot, face } = near;
         let distance_m = at.distance(foot);
         if distance_m <= CROSSING_M {
-            let NearestPoint { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
+            let Some(NearestPoint { spot, face, .. }) = b.nearest(at, distance_m + CROSSING_M, out, others) else {
+                // in a side wall of a closed skin: it has come in by another face
+                let behind =
+                    |contact: &SkinContact| b.out_of(contact.spot).is_some_and(|face| face.dot(contact.normal) > 0.0);
+                return way_out().filter(|contact| b.surface.form.closed && behind(contact));
+            };
             let away = out.map(|out| -out);
             // an open skin may be meant from either side
             let normal = face.map(|face| if away.is_some_and(|away| face.dot(away) < 0.0) { -face } else { face });
@@ -135,7 +205,7 @@ impl<'a> SkinPair<'a> {
                 && distance_m <= self.deep_m
                 && Feature::Vertex(vertex).out(a.surface, normal).is_some()
                 && a.holds(foot, least_m..=distance_m)
-                && a.nearest(foot, distance_m, Some(normal)).is_none();
+                && a.nearest(foot, distance_m, Some(normal), |_| true).is_none();
             return passed.then_some(SkinContact { spot, normal: -normal, distance_m: -distance_m });
         }
         let out_here = Feature::Vertex(vertex).out(a.surface, -normal)?;
@@ -184,34 +254,45 @@ fn along(feature: Feature) -> DVec3 {
 }
 
 impl SurfaceQuery<'_> {
-    /// The place of the skin that is nearest to a point within `within_m`; only of faces opposed to the normal `facing`, if one is given.
-    fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<NearestPoint> {
+    /// The place of the skin that is nearest to a point within `within_m`: of the triangles that `counts` accepts, and only of faces opposed to
+    /// the normal `facing`, if one is given. Of places equally near that of the lowest number counts.
+    fn nearest(
+        &self,
+        point: DVec3,
+        within_m: f64,
+        facing: Option<DVec3>,
+        counts: impl Fn([u32; 3]) -> bool,
+    ) -> Option<NearestPoint> {
         let region = Aabb::about(point, within_m);
-        let faces = self.surface.triangles_in(region).filter_map(|Triangle { vertices, corners, .. }| {
-            let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
-            if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
-                return None;
+        let mut best: Option<(f64, u32, NearestPoint)> = None;
+        let mut offer = |number: u32, near: NearestPoint| {
+            let distance2 = near.at.distance_squared(point);
+            let nearer =
+                best.is_none_or(|(least, before, _)| distance2 < least || (distance2 == least && number < before));
+            if distance2 <= within_m * within_m && nearer {
+                best = Some((distance2, number, near));
+            }
+        };
+        self.each_triangle(region, |Triangle { number, vertices, corners }| {
+            let Some(face) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { return };
+            if (self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING))
+                || !counts(vertices)
+            {
+                return;
             }
             let at = near_triangle(point, corners);
-            Some(NearestPoint {
-                spot: BarycentricPoint { vertices, shares: shares(at, corners)? },
-                at,
-                face: Some(face),
-            })
+            let Some(shares) = shares(at, corners) else { return };
+            offer(number, NearestPoint { spot: BarycentricPoint { vertices, shares }, at, face: Some(face) });
         });
-        let is_rope = self.surface.form.triangles.is_empty();
-        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|edge| {
-            let along = edge.ends[1] - edge.ends[0];
-            let share =
-                ((point - edge.ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let SkinPoint { spot, position } = edge.at(share);
-            NearestPoint { spot, at: position, face: None }
-        });
-        let distance2 = |near: &NearestPoint| near.at.distance_squared(point);
-        faces
-            .chain(lines)
-            .filter(|near| distance2(near) <= within_m * within_m)
-            .min_by(|a, b| distance2(a).total_cmp(&distance2(b)))
+        if self.surface.form.triangles.is_empty() {
+            self.each_edge(region, |edge| {
+                let along = edge.ends[1] - edge.ends[0];
+                let foot = (point - edge.ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+                let SkinPoint { spot, position } = edge.at(foot.clamp(0.0, 1.0));
+                offer(edge.number, NearestPoint { spot, at: position, face: None });
+            });
+        }
+        best.map(|(.., near)| near)
     }
 
     /// Whether a point is inside the closed skin whose nearest place this is.
@@ -220,8 +301,8 @@ impl SurfaceQuery<'_> {
     }
 
     /// Whether a point is inside the skin, at a depth in this range, metres; for an open skin always true.
-    fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
+    pub(super) fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
         let deep = |near: NearestPoint| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
-        !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
+        !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None, |_| true).is_some_and(deep)
     }
 }

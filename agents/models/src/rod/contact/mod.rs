@@ -12,10 +12,10 @@ use super::company::Company;
 use glam::DVec3;
 use metachron_contact::{Contact, Solver};
 use metachron_core::ContactJacobian;
-use metachron_geometry::narrow_phase;
+use metachron_geometry::narrow_phase::{self, FacingPoints, PLACES, RestedChain};
 use metachron_geometry::signed_distance::Ball;
 use metachron_geometry::{Obstacle, ShapeError};
-use self_contact::{FacingPoints, PLACES, Pairs};
+use self_contact::Pairs;
 pub(crate) use solve::{Solved, respond};
 use static_contact::{WallTouch, Walls};
 
@@ -168,6 +168,12 @@ impl TubeContacts {
 }
 
 impl Skin<'_> {
+    /// The tube, as it finds itself.
+    fn chain(&self) -> RestedChain<'_> {
+        let Self { positions, radii_m, arc_m, .. } = *self;
+        RestedChain { positions, radii_m, arc_m }
+    }
+
     fn segments(&self) -> usize {
         self.positions.len() - 1
     }
@@ -187,14 +193,6 @@ impl Skin<'_> {
 
     fn length(&self, segment: usize) -> f64 {
         self.positions[segment].distance(self.positions[segment + 1])
-    }
-
-    fn middle(&self, segment: usize) -> DVec3 {
-        (self.positions[segment] + self.positions[segment + 1]) * 0.5
-    }
-
-    fn widest(&self, segment: usize) -> f64 {
-        self.radii_m[segment].max(self.radii_m[segment + 1])
     }
 
     fn taper(&self, segment: usize) -> f64 {

@@ -91,12 +91,10 @@ fn the_grid_finds_every_pair_that_trying_all_finds() {
         let mut all = Vec::new();
         for i in 0..skin.segments() {
             for j in i + 1..skin.segments() {
-                let nearest = self_contact::nearest(&skin, [i as u32, j as u32]);
+                let nearest = skin.chain().nearest([i as u32, j as u32]);
                 let margin_m = 0.001 + ahead(i) + ahead(j);
-                if nearest.gap_m <= margin_m && !self_contact::is_neighbour(&skin, i, j) {
-                    self_contact::visit_places(&skin, nearest, margin_m, &mut |m| {
-                        all.push((m.segments, m.place, m.gap_m))
-                    });
+                if nearest.gap_m <= margin_m && !skin.chain().is_neighbour([i as u32, j as u32]) {
+                    skin.chain().visit_places(nearest, margin_m, &mut |m| all.push((m.segments, m.place, m.gap_m)));
                 }
             }
         }

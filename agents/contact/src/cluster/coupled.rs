@@ -1,0 +1,150 @@
+//! The members' matrix with what contacts add to it, ⊕ A/f + Jᵀ G J, and its factor.
+//!
+//! In: blocks of members, rows, a gain of each row. Out: solutions. Never here: which blocks are part of it (the whole matrix, or those
+//! near its diagonal). Theory: `docs/theory/clusters.md`, eq. 8.
+
+use super::factor::{Cholesky, Pair, Place};
+use super::problem::Block;
+use super::rows::Rows;
+use glam::DMat3;
+use glam::DVec3;
+
+/// A matrix, where rows add to it, and its factor.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Coupled {
+    factor: Cholesky,
+    /// Where two terms of a row meet, row by row; those of row k start at `starts[k]`.
+    meetings: Vec<Meeting>,
+    starts: Vec<usize>,
+    /// The blocks of all rows that the meetings were found for.
+    blocks: Vec<usize>,
+    /// Meetings by front; those of front k start at `of_fronts[k]`.
+    by_front: Vec<usize>,
+    of_fronts: Vec<usize>,
+    /// The gains that are in the factor.
+    gains: Vec<DMat3>,
+}
+
+/// Two terms of one row, by their places among its terms, and where their product goes.
+#[derive(Debug, Clone, Copy)]
+struct Meeting {
+    row: usize,
+    left: usize,
+    right: usize,
+    place: Place,
+}
+
+impl Coupled {
+    /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and, where `whole`, for those of the rows.
+    pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, whole: Option<&Rows>) {
+        for meeting in self.meetings.iter().filter(|meeting| self.gains[meeting.row] != DMat3::ZERO) {
+            self.factor.spoil(meeting.place.front);
+        }
+        self.gains.fill(DMat3::ZERO);
+        let known = whole.is_none_or(|rows| self.knows(rows));
+        if !(known && self.factor.fits(size, pairs)) {
+            pairs.extend(whole.iter().flat_map(|rows| couplings(rows)));
+            if self.factor.shape(size, pairs) {
+                self.forget();
+            }
+        }
+        self.factor.set(blocks);
+    }
+
+    /// Finds where the rows add to the matrix.
+    pub fn meet(&mut self, rows: &Rows) {
+        if self.knows(rows) {
+            return;
+        }
+        self.forget();
+        self.gains.resize(rows.len(), DMat3::ZERO);
+        for row in 0..rows.len() {
+            let terms = rows.terms(row);
+            self.starts.push(self.meetings.len());
+            self.blocks.extend(terms.iter().map(|term| term.block));
+            for left in 0..terms.len() {
+                for right in 0..=left {
+                    let place = self.factor.place(Pair { row: terms[left].block, column: terms[right].block });
+                    self.meetings.extend(place.map(|place| Meeting { row, left, right, place }));
+                }
+            }
+            // an end of each row's blocks, so that lists of blocks are equal where all rows' are
+            self.blocks.push(usize::MAX);
+        }
+        self.starts.push(self.meetings.len());
+        self.sort();
+    }
+
+    /// Whether the meetings are those of rows on these blocks.
+    fn knows(&self, rows: &Rows) -> bool {
+        let blocks = (0..rows.len())
+            .flat_map(|row| rows.terms(row).iter().map(|term| term.block).chain(std::iter::once(usize::MAX)));
+        !self.starts.is_empty() && self.blocks.iter().copied().eq(blocks)
+    }
+
+    fn forget(&mut self) {
+        for list in [&mut self.starts, &mut self.blocks, &mut self.by_front, &mut self.of_fronts] {
+            list.clear();
+        }
+        self.meetings.clear();
+        self.gains.clear();
+    }
+
+    /// Lists the meetings by front, those of one front as they are.
+    fn sort(&mut self) {
+        let Self { factor, meetings, by_front, of_fronts, .. } = self;
+        of_fronts.resize(factor.len() + 2, 0);
+        // two places ahead, as each start moves on to the next while the list is filled
+        meetings.iter().for_each(|meeting| of_fronts[meeting.place.front + 2] += 1);
+        (2..of_fronts.len()).for_each(|k| of_fronts[k] += of_fronts[k - 1]);
+        by_front.resize(meetings.len(), 0);
+        for (k, meeting) in meetings.iter().enumerate() {
+            let next = &mut of_fronts[meeting.place.front + 1];
+            by_front[*next] = k;
+            *next += 1;
+        }
+    }
+
+    /// Factors the matrix without contacts.
+    ///
+    /// # Errors
+    /// A block at which it is not positive definite.
+    pub fn factor_members(&mut self) -> Result<(), usize> {
+        self.factor.factor(|_, _| ())
+    }
+
+    /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
+    pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
+        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, .. } = self;
+        for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
+            meetings[starts[row]..starts[row + 1]].iter().for_each(|meeting| factor.spoil(meeting.place.front));
+            *known = *gain;
+        }
+        let done = factor.factor(|front, entries| {
+            for &at in &by_front[of_fronts[front]..of_fronts[front + 1]] {
+                let Meeting { row, left, right, place } = meetings[at];
+                if gains[row] != DMat3::ZERO {
+                    let terms = rows.terms(row);
+                    entries.add(place, &(terms[left].map.transpose() * (gains[row] * terms[right].map)));
+                }
+            }
+        });
+        done.is_ok()
+    }
+
+    /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last factor.
+    pub fn solve(&mut self, x: &mut [DVec3]) {
+        self.factor.solve(x);
+    }
+}
+
+/// Where terms of one row meet.
+fn couplings(rows: &Rows) -> impl Iterator<Item = Pair> {
+    (0..rows.len()).flat_map(|row| {
+        let terms = rows.terms(row);
+        terms
+            .iter()
+            .enumerate()
+            .flat_map(|(left, term)| terms[..=left].iter().map(|other| Pair { row: term.block, column: other.block }))
+    })
+}

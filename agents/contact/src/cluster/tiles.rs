@@ -1,0 +1,155 @@
+//! Dense kernels of a factor, over tiles of 4 × 4 numbers.
+//!
+//! In: columns of a front that are to be eliminated, and room for what they leave. Out: their factor and that rest. Never here: where
+//! numbers come from. Plain loops over tiles of fixed size, which compile to vector instructions and sum in one order everywhere.
+//!
+//! Rows come in chunks of four; a chunk has its columns one after the other. Numbers that fill a chunk up are those of the identity.
+
+/// Rows and columns of a tile.
+pub(super) const TILE: usize = 4;
+/// Numbers of a tile, column by column.
+pub(super) const TILE_SIZE: usize = TILE * TILE;
+
+/// Where the tiles of a row of tiles start in a lower triangle of tiles, and how many numbers so many rows hold.
+pub(super) fn triangle(tiles: usize) -> usize {
+    TILE_SIZE * (tiles * (tiles + 1) / 2)
+}
+
+/// A number of rows or columns, filled up to whole tiles.
+pub(super) fn filled(size: usize) -> usize {
+    size.next_multiple_of(TILE)
+}
+
+/// Factors the `columns` columns of `lower`, whose first rows are a square, and takes from the triangle `update` what they give to
+/// the rows below. A diagonal tile is left as the inverse of its factor.
+///
+/// # Errors
+/// The column at which the matrix is not positive definite.
+pub(super) fn eliminate(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+    if columns == 0 {
+        return Ok(());
+    }
+    let chunk = TILE * columns;
+    for tile in 0..columns / TILE {
+        let (done, below) = lower.split_at_mut((tile + 1) * chunk);
+        let (left, own) = done[tile * chunk..].split_at_mut(tile * TILE_SIZE);
+        let own = &mut own[..TILE_SIZE];
+        subtract(own, left, left);
+        invert_factor(own).map_err(|column| tile * TILE + column)?;
+        for row in below.chunks_exact_mut(chunk) {
+            let (before, here) = row.split_at_mut(tile * TILE_SIZE);
+            let here = &mut here[..TILE_SIZE];
+            subtract(here, before, left);
+            divide(here, own);
+        }
+    }
+    let below = &lower[columns * columns..];
+    for (row, a) in below.chunks_exact(chunk).enumerate() {
+        let tiles = &mut update[triangle(row)..triangle(row + 1)];
+        for (tile, b) in tiles.chunks_exact_mut(TILE_SIZE).zip(below.chunks_exact(chunk)) {
+            subtract(tile, a, b);
+        }
+    }
+    Ok(())
+}
+
+/// tile −= a bᵀ, of two chunks of equal length.
+#[inline]
+fn subtract(tile: &mut [f64], a: &[f64], b: &[f64]) {
+    let mut sums = [0.0; TILE_SIZE];
+    for (a, b) in a.as_chunks::<TILE>().0.iter().zip(b.as_chunks::<TILE>().0) {
+        for (column, b) in b.iter().enumerate() {
+            for (row, a) in a.iter().enumerate() {
+                sums[TILE * column + row] += a * b;
+            }
+        }
+    }
+    tile.iter_mut().zip(sums).for_each(|(value, sum)| *value -= sum);
+}
+
+/// tile ← tile L⁻ᵀ, of the inverse of a lower factor.
+#[inline]
+fn divide(tile: &mut [f64], inverse: &[f64]) {
+    let mut out = [0.0; TILE_SIZE];
+    for column in 0..TILE {
+        for other in 0..=column {
+            let share = inverse[TILE * other + column];
+            for row in 0..TILE {
+                out[TILE * column + row] += tile[TILE * other + row] * share;
+            }
+        }
+    }
+    tile.copy_from_slice(&out);
+}
+
+/// A symmetric tile, of which the lower half is read, becomes the inverse of its lower Cholesky factor.
+fn invert_factor(tile: &mut [f64]) -> Result<(), usize> {
+    let mut l = [0.0; TILE_SIZE];
+    let at = |row: usize, column: usize| TILE * column + row;
+    // the diagonal holds reciprocals
+    for column in 0..TILE {
+        let own = (0..column).fold(tile[at(column, column)], |left, k| left - l[at(column, k)] * l[at(column, k)]);
+        if !(own > 0.0 && own.is_finite()) {
+            return Err(column);
+        }
+        l[at(column, column)] = 1.0 / own.sqrt();
+        for row in column + 1..TILE {
+            let left = (0..column).fold(tile[at(row, column)], |left, k| left - l[at(row, k)] * l[at(column, k)]);
+            l[at(row, column)] = left * l[at(column, column)];
+        }
+    }
+    tile.fill(0.0);
+    for column in 0..TILE {
+        tile[at(column, column)] = l[at(column, column)];
+        for row in column + 1..TILE {
+            let sum: f64 = (column..row).map(|k| l[at(row, k)] * tile[at(k, column)]).sum();
+            tile[at(row, column)] = -sum * l[at(row, row)];
+        }
+    }
+    Ok(())
+}
+
+/// x ← L⁻¹ x of the square, and what it takes from the rows below.
+pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
+    for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate() {
+        let own = row * TILE < columns;
+        let length = if own { row * TILE } else { columns };
+        let mut sums = [0.0; TILE];
+        for (column, x) in chunk.as_chunks::<TILE>().0.iter().zip(&x[..length]) {
+            sums.iter_mut().zip(column).for_each(|(sum, l)| *sum += l * x);
+        }
+        let here = &mut x[row * TILE..(row + 1) * TILE];
+        here.iter_mut().zip(sums).for_each(|(x, sum)| *x -= sum);
+        if own {
+            let inverse = &chunk[row * TILE_SIZE..(row + 1) * TILE_SIZE];
+            let mut out = [0.0; TILE];
+            for (column, x) in inverse.as_chunks::<TILE>().0.iter().zip(&*here) {
+                out.iter_mut().zip(column).for_each(|(out, l)| *out += l * x);
+            }
+            here.copy_from_slice(&out);
+        }
+    }
+}
+
+/// x ← L⁻ᵀ x of the square, the rows below being known.
+pub(super) fn solve_up(lower: &[f64], columns: usize, x: &mut [f64]) {
+    for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate().rev() {
+        let own = row * TILE < columns;
+        let (before, rest) = x.split_at_mut(row * TILE);
+        let here = &mut rest[..TILE];
+        let dot = |column: &[f64; TILE], x: &[f64]| {
+            let [a, b, c, d] = *column;
+            (a * x[0] + b * x[1]) + (c * x[2] + d * x[3])
+        };
+        if own {
+            let inverse = &chunk[row * TILE_SIZE..(row + 1) * TILE_SIZE];
+            let mut out = [0.0; TILE];
+            out.iter_mut().zip(inverse.as_chunks::<TILE>().0).for_each(|(out, column)| *out = dot(column, here));
+            here.copy_from_slice(&out);
+        }
+        let length = if own { row * TILE } else { columns };
+        for (column, x) in chunk.as_chunks::<TILE>().0.iter().zip(&mut before[..length]) {
+            *x -= dot(column, here);
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Contacts of a closed skin with a box: vertices over its faces, its edges across those of the skin, its corners over triangles.
+//!
+//! In: a closed skin and a box that may touch. Out: touching places with normals towards the skin. Never here: open skins, tools.
+//! Theory: docs/theory/soft.md, eq. 15c.
+//!
+//! The normal of each place is that of its two features, not the way between two points: that way vanishes where the two lie on each
+//! other, and turns round or aside where they overlap.
+
+use super::super::primitives::Block;
+use super::super::voronoi_regions::LEAN_SHARE;
+use super::{BarycentricPoint, DEEP_SHARE, Edge, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
+use crate::{Aabb, Place, Touch, near_segments};
+use glam::DVec3;
+
+/// A skin meets a face by which it can have come in: their normals are opposed by this cosine at least.
+const FACING: f64 = 0.1;
+/// By how much two features may lean over what is next to them: about what a body turns by in a step, radians.
+const LEAN: f64 = 0.1;
+/// Edges whose directions have a sine below this have no place of their own: their ends tell it.
+const PARALLEL: f64 = 1e-3;
+/// Edges that have passed each other did so only where each lies at least this share of that depth inside the other body.
+const HALF: f64 = 0.5;
+
+/// A box where it is.
+struct PlacedBox {
+    middle: DVec3,
+    /// Its directions and half extents, metres.
+    axes: [DVec3; 3],
+    half_m: DVec3,
+}
+
+/// An edge of a box.
+struct Rim {
+    number: u64,
+    ends: [DVec3; 2],
+    /// The normals of the faces that meet there.
+    faces: [DVec3; 2],
+}
+
+impl PlacedBox {
+    fn of(block: &Block<'_>, half_m: DVec3) -> Self {
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| block.rotation * axis);
+        Self { middle: block.origin, axes, half_m }
+    }
+
+    /// How far a point is along each direction from the middle, metres.
+    fn local(&self, point: DVec3) -> DVec3 {
+        DVec3::from_array(self.axes.map(|axis| axis.dot(point - self.middle)))
+    }
+
+    /// How deep inside a point is; negative outside, metres.
+    fn depth_m(&self, point: DVec3) -> f64 {
+        (self.half_m - self.local(point).abs()).min_element()
+    }
+
+    /// The corner with these signs, by bits.
+    fn corner(&self, bits: usize) -> DVec3 {
+        let along = |axis: usize| self.axes[axis] * self.half_m[axis] * sign(bits >> axis);
+        self.middle + along(0) + along(1) + along(2)
+    }
+
+    /// The normals of the faces at a corner.
+    fn faces(&self, bits: usize) -> [DVec3; 3] {
+        std::array::from_fn(|axis| self.axes[axis] * sign(bits >> axis))
+    }
+
+    fn rims(&self) -> impl Iterator<Item = Rim> {
+        (0..12).map(|number| {
+            let axis = number / 4;
+            let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+            let bits = (number & 1) << next | (number >> 1 & 1) << last;
+            let faces = self.faces(bits);
+            let ends = [self.corner(bits), self.corner(bits | 1 << axis)];
+            Rim { number: number as u64 + 1, ends, faces: [faces[next], faces[last]] }
+        })
+    }
+}
+
+fn sign(bit: usize) -> f64 {
+    if bit & 1 == 1 { 1.0 } else { -1.0 }
+}
+
+impl SurfaceQuery<'_> {
+    /// Every place of a closed skin on a box with these half extents.
+    pub(super) fn box_touches(&self, block: &Block<'_>, half_m: DVec3, into: &mut Vec<Touch>) {
+        let cuboid = PlacedBox::of(block, half_m);
+        for (vertex, at) in self.surface.vertices_in(self.region) {
+            into.extend(self.vertex_on(&cuboid, vertex, at));
+        }
+        for edge in self.surface.edges_in(self.region) {
+            for rim in cuboid.rims() {
+                into.extend(self.edge_across(&cuboid, &edge, &rim));
+            }
+        }
+        for bits in 0..8 {
+            into.extend(self.corner_over(&cuboid, bits));
+        }
+    }
+
+    /// How deep two bodies may overlap, metres.
+    fn deep_m(&self) -> f64 {
+        DEEP_SHARE * self.surface.form.edge_m
+    }
+
+    /// A place whose normal and gap at the skin are known, unless it is too far.
+    fn place_on_box(&self, key: u64, here: SkinPoint, normal: DVec3, gap_m: f64) -> Option<Touch> {
+        let on_b = Place::Point(here.position - normal * (0.5 * gap_m));
+        (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: here.spot.place(), on_b })
+    }
+
+    /// A vertex over or under a face that looks against the skin: of several the one that it is least deep under.
+    fn vertex_on(&self, cuboid: &PlacedBox, vertex: u32, at: DVec3) -> Option<Touch> {
+        let out = self.normals[vertex as usize].try_normalize()?;
+        let (local, rim_m) = (cuboid.local(at), LEAN_SHARE * self.surface.form.edge_m);
+        let beyond = local.abs() - cuboid.half_m;
+        let mut nearest: Option<(f64, DVec3)> = None;
+        for axis in 0..3 {
+            let lean = cuboid.axes[axis].dot(out);
+            let side = -lean.signum();
+            let gap_m = side * local[axis] - cuboid.half_m[axis];
+            let within = beyond[(axis + 1) % 3] <= rim_m && beyond[(axis + 2) % 3] <= rim_m;
+            let is_under = gap_m > -2.0 * cuboid.half_m[axis];
+            if lean.abs() >= FACING && within && is_under && nearest.is_none_or(|(least_m, _)| gap_m > least_m) {
+                nearest = Some((gap_m, cuboid.axes[axis] * side));
+            }
+        }
+        let (gap_m, normal) = nearest?;
+        self.place_on_box(KINDS[0] | u64::from(vertex), SkinPoint::vertex(vertex, at), normal, gap_m)
+    }
+
+    /// The place where an edge of the skin and one of the box cross.
+    fn edge_across(&self, cuboid: &PlacedBox, edge: &Edge, rim: &Rim) -> Option<Touch> {
+        let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
+        let along = [edge.ends[1] - edge.ends[0], rim.ends[1] - rim.ends[0]];
+        let across = along[0].cross(along[1]);
+        if across.length_squared() < PARALLEL * PARALLEL * along[0].length_squared() * along[1].length_squared() {
+            return None;
+        }
+        let across = across.normalize();
+        // of the box, and into the skin
+        let normal = across * across.dot(rim.faces[0] + rim.faces[1]).signum();
+        if rim.faces.iter().any(|face| face.dot(normal) < -LEAN) || !edge.feature().faces(self.surface, -normal, LEAN) {
+            return None;
+        }
+        let (s, t) = near_segments(edge.ends, rim.ends);
+        if !(inner.contains(&s) && inner.contains(&t)) {
+            return None;
+        }
+        let (here, there) = (edge.at(s), rim.ends[0].lerp(rim.ends[1], t));
+        let gap_m = normal.dot(here.position - there);
+        let passed = || {
+            let deep_m = HALF * -gap_m..=-gap_m;
+            -gap_m <= self.deep_m() && cuboid.depth_m(here.position) >= *deep_m.start() && self.holds(there, deep_m)
+        };
+        if gap_m < 0.0 && !passed() {
+            return None;
+        }
+        self.place_on_box(KINDS[1] | edge.number << PART_SHIFT | rim.number, here, normal, gap_m)
+    }
+
+    /// A corner over or under a triangle: of several the nearest.
+    fn corner_over(&self, cuboid: &PlacedBox, bits: usize) -> Option<Touch> {
+        let (at, faces) = (cuboid.corner(bits), cuboid.faces(bits));
+        let around = Aabb::about(at, self.reach_m.max(self.deep_m()));
+        let mut nearest: Option<(f64, DVec3, SkinPoint)> = None;
+        for Triangle { vertices, corners, .. } in self.surface.triangles_in(around) {
+            let Some(out) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { continue };
+            let gap_m = out.dot(at - corners[0]);
+            let position = at - out * gap_m;
+            let is_near = nearest.is_none_or(|(least_m, ..)| gap_m.abs() < least_m.abs());
+            if !is_near || gap_m < -self.deep_m() || faces.iter().any(|face| face.dot(-out) < -HALF) {
+                continue;
+            }
+            let Some(shares) = shares(position, corners) else { continue };
+            if shares.iter().all(|share| *share >= -LEAN_SHARE) {
+                nearest = Some((gap_m, -out, SkinPoint { spot: BarycentricPoint { vertices, shares }, position }));
+            }
+        }
+        let (gap_m, normal, point) = nearest?;
+        self.place_on_box(KINDS[2] | bits as u64, point, normal, gap_m)
+    }
+}
