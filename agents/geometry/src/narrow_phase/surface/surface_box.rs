@@ -7,8 +7,9 @@
 //! other, and turns round or aside where they overlap.
 
 use super::super::primitives::Block;
+use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::LEAN_SHARE;
-use super::{BarycentricPoint, DEEP_SHARE, Edge, KINDS, PART_SHIFT, SkinPoint, SurfaceQuery, Triangle, shares};
+use super::{BarycentricPoint, DEEP_SHARE, Edge, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::{Aabb, Place, Touch, near_segments};
 use glam::DVec3;
 
@@ -31,7 +32,7 @@ struct PlacedBox {
 
 /// An edge of a box.
 struct Rim {
-    number: u64,
+    number: u32,
     ends: [DVec3; 2],
     /// The normals of the faces that meet there.
     faces: [DVec3; 2],
@@ -71,7 +72,7 @@ impl PlacedBox {
             let bits = (number & 1) << next | (number >> 1 & 1) << last;
             let faces = self.faces(bits);
             let ends = [self.corner(bits), self.corner(bits | 1 << axis)];
-            Rim { number: number as u64 + 1, ends, faces: [faces[next], faces[last]] }
+            Rim { number: number as u32 + 1, ends, faces: [faces[next], faces[last]] }
         })
     }
 }
@@ -103,7 +104,7 @@ impl SurfaceQuery<'_> {
     }
 
     /// A place whose normal and gap at the skin are known, unless it is too far.
-    fn place_on_box(&self, key: u64, here: SkinPoint, normal: DVec3, gap_m: f64) -> Option<Touch> {
+    fn place_on_box(&self, key: TouchKey, here: SkinPoint, normal: DVec3, gap_m: f64) -> Option<Touch> {
         let on_b = Place::Point(here.position - normal * (0.5 * gap_m));
         (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: here.spot.place(), on_b })
     }
@@ -125,7 +126,7 @@ impl SurfaceQuery<'_> {
             }
         }
         let (gap_m, normal) = nearest?;
-        self.place_on_box(KINDS[0] | u64::from(vertex), SkinPoint::vertex(vertex, at), normal, gap_m)
+        self.place_on_box(vertex_key(vertex), SkinPoint::vertex(vertex, at), normal, gap_m)
     }
 
     /// The place where an edge of the skin and one of the box cross.
@@ -155,7 +156,7 @@ impl SurfaceQuery<'_> {
         if gap_m < 0.0 && !passed() {
             return None;
         }
-        self.place_on_box(KINDS[1] | edge.number << PART_SHIFT | rim.number, here, normal, gap_m)
+        self.place_on_box(TouchKey::new(TouchKind::Edge, [edge.number, rim.number]), here, normal, gap_m)
     }
 
     /// A corner over or under a triangle: of several the nearest.
@@ -177,6 +178,6 @@ impl SurfaceQuery<'_> {
             }
         }
         let (gap_m, normal, point) = nearest?;
-        self.place_on_box(KINDS[2] | bits as u64, point, normal, gap_m)
+        self.place_on_box(TouchKey::new(TouchKind::Triangle, [0, bits as u32]), point, normal, gap_m)
     }
 }
