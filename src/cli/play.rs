@@ -3,15 +3,15 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, ClusterState};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
 use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
 use metachron_runtime::{AgentState, Spread};
 use metachron_session::report::{
-    AgentReport, BudgetReport, CouplingError, CouplingReport, MovedReport, OverlapReport, ProbeReport, Quantiles,
-    ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
+    AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, MovedReport, OverlapReport, ProbeReport,
+    Quantiles, ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
 };
 use metachron_session::{
     AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Outcome, PairError, ProbeOutcome, ReferenceComparison,
@@ -192,6 +192,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         summary,
         agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
+        clusters: clusters(scene, &outcome.clusters),
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
         oracle: None,
@@ -244,6 +245,35 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
 
 fn quantiles(spread: Spread) -> Quantiles {
     Quantiles { p50: spread.p50_s * 1e3, p99: spread.p99_s * 1e3 }
+}
+
+/// The clusters of more than one member, or with contacts, by their leaders.
+fn clusters(scene: &Scene, parts: &[Option<ClusterState>]) -> Vec<ClusterRow> {
+    let name = |at: usize| scene.name_of(AgentId(at as u32)).to_owned();
+    let led = |leader: AgentId| {
+        let all = parts.iter().enumerate().filter_map(move |(at, part)| Some((at, (*part)?)));
+        all.filter(move |(_, part)| part.leader == leader)
+    };
+    let row = |(at, part): (usize, &Option<ClusterState>)| {
+        let leader = AgentId(at as u32);
+        let state = part.filter(|state| state.leader == leader)?;
+        let solves = state.solves?;
+        let members: Vec<String> = led(leader).map(|(at, _)| name(at)).collect();
+        (members.len() > 1 || solves.contacts > 0).then(|| ClusterRow {
+            id: name(at),
+            members,
+            h_ms: state.step_s * 1e3,
+            steps: led(leader).map(|(_, part)| part.parts).collect(),
+            contacts: solves.contacts,
+            problems: solves.problems,
+            factors: solves.factors as f64 / solves.problems.max(1) as f64,
+            passes: solves.passes,
+            cut: solves.cut,
+            depth_m: solves.depth_m,
+            depth_max_m: solves.deepest_m,
+        })
+    };
+    parts.iter().enumerate().filter_map(row).collect()
 }
 
 fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {

@@ -20,6 +20,7 @@
 //! ```
 
 pub mod body;
+mod cluster_state;
 pub mod foot;
 pub mod id;
 pub mod impulse_response;
@@ -41,6 +42,7 @@ pub mod wave;
 pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
 };
+pub use cluster_state::{ClusterSolves, ClusterState};
 pub use foot::{Carried, Foot, Lies, Stance};
 pub use id::AgentId;
 pub use impulse_response::{CurveResponse, ImpulseResponse};

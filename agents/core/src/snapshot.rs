@@ -12,7 +12,7 @@ pub use stand::Stand;
 pub use stand::{Footprint, STANDING_M_S};
 pub use tips::Tips;
 
-use crate::{AgentId, Body, Bounds, Grip, ImpulseResponse, Resolution, ReusableOption, SimSpan, SimTime};
+use crate::{AgentId, Body, Bounds, ClusterState, Grip, ImpulseResponse, Resolution, ReusableOption, SimSpan, SimTime};
 use crate::{Ledger, Mat6, PairState, Rebound, Sprung};
 use glam::{DMat3, DQuat, DVec3};
 use std::any::Any;
@@ -78,6 +78,8 @@ pub struct Snapshot {
     pub taken: Vec<Ledger>,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
+    /// Its part in a contact cluster; `None` where it steps by itself.
+    pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
     pub bonds: Vec<AgentId>,
 }
@@ -138,6 +140,7 @@ impl Snapshot {
         self.lies.set(None);
         self.within.set(None);
         self.pairs.clear();
+        self.cluster = None;
         self.bonds.clear();
     }
 

@@ -7,10 +7,12 @@ use super::agent_runner::{AgentRunner, StepOutcome};
 use super::broad_phase::PlannedStep;
 use super::observation::Observer;
 use metachron_contact::stepper::{
-    ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
 };
 use metachron_contact::{Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Body, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport};
+use metachron_core::{
+    AgentId, Body, ClusterSolves, ClusterState, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport,
+};
 use std::sync::Arc;
 
 /// No overload stretches a macro step beyond this, unless it is longer anyway, seconds.
@@ -30,6 +32,9 @@ pub(super) struct ClusterSeat {
     sleepers: Vec<AgentId>,
     /// Work of its own steps in the last turn, in the unit of its model.
     work: f64,
+    /// Its part in the last step, and how those were solved that it has led.
+    state: Option<ClusterState>,
+    solves: ClusterSolves,
     /// Storage, empty between turns.
     participants: Vec<Participant<'static>>,
     wishes: Vec<Wish>,
@@ -81,6 +86,8 @@ impl ClusterSeat {
             bonds: Vec::new(),
             sleepers: Vec::new(),
             work: 0.0,
+            state: None,
+            solves: ClusterSolves::default(),
             participants: Vec::new(),
             wishes: Vec::new(),
             groups: Vec::new(),
@@ -93,6 +100,7 @@ impl ClusterSeat {
         into.pairs.clone_from(&self.pairs);
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
+        into.cluster = self.state;
     }
 
     /// Notes with whom it belongs into one cluster.
@@ -155,6 +163,7 @@ impl AgentRunner {
         }
         let report = outcome.map_err(|error| error.to_string())?;
         self.note_pairs(&stepper, time, dt);
+        self.note_solves(&report, plan, dt);
         self.find_groups(time + dt);
         if let Some(seat) = &mut self.cluster {
             seat.stepper = Some(stepper);
@@ -221,6 +230,31 @@ impl AgentRunner {
         });
     }
 
+    /// Notes how the step was made and solved.
+    fn note_solves(&mut self, report: &ClusterReport, plan: Plan, dt: SimSpan) {
+        let (leader, time, step_s) = (self.shared.id, self.pace.time(), dt.as_secs_f64());
+        let note = |actor: &mut Self, solves: Option<ClusterSolves>| {
+            let parts = actor.wish().map_or(1, |wish| plan.parts_in(wish.role, wish.step_s));
+            if let Some(seat) = &mut actor.cluster {
+                seat.state = Some(ClusterState { leader, parts, step_s, solves });
+            }
+        };
+        let Some(seat) = &mut self.cluster else { return };
+        let ClusterReport { contacts, factors, passes, cut, depth_m, .. } = *report;
+        let solves = &mut seat.solves;
+        solves.contacts = contacts;
+        solves.problems += u64::from(report.fine_steps);
+        solves.factors += u64::from(factors);
+        solves.passes += u64::from(passes);
+        solves.cut += u64::from(cut);
+        (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
+        let solves = Some(*solves);
+        note(self, solves);
+        let mut company = std::mem::take(&mut self.company);
+        company.seats_at(time).for_each(|actor| note(actor, None));
+        self.company = company;
+    }
+
     /// Hands every pair what it gave each other, and every member its work.
     fn note_pairs(&mut self, stepper: &ClusterStepper, time: SimTime, dt: SimSpan) {
         let (dt_s, now) = (dt.as_secs_f64(), time + dt);
@@ -280,9 +314,9 @@ impl AgentRunner {
 
     /// What the last turn cost of its own body and of each that it leads.
     pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
-        std::iter::once(self).chain(self.company.all()).filter_map(|actor| {
-            Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work })
-        })
+        std::iter::once(self)
+            .chain(self.company.all())
+            .filter_map(|actor| Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work }))
     }
 
     /// Stops all that step with it: they rest.

@@ -129,6 +129,9 @@ impl Coupling {
 impl Couplings {
     /// The couplings before the first step: jointed bodies share a clock from the start.
     pub(super) fn of(scene: &Scene) -> Self {
+        if scene.clusters {
+            return Self::default();
+        }
         let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
         for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
             let at = couplings.number(a.min(b), a.max(b), ISLAND);
@@ -166,13 +169,17 @@ impl Couplings {
             for state in &snapshot.pairs {
                 self.note_pair(id, state, newest);
             }
+            if snapshot.cluster.is_some() {
+                continue;
+            }
             // both sides publish the bond while they share a clock: the lower number records it
             for other in snapshot.bonds.iter().filter(|other| **other > id) {
                 let coupling = self.at(id, *other, ISLAND);
                 coupling.contacts = coupling.contacts.max(1);
             }
         }
-        changed.iter().for_each(|id| self.note_island_member(*id, leader(*id)));
+        let alone = |id: &&AgentId| newest.get(id.0 as usize).is_none_or(|state| state.cluster.is_none());
+        changed.iter().filter(alone).for_each(|id| self.note_island_member(*id, leader(*id)));
         changed.iter().for_each(|id| self.is_changed[id.0 as usize] = false);
         self.changed = changed;
         self.changed.clear();

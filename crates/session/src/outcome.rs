@@ -6,7 +6,7 @@ use super::coupling_record::Coupling;
 use super::error_control::ToleranceStatus;
 use super::trace::Trace;
 use glam::DVec3;
-use metachron_core::Resolution;
+use metachron_core::{ClusterState, Resolution};
 use metachron_runtime::{AgentStats, Sample};
 use serde::Serialize;
 
@@ -114,6 +114,8 @@ pub struct Outcome {
     pub agents: Vec<AgentOutcome>,
     /// All couplings.
     pub couplings: Vec<Coupling>,
+    /// Each agent's part in the contact cluster that it was stepped in last.
+    pub clusters: Vec<Option<ClusterState>>,
     /// States of the agents over time, if requested ([`crate::Session::keep_trace`]).
     pub trace: Option<Trace>,
     /// All probes.

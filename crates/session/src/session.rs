@@ -408,6 +408,7 @@ impl Session {
                 .map(|(at, stats)| AgentOutcome { picture: drawn(at), tolerance: tolerance(at), stats })
                 .collect(),
             couplings: self.couplings.all().to_vec(),
+            clusters: handles.iter().map(|agent| agent.latest().cluster).collect(),
             trace: self.trace,
             clamp,
             unpriced: self.unpriced,

@@ -50,6 +50,8 @@ pub struct Report {
     pub agents: Vec<AgentReport>,
     /// The couplings between agents.
     pub couplings: Vec<CouplingReport>,
+    /// The contact clusters of the last states.
+    pub clusters: Vec<ClusterRow>,
     /// Agents that started inside each other or fixed solids.
     pub overlaps: Vec<OverlapReport>,
     /// Objects that start elsewhere than the scene puts them, because of that.
@@ -126,6 +128,33 @@ pub struct Quantiles {
     pub p99: f64,
 }
 
+/// A contact cluster: agents that touched or were joined at the end of the run, and were stepped as one problem.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ClusterRow {
+    /// The name of the member that led it.
+    pub id: String,
+    /// The names of all members.
+    pub members: Vec<String>,
+    /// The last macro step, milliseconds.
+    pub h_ms: f64,
+    /// Steps of each member within it.
+    pub steps: Vec<u32>,
+    /// Contacts of the last step, those that bear nothing included.
+    pub contacts: u32,
+    /// Problems that its leader has solved in the run.
+    pub problems: u64,
+    /// Factors of the coupled matrix, for each problem.
+    pub factors: f64,
+    /// Convex passes in the run: the way that is taken where Newton's method gives up.
+    pub passes: u64,
+    /// Problems whose solve came to no end.
+    pub cut: u64,
+    /// The deepest overlap of the last step, metres.
+    pub depth_m: f64,
+    /// The deepest overlap of the run, metres.
+    pub depth_max_m: f64,
+}
+
 /// The coupling of two agents.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct CouplingReport {
@@ -133,7 +162,7 @@ pub struct CouplingReport {
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// The kind of coupling: `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
+    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
     pub kind: String,
     /// Contacts, grasps, attachments or joints at the end of the run.
     pub contacts: u64,
@@ -282,6 +311,7 @@ impl Report {
             summary,
             agents: vec![AgentReport::default()],
             couplings: vec![CouplingReport::default()],
+            clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],
             moved: vec![MovedReport::default()],
             oracle: Some(oracle),
@@ -335,6 +365,15 @@ mod tests {
         "/agents/0/parked",
         "/agents/0/energy_j",
         "/agents/0/residual_m",
+        "/clusters/0/id",
+        "/clusters/0/members/0",
+        "/clusters/0/h_ms",
+        "/clusters/0/steps/0",
+        "/clusters/0/contacts",
+        "/clusters/0/factors",
+        "/clusters/0/passes",
+        "/clusters/0/cut",
+        "/clusters/0/depth_m",
         "/couplings/0/a",
         "/couplings/0/b",
         "/couplings/0/kind",

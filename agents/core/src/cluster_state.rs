@@ -1,0 +1,35 @@
+//! What a contact cluster did, as its members publish it.
+
+use crate::AgentId;
+
+/// An agent's part in the contact cluster that it was stepped in last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClusterState {
+    /// The member of lowest number: it makes the cluster's turns.
+    pub leader: AgentId,
+    /// Steps of this member within the last macro step, ≥ 1.
+    pub parts: u32,
+    /// The last macro step, seconds.
+    pub step_s: f64,
+    /// How the cluster was solved; of the leader only.
+    pub solves: Option<ClusterSolves>,
+}
+
+/// How a cluster was solved. Counts are those of all steps that its leader has led so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClusterSolves {
+    /// Contacts of the last step, those that bear nothing included.
+    pub contacts: u32,
+    /// Problems solved.
+    pub problems: u64,
+    /// Factors of the coupled matrix.
+    pub factors: u64,
+    /// Convex passes: the way that is taken where Newton's method gives up.
+    pub passes: u64,
+    /// Problems whose solve came to no end.
+    pub cut: u64,
+    /// The deepest overlap of the last step, metres, ≥ 0.
+    pub depth_m: f64,
+    /// The deepest overlap ever, metres, ≥ 0.
+    pub deepest_m: f64,
+}
