@@ -1,6 +1,6 @@
 //! What does a solve of a cluster cost? Prints medians for tubes, a solid and piles of boxes: first, cold, at rest, and for each factor.
 //!
-//! `cargo run --release -p metachron-contact --example cluster_cost`
+//! `cargo run --release -p metachron-contact --example cluster_cost [part of a name]`
 //!
 //! First: a new solver, which orders and lays out the matrix. Cold: the same solver again, no impulses of a last step. Rest: again,
 //! from the impulses found. A factor: the cold solve less the one at rest, over its factors, with all else that a Newton step takes.
@@ -27,7 +27,9 @@ struct Scene {
 
 fn main() {
     println!("scene                        blocks contacts | first ms  cold ms  rest ms | factors  ms a factor");
-    for scene in [tube(100, 120), tube(400, 700), solid(8), boxes(100), boxes(320)] {
+    let wanted = std::env::args().nth(1).unwrap_or_default();
+    let scenes = [tube(100, 120), tube(400, 700), solid(8), boxes(100), boxes(320)];
+    for scene in scenes.into_iter().filter(|scene| scene.name.contains(&wanted)) {
         measure(scene);
     }
 }

@@ -52,6 +52,7 @@ pub(super) struct Projection {
 
 impl Law {
     /// The allowed impulse for `z`.
+    #[inline]
     pub fn project(&self, form: Form, z: DVec3) -> Projection {
         match (*self, form) {
             (Self::Coulomb { friction }, Form::Disc) => disc(friction, z),
@@ -87,6 +88,7 @@ fn outer(v: DVec3) -> DMat3 {
 }
 
 /// Coulomb's law at the pressure of `z` itself.
+#[inline]
 fn disc(friction: f64, z: DVec3) -> Projection {
     if z.x <= 0.0 {
         return Projection::NONE;
@@ -104,6 +106,7 @@ fn disc(friction: f64, z: DVec3) -> Projection {
 }
 
 /// The nearest impulse of the cone.
+#[inline]
 fn cone(friction: f64, z: DVec3) -> Projection {
     let slip = tangential(z);
     if slip <= friction * z.x {
@@ -124,6 +127,7 @@ fn cone(friction: f64, z: DVec3) -> Projection {
 }
 
 /// The nearest impulse of a length up to `limit`.
+#[inline]
 fn ball(limit: f64, z: DVec3) -> Projection {
     let length = z.length();
     if length <= limit {
@@ -140,5 +144,5 @@ fn ball(limit: f64, z: DVec3) -> Projection {
 
 /// The length of what is not along the normal.
 pub(super) fn tangential(z: DVec3) -> f64 {
-    z.y.hypot(z.z)
+    (z.y * z.y + z.z * z.z).sqrt()
 }

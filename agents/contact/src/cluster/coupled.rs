@@ -23,9 +23,11 @@ pub(super) struct Coupled {
     of_fronts: Vec<usize>,
     /// The gains that are in the factor.
     gains: Vec<DMat3>,
+    /// Of each term of all rows its gain times its map.
+    pushed: Vec<DMat3>,
 }
 
-/// Two terms of one row, by their places among its terms, and where their product goes.
+/// Two terms of one row, counted over all rows, and where their product goes.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     row: usize,
@@ -58,12 +60,13 @@ impl Coupled {
         }
         self.forget();
         self.gains.resize(rows.len(), DMat3::ZERO);
+        self.pushed.resize(rows.all_terms().len(), DMat3::ZERO);
+        let terms = rows.all_terms();
         for row in 0..rows.len() {
-            let terms = rows.terms(row);
             self.starts.push(self.meetings.len());
-            self.blocks.extend(terms.iter().map(|term| term.block));
-            for left in 0..terms.len() {
-                for right in 0..=left {
+            self.blocks.extend(rows.terms(row).iter().map(|term| term.block));
+            for left in rows.range(row) {
+                for right in rows.range(row).start..=left {
                     let place = self.factor.place(Pair { row: terms[left].block, column: terms[right].block });
                     self.meetings.extend(place.map(|place| Meeting { row, left, right, place }));
                 }
@@ -115,17 +118,18 @@ impl Coupled {
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
-        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, .. } = self;
+        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, pushed, .. } = self;
+        let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
             meetings[starts[row]..starts[row + 1]].iter().for_each(|meeting| factor.spoil(meeting.place.front));
+            rows.range(row).for_each(|term| pushed[term] = *gain * terms[term].map);
             *known = *gain;
         }
         let done = factor.factor(|front, entries| {
             for &at in &by_front[of_fronts[front]..of_fronts[front + 1]] {
                 let Meeting { row, left, right, place } = meetings[at];
                 if gains[row] != DMat3::ZERO {
-                    let terms = rows.terms(row);
-                    entries.add(place, &(terms[left].map.transpose() * (gains[row] * terms[right].map)));
+                    entries.add(place, &(terms[left].map.transpose() * pushed[right]));
                 }
             }
         });

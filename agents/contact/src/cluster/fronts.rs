@@ -33,8 +33,8 @@ struct Size {
 }
 
 /// What a front costs besides multiplications, in these: by itself, and for each number that it hands on.
-const COST_FRONT: f64 = 400.0;
-const COST_NUMBER: f64 = 3.0;
+const COST_FRONT: f64 = 1000.0;
+const COST_NUMBER: f64 = 4.0;
 
 impl Size {
     fn cost(self) -> f64 {

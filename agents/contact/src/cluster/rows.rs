@@ -8,6 +8,7 @@ use super::joint::{Hold, JointRow};
 use super::problem::{Contact, Problem};
 use super::side::Side;
 use glam::{DMat3, DVec3};
+use std::ops::Range;
 
 /// The least and the most compliance of a contact, in shares of its scale (eq. 5).
 const COMPLIANCE_MIN: f64 = 1e-7;
@@ -121,6 +122,7 @@ impl Row {
     }
 
     /// P(z) of eq. 7 at an iterate; where it gives the impulse back, the law holds.
+    #[inline]
     pub fn natural_map(&self, form: Form, at: Point) -> Projection {
         let mut velocity = self.yielding_velocity(at);
         if form == Form::Cone {
@@ -213,6 +215,15 @@ impl Rows {
     /// The blocks that move a row.
     pub fn terms(&self, row: usize) -> &[Term] {
         &self.terms[self.rows[row].start..self.rows[row].end]
+    }
+
+    /// The terms of all rows, and which of them are a row's.
+    pub fn all_terms(&self) -> &[Term] {
+        &self.terms
+    }
+
+    pub fn range(&self, row: usize) -> Range<usize> {
+        self.rows[row].start..self.rows[row].end
     }
 
     /// One row of J x.

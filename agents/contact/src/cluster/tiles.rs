@@ -9,6 +9,7 @@
 pub(super) const TILE: usize = 4;
 /// Numbers of a tile, column by column.
 pub(super) const TILE_SIZE: usize = TILE * TILE;
+type Tile = [f64; TILE_SIZE];
 
 /// Where the tiles of a row of tiles start in a lower triangle of tiles, and how many numbers so many rows hold.
 pub(super) fn triangle(tiles: usize) -> usize {
@@ -26,41 +27,43 @@ pub(super) fn filled(size: usize) -> usize {
 /// # Errors
 /// The column at which the matrix is not positive definite.
 pub(super) fn eliminate(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
-    if columns == 0 {
+    let tiles = columns / TILE;
+    if tiles == 0 {
         return Ok(());
     }
-    let chunk = TILE * columns;
-    for tile in 0..columns / TILE {
-        let (done, below) = lower.split_at_mut((tile + 1) * chunk);
-        let (left, own) = done[tile * chunk..].split_at_mut(tile * TILE_SIZE);
-        let own = &mut own[..TILE_SIZE];
+    let lower = lower.as_chunks_mut::<TILE_SIZE>().0;
+    for tile in 0..tiles {
+        let (done, below) = lower.split_at_mut((tile + 1) * tiles);
+        let (left, own) = done[tile * tiles..].split_at_mut(tile);
+        let own = &mut own[0];
         subtract(own, left, left);
         invert_factor(own).map_err(|column| tile * TILE + column)?;
-        for row in below.chunks_exact_mut(chunk) {
-            let (before, here) = row.split_at_mut(tile * TILE_SIZE);
-            let here = &mut here[..TILE_SIZE];
-            subtract(here, before, left);
-            divide(here, own);
+        for row in below.chunks_exact_mut(tiles) {
+            let (before, here) = row.split_at_mut(tile);
+            subtract(&mut here[0], before, left);
+            divide(&mut here[0], own);
         }
     }
-    let below = &lower[columns * columns..];
-    for (row, a) in below.chunks_exact(chunk).enumerate() {
-        let tiles = &mut update[triangle(row)..triangle(row + 1)];
-        for (tile, b) in tiles.chunks_exact_mut(TILE_SIZE).zip(below.chunks_exact(chunk)) {
-            subtract(tile, a, b);
-        }
+    let below = &lower[tiles * tiles..];
+    let mut update = update.as_chunks_mut::<TILE_SIZE>().0;
+    for (row, a) in below.chunks_exact(tiles).enumerate() {
+        let (here, rest) = update.split_at_mut(row + 1);
+        here.iter_mut().zip(below.chunks_exact(tiles)).for_each(|(tile, b)| subtract(tile, a, b));
+        update = rest;
     }
     Ok(())
 }
 
 /// tile −= a bᵀ, of two chunks of equal length.
-#[inline]
-fn subtract(tile: &mut [f64], a: &[f64], b: &[f64]) {
+#[inline(always)]
+fn subtract(tile: &mut Tile, a: &[Tile], b: &[Tile]) {
     let mut sums = [0.0; TILE_SIZE];
-    for (a, b) in a.as_chunks::<TILE>().0.iter().zip(b.as_chunks::<TILE>().0) {
-        for (column, b) in b.iter().enumerate() {
-            for (row, a) in a.iter().enumerate() {
-                sums[TILE * column + row] += a * b;
+    for (a, b) in a.iter().zip(b) {
+        for (a, b) in a.as_chunks::<TILE>().0.iter().zip(b.as_chunks::<TILE>().0) {
+            for (column, b) in b.iter().enumerate() {
+                for (row, a) in a.iter().enumerate() {
+                    sums[TILE * column + row] += a * b;
+                }
             }
         }
     }
@@ -68,8 +71,8 @@ fn subtract(tile: &mut [f64], a: &[f64], b: &[f64]) {
 }
 
 /// tile ← tile L⁻ᵀ, of the inverse of a lower factor.
-#[inline]
-fn divide(tile: &mut [f64], inverse: &[f64]) {
+#[inline(always)]
+fn divide(tile: &mut Tile, inverse: &Tile) {
     let mut out = [0.0; TILE_SIZE];
     for column in 0..TILE {
         for other in 0..=column {
@@ -79,11 +82,11 @@ fn divide(tile: &mut [f64], inverse: &[f64]) {
             }
         }
     }
-    tile.copy_from_slice(&out);
+    *tile = out;
 }
 
 /// A symmetric tile, of which the lower half is read, becomes the inverse of its lower Cholesky factor.
-fn invert_factor(tile: &mut [f64]) -> Result<(), usize> {
+fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
     let mut l = [0.0; TILE_SIZE];
     let at = |row: usize, column: usize| TILE * column + row;
     // the diagonal holds reciprocals
@@ -98,7 +101,7 @@ fn invert_factor(tile: &mut [f64]) -> Result<(), usize> {
             l[at(row, column)] = left * l[at(column, column)];
         }
     }
-    tile.fill(0.0);
+    *tile = [0.0; TILE_SIZE];
     for column in 0..TILE {
         tile[at(column, column)] = l[at(column, column)];
         for row in column + 1..TILE {

@@ -7,7 +7,7 @@
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
 //! search    places that may close, joints, springs
-//! solve     one problem for all
+//! solve     one problem for all; again with the places that bodies struck would pass
 //! end       members move; those whose step ends take its velocities
 
 mod member;
@@ -31,6 +31,8 @@ use std::f64::consts::SQRT_2;
 
 /// The most steps that a member makes within a macro step.
 const PARTS_MAX: u32 = 16;
+/// The most solves of a fine step: what is struck reaches what it strikes one body further in each.
+const ROUNDS_MAX: u32 = 4;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
 const PART_S: f64 = 0.2;
 
@@ -159,7 +161,7 @@ impl ClusterStepper {
             self.search.find(scene, all, &self.progress, h_s);
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(all, h_s, scene.gravity_m_s2 * dt.as_secs_f64(), &mut report)?;
+            self.solve(scene, all, h_s, dt.as_secs_f64(), &mut report)?;
             self.remember(all, h_s, fine + 1 == parts, dt);
             self.end(all, h_s)?;
         }
@@ -205,8 +207,41 @@ impl ClusterStepper {
         }
     }
 
-    /// Solves the problem of a fine step, and gives every member its impulses (eq. 19).
+    /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
+    /// its impulses (eq. 19).
     fn solve(
+        &mut self,
+        scene: &ClusterScene,
+        all: &[Participant<'_>],
+        h_s: f64,
+        dt_s: f64,
+        report: &mut ClusterReport,
+    ) -> Result<(), StepError> {
+        report.contacts = self.search.contacts.len() as u32;
+        if self.search.contacts.is_empty() && self.springs.rows.is_empty() {
+            // what touches nothing moves as it would
+            self.progress.iter_mut().for_each(Progress::go_on);
+            return Ok(());
+        }
+        for round in 1..=ROUNDS_MAX {
+            self.solve_once(all, h_s, scene.gravity_m_s2 * dt_s, report)?;
+            let Self { solver, search, springs, progress, .. } = &mut *self;
+            let solution = solver.solution();
+            for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
+                contact.warm_n_s = *impulse;
+            }
+            for (row, impulse) in springs.rows.iter_mut().zip(&solution.rows_n_s) {
+                row.warm_n_s = *impulse;
+            }
+            if round == ROUNDS_MAX || !search.add_passed(scene, all, progress, solution, h_s) {
+                break;
+            }
+        }
+        self.give(report);
+        Ok(())
+    }
+
+    fn solve_once(
         &mut self,
         all: &[Participant<'_>],
         h_s: f64,
@@ -214,12 +249,6 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         let Self { solver, search, springs, progress, members, .. } = self;
-        report.contacts = search.contacts.len() as u32;
-        if search.contacts.is_empty() && springs.rows.is_empty() {
-            // what touches nothing moves as it would
-            progress.iter_mut().for_each(Progress::go_on);
-            return Ok(());
-        }
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
             blocks: one.member.blocks(),
@@ -228,9 +257,19 @@ impl ClusterStepper {
         }));
         let problem =
             Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s };
-        let outcome = solver.solve(&problem);
+        let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = emptied(list);
-        let solution = outcome.map_err(|error| refused(&error, h_s))?;
+        let took = outcome.map_err(|error| refused(&error, h_s))?;
+        report.factors += took.factors as u32;
+        report.passes += took.passes as u32;
+        report.cut += u32::from(took.cut);
+        Ok(())
+    }
+
+    /// Gives every member the impulses found.
+    fn give(&mut self, report: &mut ClusterReport) {
+        let Self { solver, search, springs, progress, .. } = self;
+        let solution = solver.solution();
         for (member, state) in progress.iter_mut().enumerate() {
             state.take(solution.velocities(member));
         }
@@ -243,11 +282,8 @@ impl ClusterStepper {
             let moving = row.sides.iter().filter(|side| !side.terms().is_empty());
             moving.for_each(|side| progress[side.member].touched = true);
         }
-        report.factors += solution.report.factors as u32;
-        report.passes += solution.report.passes as u32;
-        report.cut += u32::from(solution.report.cut);
+        report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
-        Ok(())
     }
 
     /// Notes what the next step starts from.

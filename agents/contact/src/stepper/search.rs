@@ -6,10 +6,10 @@
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::{Participant, Progress};
-use crate::cluster::{Contact, Side};
+use crate::cluster::{Contact, Side, Solution};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, touches};
-use metachron_geometry::{Aabb, CollisionShape, ContactSide, Touch};
+use metachron_geometry::{Aabb, CollisionShape, ContactSide, Place, Touch};
 
 /// A place is taken up if its gap may close below this within the step, metres.
 const LOOK_M: f64 = 4e-4;
@@ -30,6 +30,28 @@ pub(super) struct Owner {
     pub key: TouchKey,
 }
 
+impl Owner {
+    fn name(&self) -> (usize, Partner, TouchKey) {
+        (self.member, self.partner, self.key)
+    }
+}
+
+/// What a round of the search goes by.
+struct Round<'a, 'p> {
+    scene: &'a ClusterScene,
+    all: &'a [Participant<'p>],
+    progress: &'a [Progress],
+    h_s: f64,
+    judge: Judge<'a>,
+}
+
+impl Round<'_, '_> {
+    /// Whether it is the one before the solve.
+    fn foresees(&self) -> bool {
+        matches!(self.judge, Judge::Foreseen)
+    }
+}
+
 /// Reusable storage, and what was found.
 #[derive(Default)]
 pub(super) struct Search {
@@ -38,9 +60,24 @@ pub(super) struct Search {
     pub owners: Vec<Owner>,
     /// Pairs of participants that are near each other, the lower first.
     pub near: Vec<[usize; 2]>,
+    /// What was looked at in this fine step, by rising names once it is sorted.
+    looks: Vec<Look>,
+    /// How many contacts were found before the solve.
+    known: usize,
+    /// Pairs near each other by the velocities of a solution.
+    again: Vec<[usize; 2]>,
     boxes: Vec<Reach>,
     touches: Vec<Touch>,
     scratch: NarrowPhaseScratch,
+}
+
+/// A member and its partner that were looked at.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    member: usize,
+    partner: Partner,
+    /// No place of the two that was left out is nearer than this, metres.
+    clear_m: f64,
 }
 
 /// Where a member may be in a step.
@@ -53,116 +90,190 @@ struct Reach {
     speed_m_s: f64,
 }
 
+/// By which velocities a place is judged.
+#[derive(Clone, Copy)]
+enum Judge<'a> {
+    /// Those at the start and without contact, each side's alone too.
+    Foreseen,
+    /// Those of a solution.
+    Solved(&'a Solution),
+}
+
 impl Search {
     /// Finds all places of a fine step of `h_s` seconds.
     pub fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
         self.contacts.clear();
         self.owners.clear();
         self.near.clear();
-        self.boxes.clear();
-        for (member, (one, state)) in all.iter().zip(progress).enumerate() {
-            if let Some(skin) = one.member.skin() {
-                let speed_m_s = one.member.speed_bound(&state.before).max(one.member.speed_bound(&state.seen));
-                self.boxes.push(Reach { member, skin: skin.bounds(), speed_m_s });
-            }
-        }
-        self.boxes.sort_unstable_by(|a, b| a.skin.low.x.total_cmp(&b.skin.low.x).then(a.member.cmp(&b.member)));
-        self.find_pairs(h_s);
+        self.looks.clear();
+        let speed = |member: usize| {
+            let (body, state) = (&all[member].member, &progress[member]);
+            body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
+        };
+        self.place_boxes(all, speed);
+        find_pairs(&self.boxes, NEAR_STEPS * h_s, &mut self.near);
+        let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
         let near = std::mem::take(&mut self.near);
-        for &[a, b] in &near {
-            self.find_between(all, progress, [a, b], h_s);
+        for &pair in &near {
+            self.find_between(&round, pair);
         }
         self.near = near;
         for member in 0..all.len() {
-            self.find_static(scene, all, progress, member, h_s);
+            self.find_static(&round, member);
         }
         self.sort();
     }
 
-    /// Pairs whose boxes may meet, by a sweep along x.
-    fn find_pairs(&mut self, h_s: f64) {
-        let grown = |reach: &Reach| reach.skin.grown(NEAR_STEPS * reach.speed_m_s * h_s + 0.5 * NEAR_M);
-        let widest = self.boxes.iter().map(|reach| NEAR_STEPS * reach.speed_m_s * h_s).fold(0.0, f64::max) + NEAR_M;
-        for (at, reach) in self.boxes.iter().enumerate() {
-            let mine = grown(reach);
-            for other in &self.boxes[at + 1..] {
-                if other.skin.low.x - widest > mine.high.x {
-                    break;
-                }
-                let theirs = grown(other);
-                if mine.meets(theirs) {
-                    self.near.push([reach.member.min(other.member), reach.member.max(other.member)]);
-                }
+    /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
+    /// whether there are any; contacts are then in a new order.
+    pub fn add_passed(
+        &mut self,
+        scene: &ClusterScene,
+        all: &[Participant<'_>],
+        progress: &[Progress],
+        solved: &Solution,
+        h_s: f64,
+    ) -> bool {
+        self.place_boxes(all, |member| all[member].member.speed_bound(solved.velocities(member)));
+        let mut pairs = std::mem::take(&mut self.again);
+        pairs.clear();
+        find_pairs(&self.boxes, h_s, &mut pairs);
+        let round = Round { scene, all, progress, h_s, judge: Judge::Solved(solved) };
+        self.known = self.contacts.len();
+        for &pair in &pairs {
+            self.find_between(&round, pair);
+        }
+        self.again = pairs;
+        for member in 0..all.len() {
+            self.find_static(&round, member);
+        }
+        let more = self.contacts.len() > self.known;
+        self.sort();
+        more
+    }
+
+    /// The boxes around all members that have a skin, along x.
+    fn place_boxes(&mut self, all: &[Participant<'_>], speed_m_s: impl Fn(usize) -> f64) {
+        self.boxes.clear();
+        for (member, one) in all.iter().enumerate() {
+            if let Some(skin) = one.member.skin() {
+                self.boxes.push(Reach { member, skin: skin.bounds(), speed_m_s: speed_m_s(member) });
             }
         }
-        self.near.sort_unstable();
+        self.boxes.sort_unstable_by(|a, b| a.skin.low.x.total_cmp(&b.skin.low.x).then(a.member.cmp(&b.member)));
     }
 
     fn speed(&self, member: usize) -> f64 {
         self.boxes.iter().find(|reach| reach.member == member).map_or(0.0, |reach| reach.speed_m_s)
     }
 
+    /// Whether a solution may have closed a place of the two that was left out: they come closer by at most `way_m`.
+    fn may_have_passed(&self, member: usize, partner: Partner, way_m: f64) -> bool {
+        let found = self.looks.binary_search_by_key(&(member, partner), |look| (look.member, look.partner));
+        found.map_or(true, |at| way_m > self.looks[at].clear_m)
+    }
+
     /// Places between two members.
-    fn find_between(&mut self, all: &[Participant<'_>], progress: &[Progress], [a, b]: [usize; 2], h_s: f64) {
+    fn find_between(&mut self, round: &Round<'_, '_>, [a, b]: [usize; 2]) {
+        let Round { all, h_s, .. } = *round;
         let (Some(here), Some(there)) = (all[a].member.skin(), all[b].member.skin()) else { return };
         if !all[a].may_touch(all[b].id) {
             return;
         }
-        let reach_m = LOOK_M + (self.speed(a) + self.speed(b)) * h_s;
-        touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
-        let skins = [here.form, there.form];
         let partner = Partner::Agent(all[b].id);
-        for touch in &self.touches {
-            let side = |member: usize, place, contact| all[member].member.side(place, contact).of_member(member);
-            let sides = [
-                side(a, &touch.on_a, ContactSide::first(touch.normal)),
-                side(b, &touch.on_b, ContactSide::second(touch.normal)),
-            ];
-            if closes(touch, &sides, progress, h_s) {
-                self.owners.push(Owner { member: a, partner, other: Some(b), key: touch.key });
-                self.contacts.push(contact(touch, sides, skins, progress));
-            }
+        let way_m = (self.speed(a) + self.speed(b)) * h_s;
+        if !round.foresees() && !self.may_have_passed(a, partner, way_m) {
+            return;
         }
+        let reach_m = LOOK_M + way_m;
+        touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
+        let side = |member: usize, place: &Place, contact: ContactSide| {
+            all[member].member.side(place, contact).of_member(member)
+        };
+        let sides = |touch: &Touch| {
+            let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
+            [side(a, &touch.on_a, first), side(b, &touch.on_b, second)]
+        };
+        self.take(
+            round,
+            Owner { member: a, partner, other: Some(b), key: TouchKey::default() },
+            [here.form, there.form],
+            reach_m,
+            sides,
+        );
     }
 
     /// Places between a member and the static solids.
-    fn find_static(
-        &mut self,
-        scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
-        member: usize,
-        h_s: f64,
-    ) {
+    fn find_static(&mut self, round: &Round<'_, '_>, member: usize) {
+        let Round { scene, all, h_s, .. } = *round;
         let Some(skin) = all[member].member.skin() else { return };
-        let reach_m = LOOK_M + self.speed(member) * h_s;
+        let way_m = self.speed(member) * h_s;
+        let reach_m = LOOK_M + way_m;
         let bounds = skin.bounds().grown(reach_m);
         for (number, solid) in (0..).zip(scene.statics()) {
-            if !solid.bounds().meets(bounds) {
+            let partner = Partner::Static(number);
+            let looks = round.foresees() || self.may_have_passed(member, partner, way_m);
+            if !looks || !solid.bounds().meets(bounds) {
                 continue;
             }
             solid.touches(&skin, reach_m, &mut self.scratch, &mut self.touches);
-            let skins = [skin.form, &solid.form];
-            for touch in &self.touches {
-                let place = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
-                let sides = [place.of_member(member), Side::FIXED];
-                if closes(touch, &sides, progress, h_s) {
-                    let partner = Partner::Static(number);
-                    self.owners.push(Owner { member, partner, other: None, key: touch.key });
-                    self.contacts.push(contact(touch, sides, skins, progress));
-                }
+            let sides = |touch: &Touch| {
+                let side = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
+                [side.of_member(member), Side::FIXED]
+            };
+            self.take(
+                round,
+                Owner { member, partner, other: None, key: TouchKey::default() },
+                [skin.form, &solid.form],
+                reach_m,
+                sides,
+            );
+        }
+    }
+
+    /// Takes up those of the touches found that may close.
+    fn take(
+        &mut self,
+        round: &Round<'_, '_>,
+        owner: Owner,
+        skins: [&CollisionShape; 2],
+        reach_m: f64,
+        sides: impl Fn(&Touch) -> [Side; 2],
+    ) {
+        let Self { contacts, owners, touches, looks, known, .. } = self;
+        let mut clear_m = reach_m;
+        for touch in touches.iter() {
+            let (owner, sides) = (Owner { key: touch.key, ..owner }, sides(touch));
+            if sides.iter().all(|side| side.terms().is_empty()) {
+                continue;
             }
+            let taken = match round.judge {
+                Judge::Foreseen => closes(touch, &sides, round.progress, round.h_s),
+                Judge::Solved(solved) => {
+                    let known = owners[..*known].binary_search_by_key(&owner.name(), Owner::name).is_ok();
+                    !known && touch.gap_m + opening_m_s(touch, &sides, solved) * round.h_s < 0.0
+                }
+            };
+            if taken {
+                owners.push(owner);
+                contacts.push(contact(touch, sides, skins, round.progress));
+            } else {
+                clear_m = clear_m.min(touch.gap_m);
+            }
+        }
+        if round.foresees() {
+            looks.push(Look { member: owner.member, partner: owner.partner, clear_m });
         }
     }
 
     /// Contacts in the order of their names: sums are then the same whatever found them first.
     fn sort(&mut self) {
-        let order = |owner: &Owner| (owner.member, owner.partner, owner.key);
-        if self.owners.is_sorted_by_key(order) {
+        self.looks.sort_unstable_by_key(|look| (look.member, look.partner));
+        if self.owners.is_sorted_by_key(Owner::name) {
             return;
         }
         let mut both: Vec<_> = self.owners.drain(..).zip(self.contacts.drain(..)).collect();
-        both.sort_by_key(|(owner, _)| order(owner));
+        both.sort_by_key(|(owner, _)| owner.name());
         for (owner, contact) in both {
             self.owners.push(owner);
             self.contacts.push(contact);
@@ -170,12 +281,28 @@ impl Search {
     }
 }
 
+/// Pairs whose boxes may meet within `after_s` seconds, by a sweep along x; the boxes are sorted by that.
+fn find_pairs(boxes: &[Reach], after_s: f64, near: &mut Vec<[usize; 2]>) {
+    let grown = |reach: &Reach| reach.skin.grown(reach.speed_m_s * after_s + 0.5 * NEAR_M);
+    let widest = boxes.iter().map(|reach| reach.speed_m_s * after_s).fold(0.0, f64::max) + NEAR_M;
+    for (at, reach) in boxes.iter().enumerate() {
+        let mine = grown(reach);
+        for other in &boxes[at + 1..] {
+            if other.skin.low.x - widest > mine.high.x {
+                break;
+            }
+            let theirs = grown(other);
+            if mine.meets(theirs) {
+                near.push([reach.member.min(other.member), reach.member.max(other.member)]);
+            }
+        }
+    }
+    near.sort_unstable();
+}
+
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
 /// lies on something that the ground stops would else not be seen.
 fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> bool {
-    if sides.iter().all(|side| side.terms().is_empty()) {
-        return false;
-    }
     let along = |side: &Side, of: fn(&Progress) -> &[DVec3]| -> f64 {
         if side.terms().is_empty() { 0.0 } else { side.velocity(of(&progress[side.member])).dot(touch.normal) }
     };
@@ -183,6 +310,14 @@ fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> 
         let (a, b) = (along(&sides[0], of), along(&sides[1], of));
         [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
     })
+}
+
+/// How fast a gap opens with the velocities of a solution, m/s.
+fn opening_m_s(touch: &Touch, sides: &[Side; 2], solved: &Solution) -> f64 {
+    let [a, b] = sides.each_ref().map(|side| {
+        if side.terms().is_empty() { 0.0 } else { side.velocity(solved.velocities(side.member)).dot(touch.normal) }
+    });
+    a - b
 }
 
 fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
