@@ -162,6 +162,7 @@ impl AgentRunner {
             (seat.participants, seat.wishes) = (list, wishes);
         }
         let report = outcome.map_err(|error| error.to_string())?;
+        let dt = report.dt;
         self.note_pairs(&stepper, time, dt);
         self.note_solves(&report, plan, dt);
         self.find_groups(time + dt);

@@ -28,7 +28,7 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
     let clusters = if scene.clusters {
-        let built = ClusterScene::new(&scene.obstacles, scene.gravity);
+        let built = ClusterScene::new(&scene.obstacles);
         let failed =
             |error: StaticSolidError| WorldError::Build { name: "world".to_owned(), reason: error.to_string() };
         Some(Arc::new(built.map_err(failed)?))

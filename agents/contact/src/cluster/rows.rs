@@ -85,17 +85,21 @@ impl Row {
         }
     }
 
-    /// Of a contact, with its rebound where it has one (eq. 3b).
+    /// Of a contact, as if it did not rebound.
     fn of_contact(contact: &Contact, problem: &Problem<'_>) -> Self {
         let frame = contact.frame();
-        let mut bias = contact.bias_m_s(problem.h_s);
-        let calm = contact.rebound_m_s(problem).map(|parting| {
-            let calm = bias.x;
-            bias.x = calm.min(-parting);
-            calm
-        });
         let surface = frame.transpose() * contact.surface_m_s;
-        Self { calm, surface, ..Self::new(Law::Coulomb { friction: contact.friction }, frame, bias) }
+        let law = Law::Coulomb { friction: contact.friction };
+        Self { surface, ..Self::new(law, frame, contact.bias_m_s(problem.h_s)) }
+    }
+
+    /// Lets a contact that closed at `approach_m_s` rebound where its sides would move at `free_m_s` along the normal without it
+    /// (eq. 3b).
+    fn rebound(&mut self, parting_m_s: f64, approach_m_s: f64, free_m_s: f64) {
+        self.calm = Some(self.bias.x);
+        // the blow is at the start of the step: what else changes the velocity within it does so after the blow
+        let gained_m_s = free_m_s + approach_m_s;
+        self.bias.x = self.bias.x.min(-parting_m_s - gained_m_s);
     }
 
     fn of_joint(joint: &JointRow) -> Self {
@@ -178,7 +182,13 @@ impl Rows {
             self.push(Row::of_joint(joint), &joint.sides, offsets);
         }
         for k in 0..self.rows.len() {
-            self.rows[k].free = self.rows[k].bias - self.rows[k].surface + self.velocity(k, free);
+            let moving = self.velocity(k, free) - self.rows[k].surface;
+            let contact = problem.contacts.get(k);
+            let rebound = contact.and_then(|contact| Some((contact.approach_m_s, contact.rebound_m_s(problem)?)));
+            if let Some((approach_m_s, parting_m_s)) = rebound {
+                self.rows[k].rebound(parting_m_s, approach_m_s, moving.x);
+            }
+            self.rows[k].free = self.rows[k].bias + moving;
         }
     }
 

@@ -10,6 +10,7 @@
 //! solve     one problem for all; again with the places that bodies struck would pass
 //! end       members move; those whose step ends take its velocities
 
+mod blows;
 mod member;
 mod memory;
 mod scene;
@@ -17,8 +18,9 @@ mod search;
 mod springs;
 
 use crate::StepContext;
-use crate::cluster::{Member, Problem, ProblemError, Settings, Solver};
+use crate::cluster::{Contact, Member, Problem, ProblemError, Settings, Solver};
 use crate::law::Law;
+use blows::Rebounds;
 use glam::DVec3;
 pub use member::{ClusterMember, MaterialPoint, Role};
 use memory::Remembered;
@@ -31,6 +33,8 @@ use std::f64::consts::SQRT_2;
 
 /// The most steps that a member makes within a macro step.
 const PARTS_MAX: u32 = 16;
+/// No macro step is cut shorter than this: clocks count nanoseconds.
+const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each.
 const ROUNDS_MAX: u32 = 4;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
@@ -64,6 +68,8 @@ impl Participant<'_> {
 /// What a macro step was.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ClusterReport {
+    /// Its length: shorter than asked for where something rebounds within it.
+    pub dt: SimSpan,
     /// Fine steps that it was made in.
     pub fine_steps: u32,
     /// Contacts of the last fine step, those that bear nothing included.
@@ -113,7 +119,7 @@ pub(crate) struct Progress {
     known: Vec<DVec3>,
     /// û: the velocity at which its place moves in this fine step, without the impulses sought.
     seen: Vec<DVec3>,
-    /// Whether anything has acted on it since its step began.
+    /// Whether anything has acted on it for a while since its step began.
     touched: bool,
     /// Work of its steps within the macro step, in the unit of its model.
     work: f64,
@@ -148,20 +154,33 @@ impl ClusterStepper {
         dt: SimSpan,
     ) -> Result<ClusterReport, StepError> {
         let parts = all.iter().map(|one| one.parts).max().unwrap_or(1);
-        let h_s = dt.as_secs_f64() / f64::from(parts);
+        let mut dt = dt;
+        let mut h_s = dt.as_secs_f64() / f64::from(parts);
         self.progress.resize_with(all.len(), Progress::default);
-        for (one, state) in all.iter_mut().zip(&mut self.progress) {
-            (state.share, state.part, state.work) = (parts / one.parts, 0, 0.0);
-            one.grips.clear();
-        }
         self.totals.clear();
         let mut report = ClusterReport { fine_steps: parts, ..ClusterReport::default() };
-        for fine in 0..parts {
+        self.start(all, parts);
+        self.begin(all, h_s, &mut report)?;
+        self.search.find(scene, all, &self.progress, h_s);
+        let mut rebounds = Rebounds { macro_s: dt.as_secs_f64(), step_s: h_s, is_even: parts == 1 };
+        if let Some(blow) = rebounds.first(&self.search, &self.progress).filter(|_| parts == 1) {
+            dt = SimSpan::from_secs_f64(blow).unwrap_or(dt).clamp(SHORTEST.min(dt), dt);
+            h_s = dt.as_secs_f64();
+            rebounds.step_s = h_s;
+            self.start(all, parts);
             self.begin(all, h_s, &mut report)?;
             self.search.find(scene, all, &self.progress, h_s);
+        }
+        report.dt = dt;
+        for fine in 0..parts {
+            if fine > 0 {
+                self.begin(all, h_s, &mut report)?;
+                self.search.find(scene, all, &self.progress, h_s);
+            }
+            rebounds.choose(&mut self.search, &self.progress);
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(scene, all, h_s, dt.as_secs_f64(), &mut report)?;
+            self.solve(scene, all, h_s, &rebounds, &mut report)?;
             self.remember(all, h_s, fine + 1 == parts, dt);
             self.end(all, h_s)?;
         }
@@ -182,6 +201,14 @@ impl ClusterStepper {
     /// Pairs of participants of the last step that are near each other, by their places in its list.
     pub fn near(&self) -> &[[usize; 2]] {
         &self.search.near
+    }
+
+    /// Starts a macro step of so many fine ones.
+    fn start(&mut self, all: &mut [Participant<'_>], parts: u32) {
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            (state.share, state.part, state.work) = (parts / one.parts, 0, 0.0);
+            one.grips.clear();
+        }
     }
 
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 18).
@@ -214,7 +241,7 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &[Participant<'_>],
         h_s: f64,
-        dt_s: f64,
+        rebounds: &Rebounds,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         report.contacts = self.search.contacts.len() as u32;
@@ -224,7 +251,7 @@ impl ClusterStepper {
             return Ok(());
         }
         for round in 1..=ROUNDS_MAX {
-            self.solve_once(all, h_s, scene.gravity_m_s2 * dt_s, report)?;
+            self.solve_once(all, h_s, report)?;
             let Self { solver, search, springs, progress, .. } = &mut *self;
             let solution = solver.solution();
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -236,18 +263,13 @@ impl ClusterStepper {
             if round == ROUNDS_MAX || !search.add_passed(scene, all, progress, solution, h_s) {
                 break;
             }
+            rebounds.choose(search, progress);
         }
         self.give(report);
         Ok(())
     }
 
-    fn solve_once(
-        &mut self,
-        all: &[Participant<'_>],
-        h_s: f64,
-        rebound_from_m_s: f64,
-        report: &mut ClusterReport,
-    ) -> Result<(), StepError> {
+    fn solve_once(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
         let Self { solver, search, springs, progress, members, .. } = self;
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
@@ -256,7 +278,7 @@ impl ClusterStepper {
             share: f64::from(state.part),
         }));
         let problem =
-            Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s };
+            Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s: 0.0 };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = emptied(list);
         let took = outcome.map_err(|error| refused(&error, h_s))?;
@@ -273,10 +295,14 @@ impl ClusterStepper {
         for (member, state) in progress.iter_mut().enumerate() {
             state.take(solution.velocities(member));
         }
-        let pushed = |impulse: &DVec3| *impulse != DVec3::ZERO;
-        for (owner, _) in search.owners.iter().zip(&solution.contacts_n_s).filter(|(_, impulse)| pushed(impulse)) {
-            progress[owner.member].touched = true;
-            owner.other.into_iter().for_each(|other| progress[other].touched = true);
+        // a blow is over when the step begins: the flight after it is free
+        let lasting = |(contact, impulse): (&Contact, &DVec3)| *impulse != DVec3::ZERO && contact.restitution == 0.0;
+        for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
+            if lasting(both) {
+                let owner = &search.owners[k];
+                progress[owner.member].touched = true;
+                owner.other.into_iter().for_each(|other| progress[other].touched = true);
+            }
         }
         for row in &springs.rows {
             let moving = row.sides.iter().filter(|side| !side.terms().is_empty());

@@ -266,6 +266,14 @@ impl Search {
         }
     }
 
+    /// Keeps those contacts for which `keep` is true.
+    pub fn retain(&mut self, mut keep: impl FnMut(&Contact) -> bool) {
+        let Self { contacts, owners, .. } = self;
+        let mut kept = contacts.iter().map(&mut keep);
+        owners.retain(|_| kept.next().unwrap_or(true));
+        contacts.retain(|contact| keep(contact));
+    }
+
     /// Contacts in the order of their names: sums are then the same whatever found them first.
     fn sort(&mut self) {
         self.looks.sort_unstable_by_key(|look| (look.member, look.partner));

@@ -99,13 +99,14 @@ impl ClusterMember for RigidBody {
 
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
         let before = self.motion;
+        let [moved, turned] = [v[0] - self.unknowns.free[0], v[1] - self.unknowns.free[1]];
+        self.motion.angular += self.motion.inertia_times(&self.spread, turned);
         if touched {
-            let turned = self.motion.inertia_times(&self.spread, v[1] - self.unknowns.free[1]);
-            self.motion.angular += turned;
             self.motion.velocity = v[0];
             self.motion.position += v[0] * h_s;
             self.motion.turn(&self.spread, h_s);
         } else {
+            self.motion.velocity += moved;
             self.motion.fly(&self.spread, self.gravity, h_s);
         }
         if !self.motion.is_sane(&self.spread) {

@@ -71,7 +71,7 @@ impl Table {
     }
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
-        let scene = ClusterScene::new(obstacles, GRAVITY).unwrap();
+        let scene = ClusterScene::new(obstacles).unwrap();
         Self { bodies, time: SimTime::ZERO, scene, stepper: ClusterStepper::new(20e-6), snapshot: Snapshot::default() }
     }
 
@@ -100,8 +100,8 @@ impl Table {
             all.push(Participant { id: AgentId(id), member, context, laws: &[], memory, parts, grips });
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
-        self.time = self.time + dt;
-        (report, dt.as_secs_f64())
+        self.time = self.time + report.dt;
+        (report, report.dt.as_secs_f64())
     }
 
     pub fn energy_j(&mut self) -> f64 {

@@ -1,0 +1,125 @@
+//! Balls that bounce, against the closed form: heights e²ⁿ h, speeds after a blow by momentum and restitution.
+
+use crate::bodies::rigid;
+use crate::table::{GRAVITY, Table, placed};
+use glam::{DQuat, DVec3};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::{RigidBody, RigidSpec};
+
+const RADIUS_M: f64 = 0.05;
+const HEIGHT_M: f64 = 1.0;
+
+fn floor(restitution: f64) -> Obstacle {
+    Obstacle {
+        name: "floor".into(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.5,
+        restitution,
+    }
+}
+
+/// Heights of the first tops of a ball after its bounces, metres above the floor.
+fn tops(table: &mut Table, body: usize, count: usize) -> Vec<f64> {
+    let mut tops = vec![];
+    let mut rising = false;
+    for _ in 0..40_000 {
+        let (_, before) = table.middle(body);
+        table.step();
+        let (place, after) = table.middle(body);
+        if rising && after.z <= 0.0 && before.z > 0.0 {
+            // the top lies within the step: from the state at its end
+            tops.push(place.z - RADIUS_M + after.z * after.z / (2.0 * -GRAVITY.z));
+        }
+        rising = after.z > 0.0;
+        if tops.len() == count {
+            break;
+        }
+    }
+    tops
+}
+
+fn ball(x: f64, restitution: f64) -> RigidSpec {
+    let solid = Solid::Ball { radius_m: RADIUS_M };
+    RigidSpec { restitution, ..rigid(solid, DVec3::new(x, 0.0, HEIGHT_M + RADIUS_M), 0.5) }
+}
+
+#[test]
+fn a_ball_rises_to_its_share_of_the_height_at_any_rate() {
+    for restitution in [0.5, 0.8, 1.0] {
+        for rate_hz in [60.0, 137.0, 240.0, 1000.0] {
+            let ball = placed(RigidBody::new(ball(0.0, restitution)).unwrap(), false);
+            let mut table = Table::among(vec![ball], &[floor(restitution)]).at_rates(rate_hz, rate_hz);
+            for (bounce, top_m) in (1..).zip(tops(&mut table, 0, 5)) {
+                let exact_m = restitution.powi(2 * bounce) * HEIGHT_M;
+                let off = top_m / exact_m - 1.0;
+                // never above: contacts give way by some micrometres
+                assert!(
+                    (-1e-2..1e-9).contains(&off),
+                    "e {restitution}, {rate_hz} Hz, bounce {bounce}: {top_m} of {exact_m}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn balls_of_one_cluster_bounce_each_as_if_alone() {
+    let near = |at: f64| ball(at * 5.0 * RADIUS_M, 0.8);
+    for body in 0..3 {
+        let balls = (0..3).map(|at| {
+            let spec = near(f64::from(at));
+            let position = spec.position - DVec3::Z * (0.1 * f64::from(at));
+            placed(RigidBody::new(RigidSpec { position, ..spec }).unwrap(), false)
+        });
+        let mut table = Table::among(balls.collect(), &[floor(0.8)]);
+        let height_m = HEIGHT_M - 0.1 * body as f64;
+        for (bounce, top_m) in (1..).zip(tops(&mut table, body, 5)) {
+            let exact_m = 0.8_f64.powi(2 * bounce) * height_m;
+            let off = top_m / exact_m - 1.0;
+            assert!((-1e-2..1e-9).contains(&off), "ball {body}, bounce {bounce}: {top_m} of {exact_m}");
+        }
+    }
+}
+
+#[test]
+fn a_ball_without_restitution_stays_where_it_lands() {
+    for rate_hz in [60.0, 240.0] {
+        let ball = placed(RigidBody::new(ball(0.0, 0.0)).unwrap(), false);
+        let mut table = Table::new(vec![ball]).at_rates(rate_hz, rate_hz);
+        let found = table.play(1.5);
+        assert!(found.rest_m < 25e-6 && found.landing_m < 25e-6, "{found:?}");
+        let depth_m = RADIUS_M - table.middle(0).0.z;
+        assert!((0.0..21e-6).contains(&depth_m), "{depth_m}");
+    }
+}
+
+#[test]
+fn two_bodies_part_by_momentum_and_restitution() {
+    for restitution in [0.0, 0.3, 1.0] {
+        for mass_kg in [1.0, 10.0, 1000.0] {
+            for rate_hz in [10.0, 60.0, 1000.0] {
+                let of = |x: f64, speed: f64, mass_kg: f64| RigidSpec {
+                    restitution,
+                    mass_kg,
+                    gravity: DVec3::ZERO,
+                    velocity: DVec3::X * speed,
+                    ..ball(x, restitution)
+                };
+                let (first, second) = (of(0.0, 1.0, 1.0), of(0.3, -0.5, mass_kg));
+                let bodies = [first, second].map(|spec| placed(RigidBody::new(spec).unwrap(), false));
+                let mut table = Table::among(bodies.into(), &[]).at_rates(rate_hz, 60.0);
+                while table.time.as_secs_f64() < 0.4 {
+                    table.step();
+                }
+                let (v, w) = (table.middle(0).1.x, table.middle(1).1.x);
+                let common = (1.0 - 0.5 * mass_kg) / (1.0 + mass_kg);
+                let parting = 1.5 * restitution;
+                let exact = [common - parting * mass_kg / (1.0 + mass_kg), common + parting / (1.0 + mass_kg)];
+                let off = (v - exact[0]).abs().max((w - exact[1]).abs());
+                assert!(off < 5e-3, "e {restitution}, 1 : {mass_kg}, {rate_hz} Hz: {v} {w} of {exact:?}");
+            }
+        }
+    }
+}
