@@ -63,8 +63,11 @@ fn measure(mut scene: Scene) {
 }
 
 fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_contact::cluster::Solution) -> T) -> T {
-    let members: Vec<_> =
-        scene.bodies.iter().map(|body| Member { blocks: &body.blocks, free: &body.free, share: 1.0 }).collect();
+    let members: Vec<_> = scene
+        .bodies
+        .iter()
+        .map(|body| Member { blocks: &body.blocks, free: &body.free, share: 1.0, response: None })
+        .collect();
     let (members, contacts) = (&members, &scene.contacts);
     let problem = Problem { h_s: H_S, members, contacts, rows: &[], rebound_from_m_s: 9.81 * H_S };
     of(solver.solve(&problem).expect("a problem"))

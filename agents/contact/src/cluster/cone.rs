@@ -144,5 +144,7 @@ fn ball(limit: f64, z: DVec3) -> Projection {
 
 /// The length of what is not along the normal.
 pub(super) fn tangential(z: DVec3) -> f64 {
-    (z.y * z.y + z.z * z.z).sqrt()
+    let square = z.y * z.y + z.z * z.z;
+    // `hypot` takes four times as long, and is needed where squares overflow alone
+    if square.is_finite() { square.sqrt() } else { z.y.hypot(z.z) }
 }

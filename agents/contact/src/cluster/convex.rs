@@ -6,6 +6,7 @@
 use super::cone::Form;
 use super::iterate::{Iterate, Kept, Quadratic};
 use super::newton::{Aim, harden, largest_miss};
+use super::problem::Member;
 use glam::DVec3;
 
 /// Most steps of the first pass from the last step's impulses: it knows the answer or it does not.
@@ -50,18 +51,19 @@ pub(super) struct Stores {
 
 /// One convex problem: its limits.
 #[derive(Debug, Clone, Copy)]
-struct Pass {
+struct Pass<'a> {
+    members: &'a [Member<'a>],
     steps: usize,
     tolerance_m_s: f64,
 }
 
 /// Solves by up to `passes_max` passes. The iterate holds the impulses of the last finished one, or of a softer problem.
-pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim, passes_max: usize) -> Passes {
+pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, passes_max: usize) -> Passes {
     stores.shifts.clear();
     stores.shifts.resize(iterate.rows.len(), 0.0);
-    let tolerance_m_s = PASS_TOLERANCE * aim.tolerance_m_s;
-    let first = Pass { steps: WARM_STEPS, tolerance_m_s };
-    if !descend(iterate, &stores.shifts, first) && !restart(iterate, stores, tolerance_m_s) {
+    let first = Pass { members: aim.members, steps: WARM_STEPS, tolerance_m_s: PASS_TOLERANCE * aim.tolerance_m_s };
+    let later = Pass { steps: FULL_STEPS, ..first };
+    if !descend(iterate, &stores.shifts, first) && !restart(iterate, stores, later) {
         return Passes { finished: 0, settled: false };
     }
     for finished in 1..passes_max {
@@ -73,8 +75,8 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim, passe
         for (k, row) in iterate.rows.rows.iter().enumerate() {
             stores.shifts[k] = row.shift(iterate.state.point(k));
         }
-        if !descend(iterate, &stores.shifts, Pass { steps: FULL_STEPS, tolerance_m_s }) {
-            iterate.restore(&stores.pass);
+        if !descend(iterate, &stores.shifts, later) {
+            iterate.restore(aim.members, &stores.pass);
             return Passes { finished, settled: false };
         }
     }
@@ -83,36 +85,36 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim, passe
 
 /// The first pass again from rest: soft first, then at the wanted compliance. Where that is not reached the soft answer stands,
 /// and where not even that is found there are no impulses.
-fn restart(iterate: &mut Iterate, stores: &mut Stores, tolerance_m_s: f64) -> bool {
+fn restart(iterate: &mut Iterate, stores: &mut Stores, full: Pass<'_>) -> bool {
     let Stores { shifts, rest, soft: answer, .. } = stores;
     iterate.state.lambda.fill(DVec3::ZERO);
     iterate.keep(rest);
     let soft = [(SOFT_SHARE, SOFT_STEPS), (SOFTEST_SHARE, FULL_STEPS)].iter().any(|&(share, steps)| {
-        iterate.restore(rest);
+        iterate.restore(full.members, rest);
         iterate.rows.rows.iter_mut().for_each(|row| row.compliance = row.softened(share));
-        descend(iterate, shifts, Pass { steps, tolerance_m_s })
+        descend(iterate, shifts, Pass { steps, ..full })
     });
     if !soft {
-        iterate.restore(rest);
+        iterate.restore(full.members, rest);
         return false;
     }
     iterate.keep(answer);
     // the soft impulses' velocities are where the harder problem starts
     iterate.restore_compliances(rest);
-    let found = descend(iterate, shifts, Pass { steps: FULL_STEPS, tolerance_m_s });
+    let found = descend(iterate, shifts, full);
     if !found {
-        iterate.restore(answer);
+        iterate.restore(full.members, answer);
     }
     found
 }
 
 /// Minimises eq. 10; on success impulses and velocities are those of its minimum, else neither is of use.
-fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass) -> bool {
+fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass<'_>) -> bool {
     for step in 0..=pass.steps {
         evaluate(iterate, shifts);
-        let mut led = iterate.look_ahead(false);
+        let mut led = iterate.look_ahead(pass.members, false);
         if led.off.max_element() < pass.tolerance_m_s {
-            led = iterate.look_ahead(true);
+            led = iterate.look_ahead(pass.members, true);
         }
         if led.answered && led.off.max_element() < pass.tolerance_m_s {
             iterate.take_pulls();

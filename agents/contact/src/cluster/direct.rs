@@ -6,13 +6,19 @@
 use super::coupled::Coupled;
 use super::factor::{Cholesky, Pair};
 use super::members::Members;
+use super::problem::Block;
 use super::rows::Rows;
 use glam::{DMat3, DVec3};
 
 /// Both matrices, each with its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Direct {
+    /// Of the members that lend no factor.
     own: Cholesky,
+    /// The blocks of these, as `own` counts them: what each is called over all members.
+    lone: Vec<usize>,
+    blocks: Vec<Block>,
+    x: Vec<DVec3>,
     coupled: Coupled,
     pairs: Vec<Pair>,
     /// Factors of the coupled matrix since the members were taken up.
@@ -26,22 +32,32 @@ impl Direct {
     /// The block at which one is not positive definite.
     pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
         self.factors = 0;
-        self.list(members);
-        self.own.shape(members.size(), &self.pairs);
-        self.own.set(&members.blocks);
-        self.own.factor(|_, _| ())
+        let Self { own, lone, blocks, pairs, x, .. } = self;
+        lone.clear();
+        lone.extend((0..members.size()).filter(|&block| !members.lends[members.owners[block]]));
+        let place = |block: usize| lone.binary_search(&block).ok();
+        blocks.clear();
+        blocks.extend(
+            members
+                .blocks
+                .iter()
+                .filter_map(|block| Some(Block { row: place(block.row)?, column: place(block.column)?, ..*block })),
+        );
+        pairs.clear();
+        pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
+        x.clear();
+        x.resize(lone.len(), DVec3::ZERO);
+        own.shape(lone.len(), pairs);
+        own.set(blocks);
+        own.factor(|_, _| ()).map_err(|block| lone[block])
     }
 
     /// Takes up where rows couple blocks: the structure of a Newton step.
     pub fn couple(&mut self, members: &Members, rows: &Rows) {
-        self.list(members);
-        self.coupled.take(members.size(), &members.blocks, &mut self.pairs, Some(rows));
-        self.coupled.meet(rows);
-    }
-
-    fn list(&mut self, members: &Members) {
         self.pairs.clear();
         self.pairs.extend(members.blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
+        self.coupled.take(members.size(), &members.blocks, &mut self.pairs, Some(rows));
+        self.coupled.meet(rows);
     }
 
     /// Factors ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without a factor.
@@ -55,8 +71,11 @@ impl Direct {
         self.coupled.solve(x);
     }
 
-    /// x ← (⊕ A/f)⁻¹ x.
+    /// x ← (⊕ A/f)⁻¹ x, where members lend no factor.
     pub fn respond(&mut self, x: &mut [DVec3]) {
-        self.own.solve(x);
+        let Self { own, lone, x: own_x, .. } = self;
+        own_x.iter_mut().zip(&*lone).for_each(|(own, &block)| *own = x[block]);
+        own.solve(own_x);
+        own_x.iter().zip(&*lone).for_each(|(own, &block)| x[block] = *own);
     }
 }

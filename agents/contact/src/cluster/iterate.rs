@@ -7,6 +7,7 @@
 
 use super::cone::{Form, Projection};
 use super::gradients::{Stiffness, Task};
+use super::problem::Member;
 use super::rows::{Point, Rows};
 use super::system::System;
 use glam::{DMat3, DVec3};
@@ -106,21 +107,33 @@ impl Iterate {
     }
 
     /// Velocities as the impulses make them: momentum to rounding by a factor, else to the share of it that is wanted (eq. 17).
-    pub fn respond(&mut self) {
+    pub fn respond(&mut self, members: &[Member<'_>]) {
         let Self { rows, system, state, scratch, .. } = self;
         rows.scatter(&state.lambda, scratch);
         let goal = system.response_share * system.members.size_squared(scratch).sqrt();
-        system.respond(&mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal });
+        system.respond(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal });
         self.update_velocities();
     }
 
     /// Makes impulses those that laws allow, and velocities theirs. Returns whether anything was off.
-    pub fn refine(&mut self) -> bool {
-        let off = self.allow() || self.state.left.iter().any(|left| *left != DVec3::ZERO);
+    pub fn refine(&mut self, form: Form, members: &[Member<'_>]) -> bool {
+        let off = self.obey(form) || self.state.left.iter().any(|left| *left != DVec3::ZERO);
         if off {
-            self.respond();
+            self.respond(members);
         }
         off
+    }
+
+    /// Makes impulses those that laws ask for at the velocities as they are; returns whether any was not.
+    fn obey(&mut self, form: Form) -> bool {
+        let Self { rows, state, .. } = self;
+        let mut any = false;
+        for (row, (impulse, velocity)) in rows.rows.iter().zip(state.lambda.iter_mut().zip(&state.velocity)) {
+            let asked = row.natural_map(form, Point { impulse: *impulse, velocity: *velocity }).value;
+            any |= asked != *impulse;
+            *impulse = asked;
+        }
+        any
     }
 
     /// Makes impulses those that laws allow; returns whether any was not.
@@ -150,10 +163,10 @@ impl Iterate {
     }
 
     /// Goes back to impulses and compliances as they were.
-    pub fn restore(&mut self, kept: &Kept) {
+    pub fn restore(&mut self, members: &[Member<'_>], kept: &Kept) {
         self.state.lambda.clone_from(&kept.lambda);
         self.restore_compliances(kept);
-        self.respond();
+        self.respond(members);
     }
 
     /// Goes back to compliances as they were, and stays where it is.
@@ -189,7 +202,7 @@ impl Iterate {
     }
 
     /// Where the pulls as impulses would lead from here: `step` has the change of velocities. The first look is a rough one.
-    pub fn look_ahead(&mut self, exactly: bool) -> Led {
+    pub fn look_ahead(&mut self, members: &[Member<'_>], exactly: bool) -> Led {
         self.rows.scatter(&self.pull, &mut self.scratch);
         let pulled = self.system.members.size_squared(&self.scratch).sqrt();
         self.pull_on_members();
@@ -200,7 +213,7 @@ impl Iterate {
         if !exactly {
             step.change.fill(DVec3::ZERO);
         }
-        system.respond(&mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
+        system.respond(members, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
         rows.velocities(&step.change, &mut step.velocity);
         let answered = system.members.size_squared(&step.left).sqrt() <= goal.max(UNANSWERED * pulled);
         Led { off: step.velocity.iter().fold(DVec3::ZERO, |worst, u| worst.max(u.abs())), gradient, answered }

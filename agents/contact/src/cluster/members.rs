@@ -19,6 +19,8 @@ pub(super) struct Members {
     pub mobilities: Vec<DMat3>,
     /// Whether each member has no more blocks than a rigid body.
     pub rigid: Vec<bool>,
+    /// Whether each member lends its own factor.
+    pub lends: Vec<bool>,
 }
 
 impl Members {
@@ -27,9 +29,11 @@ impl Members {
         self.blocks.clear();
         self.owners.clear();
         self.rigid.clear();
+        self.lends.clear();
         for (place, member) in problem.members.iter().enumerate() {
             let offset = offsets[place];
             self.rigid.push(member.free.len() <= RIGID_BLOCKS);
+            self.lends.push(member.response.is_some());
             self.owners.extend(member.free.iter().map(|_| place));
             self.blocks.extend(member.blocks.iter().map(|block| Block {
                 row: offset + block.row,

@@ -15,7 +15,7 @@
 //!     Block { row: 1, column: 1, value: DMat3::from_diagonal(inertia) },
 //! ];
 //! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
-//! let members = [Member { blocks: &blocks, free: &free, share: 1.0 }];
+//! let members = [Member { blocks: &blocks, free: &free, share: 1.0, response: None }];
 //! let corner = |key, x, y| Contact {
 //!     key,
 //!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
@@ -67,7 +67,7 @@ mod validate;
 
 pub use error::ProblemError;
 pub use joint::{Hold, JointRow, Spring};
-pub use problem::{Block, Contact, Member, Problem};
+pub use problem::{Block, Contact, Member, Problem, Response};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};
 pub use system::StepForm;

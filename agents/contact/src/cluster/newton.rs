@@ -6,6 +6,7 @@
 use super::cone::Form;
 use super::iterate::Iterate;
 use super::members::worse;
+use super::problem::Member;
 use super::rows::Point;
 
 /// The most steps: where the pressure of what slides is not known it is found at a rate of about a half a step.
@@ -27,7 +28,9 @@ const LEAVE_LESS: f64 = 0.1;
 
 /// What the way needs to know besides the problem.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Aim {
+pub(super) struct Aim<'a> {
+    /// The members, whose responses velocities follow from.
+    pub members: &'a [Member<'a>],
     /// Coulomb's law as a disc, or as a cone with a shift.
     pub form: Form,
     /// The miss at which all laws hold, m/s.
@@ -37,12 +40,12 @@ pub(super) struct Aim {
 }
 
 /// Iterates until all laws hold; `false` where it gave up, the iterate being of no use then.
-pub(super) fn solve(iterate: &mut Iterate, aim: &Aim) -> bool {
+pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
     let (mut least, mut stale, mut last) = (f64::INFINITY, 0, f64::INFINITY);
     let (mut leave, mut stuck) = (LEAVE_MOST, false);
     for step in 0..=STEPS_MAX {
         let mut miss = linearise(iterate, aim.form);
-        if miss < aim.tolerance_m_s && iterate.refine() {
+        if miss < aim.tolerance_m_s && iterate.refine(aim.form, aim.members) {
             miss = linearise(iterate, aim.form);
         }
         if miss < aim.tolerance_m_s {
@@ -90,7 +93,7 @@ fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
 }
 
 /// How far to go: the whole step, or as many halves as make the sum of squares fall, or the best look.
-fn share_of_step(iterate: &Iterate, aim: &Aim) -> f64 {
+fn share_of_step(iterate: &Iterate, aim: &Aim<'_>) -> f64 {
     let before = sum_of_squares(iterate, aim, 0.0);
     let (mut share, mut best_share, mut best) = (1.0, 1.0, f64::INFINITY);
     for _ in 0..LOOKS {
@@ -107,7 +110,7 @@ fn share_of_step(iterate: &Iterate, aim: &Aim) -> f64 {
 }
 
 /// ‖F‖² of eq. 16 at a share of the step, with the compliance that rows would have there. A factor leaves Σ w |λ − P|² of it.
-fn sum_of_squares(iterate: &Iterate, aim: &Aim, share: f64) -> f64 {
+fn sum_of_squares(iterate: &Iterate, aim: &Aim<'_>, share: f64) -> f64 {
     let Iterate { rows, state, step, system, .. } = iterate;
     let mobilities = system.members.mobilities.iter().zip(&state.left).zip(&step.left);
     let momentum = mobilities.map(|((mobility, left), by)| {

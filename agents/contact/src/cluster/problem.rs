@@ -7,6 +7,7 @@ use super::joint::JointRow;
 use super::side::Side;
 use crate::contact::push_out_m_s;
 use glam::{DMat3, DVec3};
+use std::fmt;
 
 /// The share of the slip owed that one step takes back.
 const SLIP_SHARE: f64 = 0.2;
@@ -24,8 +25,15 @@ pub struct Block {
     pub value: DMat3,
 }
 
+/// A factor of a member's own, which it has made for its step already.
+pub trait Response: fmt::Debug + Sync {
+    /// Replaces impulses on all blocks of the member by the velocities that they give: A⁻¹ of them, to rounding, by the A of its
+    /// blocks.
+    fn respond(&self, impulses: &mut [DVec3]);
+}
+
 /// A body that takes part: how it answers impulses, and how it would move without any.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Member<'a> {
     /// The lower half of A = M + h C + h² S: symmetric and positive definite; kg, or kg m² for spins.
     pub blocks: &'a [Block],
@@ -33,6 +41,8 @@ pub struct Member<'a> {
     pub free: &'a [DVec3],
     /// How much of its own step an impulse moves it by, in fine steps: f ≥ 1 where its step is longer than h, else 1.
     pub share: f64,
+    /// The factor of A that it lends; `None` to have A factored here. What is lent is taken for positive definite.
+    pub response: Option<&'a dyn Response>,
 }
 
 /// A place where two sides may touch. Velocities are those of side 0 against side 1.
@@ -65,7 +75,7 @@ pub struct Contact {
 }
 
 /// All that touch or are joined, at one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     /// The step h, seconds, > 0.
     pub h_s: f64,

@@ -5,12 +5,17 @@
 
 use super::gradients::Task;
 use super::members::Members;
+use super::problem::Member;
 use super::rows::Rows;
 use super::system::System;
 use glam::{DMat3, DVec3};
 
 /// Contacts of a member whose exact compliance is compared with the estimate of its diagonal.
 const SAMPLES: usize = 4;
+/// The directions, in the frames of rows, along which they are. All axes are in each: a sum over these is one over axes, as what
+/// joins two axes has both signs.
+const DIRECTIONS: [DVec3; SAMPLES] =
+    [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)];
 /// The most that an iterative solve may leave of a sample's impulses, in shares of them. A compliance is off by about the square, and
 /// may be by this many times what responses may be.
 const SAMPLE_SHARE: f64 = 0.01;
@@ -40,12 +45,12 @@ struct Sample {
 
 impl Scales {
     /// The estimate of the members' diagonals, put right by some exact ones.
-    pub fn set(&mut self, system: &mut System, rows: &mut Rows) {
+    pub fn set(&mut self, system: &mut System, members: &[Member<'_>], rows: &mut Rows) {
         self.samples.clear();
         self.samples.resize(system.members.rigid.len(), Sample::default());
         if system.members.blocks.iter().any(|block| block.row != block.column) {
             self.choose(&system.members, rows);
-            (0..SAMPLES).for_each(|sample| self.sample(system, rows, sample));
+            (0..SAMPLES).for_each(|sample| self.sample(system, members, rows, sample));
         }
         let members = &system.members;
         for row in 0..rows.len() {
@@ -72,31 +77,29 @@ impl Scales {
         }
     }
 
-    /// Adds the mobility of every member at one row of its own; all members share three solutions.
-    fn sample(&mut self, system: &mut System, rows: &Rows, sample: usize) {
-        let size = system.members.size();
-        for axis in 0..3 {
-            for list in [&mut self.right, &mut self.x, &mut self.left] {
-                list.clear();
-                list.resize(size, DVec3::ZERO);
+    /// Adds the mobility of every member at one row of its own, along one direction; all members share a solution.
+    fn sample(&mut self, system: &mut System, members: &[Member<'_>], rows: &Rows, sample: usize) {
+        let Self { samples, right, x, left } = self;
+        let direction = DIRECTIONS[sample];
+        for list in [&mut *right, &mut *x, &mut *left] {
+            list.clear();
+            list.resize(system.members.size(), DVec3::ZERO);
+        }
+        for (member, at) in samples.iter_mut().enumerate() {
+            let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
+            for term in terms.filter(|t| system.members.owners[t.block] == member) {
+                let given = term.map.mul_transpose_vec3(direction);
+                right[term.block] += given;
+                at.estimate += given.dot(system.members.mobilities[term.block] * given);
             }
-            for (member, at) in self.samples.iter().enumerate() {
-                let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
-                for term in terms.filter(|t| system.members.owners[t.block] == member) {
-                    self.right[term.block] += term.map.row(axis);
-                }
-            }
-            let share = (COARSER * system.response_share).sqrt().min(SAMPLE_SHARE);
-            let goal = share * system.members.size_squared(&self.right).sqrt();
-            system.respond(&mut Task { right: &self.right, x: &mut self.x, left: &mut self.left, goal });
-            for (member, at) in self.samples.iter_mut().enumerate() {
-                let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
-                for term in terms.filter(|t| system.members.owners[t.block] == member) {
-                    at.exact += term.map.row(axis).dot(self.x[term.block]);
-                    if axis == 0 {
-                        at.estimate += estimate(&system.members, &term.map, term.block);
-                    }
-                }
+        }
+        let share = (COARSER * system.response_share).sqrt().min(SAMPLE_SHARE);
+        let goal = share * system.members.size_squared(right).sqrt();
+        system.respond(members, &mut Task { right, x, left, goal });
+        for (member, at) in samples.iter_mut().enumerate() {
+            let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
+            for term in terms.filter(|t| system.members.owners[t.block] == member) {
+                at.exact += direction.dot(term.map * x[term.block]);
             }
         }
     }

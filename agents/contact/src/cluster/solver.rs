@@ -9,7 +9,7 @@ use super::error::ProblemError;
 use super::iterate::{Iterate, Kept, State};
 use super::newton::{self, Aim};
 use super::passivity;
-use super::problem::Problem;
+use super::problem::{Member, Problem};
 use super::rebound;
 use super::system::StepForm;
 use super::validate::validate;
@@ -153,7 +153,7 @@ impl Solver {
         (system.form, system.response_share) = (self.settings.form, self.settings.response_share);
         system.take_members(problem, offsets)?;
         rows.gather(problem, offsets, velocities);
-        system.scale_rows(rows);
+        system.scale_rows(problem.members, rows);
         let yield_m_s = self.settings.yield_m_s(problem.h_s);
         let given = problem.contacts.iter().map(|c| c.warm_n_s).chain(problem.rows.iter().map(|r| r.warm_n_s));
         self.warm.clear();
@@ -168,16 +168,17 @@ impl Solver {
     }
 
     /// Starts from the impulses of the last step.
-    fn start(&mut self) {
+    fn start(&mut self, members: &[Member<'_>]) {
         self.iterate.state.lambda.clone_from(&self.warm);
         self.iterate.rows.rows.iter_mut().zip(&self.compliances).for_each(|(row, r)| row.compliance = *r);
-        self.iterate.respond();
+        self.iterate.respond(members);
     }
 
     /// The ways in their order, again without rebounds that make energy, then the guard.
     fn run(&mut self, problem: &Problem<'_>) -> Report {
         let rigid = self.iterate.system.members.rigid.iter().all(|rigid| *rigid);
         let aim = Aim {
+            members: problem.members,
             form: if rigid { Form::Cone } else { Form::Disc },
             tolerance_m_s: self.settings.tolerance_m_s,
             yield_m_s: self.settings.yield_m_s(problem.h_s),
@@ -202,7 +203,7 @@ impl Solver {
     }
 
     /// Impulses in their cones by the first way that finds them.
-    fn find(&mut self, aim: &Aim) -> Report {
+    fn find(&mut self, aim: &Aim<'_>) -> Report {
         let mut report = Report::resting();
         if !self.settings.convex_only && self.primal_dual(aim) {
             report.way = if self.iterate.steps > 0 { Way::PrimalDual } else { Way::Kept };
@@ -210,42 +211,44 @@ impl Solver {
             let passes = self.convex(aim);
             report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
         }
-        report.cut |= !self.settle() || !self.iterate.answered();
+        report.cut |= !self.settle(aim.members) || !self.iterate.answered();
         report
     }
 
     /// The primal-dual way, in the form that serves these members best, then in the other.
-    fn primal_dual(&mut self, aim: &Aim) -> bool {
+    fn primal_dual(&mut self, aim: &Aim<'_>) -> bool {
         let other = if aim.form == Form::Cone { Form::Disc } else { Form::Cone };
         [aim.form, other].into_iter().any(|form| {
-            self.start();
+            self.start(aim.members);
             newton::solve(&mut self.iterate, &Aim { form, ..*aim })
         })
     }
 
     /// The convex way; passes that have not settled are a start from which the primal-dual way may find the rest.
-    fn convex(&mut self, aim: &Aim) -> Passes {
-        self.start();
+    fn convex(&mut self, aim: &Aim<'_>) -> Passes {
+        self.start(aim.members);
         let mut passes = convex::solve(&mut self.iterate, &mut self.stores, aim, self.settings.passes);
         if !passes.settled && passes.finished > 0 && !self.settings.convex_only {
             self.iterate.keep(&mut self.kept);
             passes.settled = newton::solve(&mut self.iterate, &Aim { form: Form::Cone, ..*aim });
             if !passes.settled {
-                self.iterate.restore(&self.kept);
+                self.iterate.restore(aim.members, &self.kept);
             }
         }
         passes
     }
 
     /// Impulses into their cones, and the velocities that these make; `false` where numbers have overflowed and there is no answer.
-    fn settle(&mut self) -> bool {
-        self.iterate.allow();
-        self.iterate.respond();
+    fn settle(&mut self, members: &[Member<'_>]) -> bool {
+        // without a step they are those of the start
+        if self.iterate.allow() || self.iterate.steps > 0 {
+            self.iterate.respond(members);
+        }
         let State { lambda, velocity, .. } = &mut self.iterate.state;
         let finite = lambda.iter().chain(&*velocity).all(|v| v.is_finite());
         if !finite {
             lambda.fill(DVec3::ZERO);
-            self.iterate.respond();
+            self.iterate.respond(members);
         }
         finite
     }

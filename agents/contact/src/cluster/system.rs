@@ -7,10 +7,11 @@ use super::direct::Direct;
 use super::error::ProblemError;
 use super::gradients::{Gradients, Operator, Stiffness, Task};
 use super::members::Members;
-use super::problem::Problem;
+use super::problem::{Member, Problem};
 use super::rows::Rows;
 use super::scale::Scales;
 use glam::DVec3;
+use std::ops::Range;
 
 /// How the linear equations of a Newton step are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -34,6 +35,7 @@ pub(super) struct System {
     direct: Direct,
     gradients: Gradients,
     scales: Scales,
+    right: Vec<DVec3>,
     /// Whether the structure of a Newton step is that of the rows.
     coupled: bool,
 }
@@ -56,19 +58,37 @@ impl System {
         })
     }
 
-    /// Solves with ⊕ A/f: what members do under impulses.
-    pub fn respond(&mut self, task: &mut Task<'_>) {
+    /// Solves with ⊕ A/f: what members do under impulses. Those that lend a factor are those taken up last.
+    pub fn respond(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
         match self.form {
             StepForm::Direct => {
                 task.x.copy_from_slice(task.right);
                 self.direct.respond(task.x);
                 task.left.fill(DVec3::ZERO);
             }
-            StepForm::Iterative => {
-                let operator = Operator { members: &self.members, contacts: None };
-                self.gradients.solve(&operator, task);
-            }
+            StepForm::Iterative => self.descend(members, task),
         }
+        for (range, member) in lending(members) {
+            let x = &mut task.x[range.clone()];
+            x.copy_from_slice(&task.right[range]);
+            if let Some(response) = member.response {
+                response.respond(x);
+            }
+            x.iter_mut().for_each(|x| *x *= member.share);
+        }
+    }
+
+    /// Solves with ⊕ A/f by conjugate gradients, for members that lend no factor; the others are left at rest.
+    fn descend(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
+        self.right.clear();
+        self.right.extend_from_slice(task.right);
+        for (range, _) in lending(members) {
+            self.right[range.clone()].fill(DVec3::ZERO);
+            task.x[range].fill(DVec3::ZERO);
+        }
+        let operator = Operator { members: &self.members, contacts: None };
+        let Task { x, left, goal, .. } = task;
+        self.gradients.solve(&operator, &mut Task { right: &self.right, x, left, goal: *goal });
     }
 
     /// Solves with ⊕ A/f + Jᵀ G J: a Newton step; `false` where rounding leaves it without a solution.
@@ -111,9 +131,19 @@ impl System {
     }
 
     /// The scale of each row (eq. 6).
-    pub fn scale_rows(&mut self, rows: &mut Rows) {
+    pub fn scale_rows(&mut self, members: &[Member<'_>], rows: &mut Rows) {
         let mut scales = std::mem::take(&mut self.scales);
-        scales.set(self, rows);
+        scales.set(self, members, rows);
         self.scales = scales;
     }
+}
+
+/// The members that lend a factor, each with its blocks.
+fn lending<'a, 'b>(members: &'a [Member<'b>]) -> impl Iterator<Item = (Range<usize>, &'a Member<'b>)> {
+    let blocks = members.iter().scan(0, |start, member| {
+        let range = *start..*start + member.free.len();
+        *start = range.end;
+        Some((range, member))
+    });
+    blocks.filter(|(_, member)| member.response.is_some())
 }

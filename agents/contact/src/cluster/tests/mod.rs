@@ -4,6 +4,7 @@ mod cone;
 mod factor;
 mod iterative;
 mod joints;
+mod lent;
 mod promises;
 mod random;
 mod rebounds;
@@ -62,8 +63,11 @@ pub struct Case {
 impl Case {
     /// Hands the problem to `work`.
     pub fn with<T>(&self, work: impl FnOnce(&Problem<'_>) -> T) -> T {
-        let members: Vec<_> =
-            self.bodies.iter().map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0 }).collect();
+        let members: Vec<_> = self
+            .bodies
+            .iter()
+            .map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0, response: None })
+            .collect();
         work(&Problem {
             h_s: self.h_s,
             members: &members,

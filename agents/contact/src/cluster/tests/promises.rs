@@ -113,7 +113,12 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
     // f = 2: its place moves by twice A⁻¹, so half the impulse stops it
     let case = Case { contacts: vec![contact([Side::node(0, 0), Side::FIXED], DVec3::Z)], ..case() };
     let impulse = |share: f64| {
-        let members = [crate::cluster::Member { blocks: &case.bodies[0].blocks, free: &case.bodies[0].free, share }];
+        let members = [crate::cluster::Member {
+            blocks: &case.bodies[0].blocks,
+            free: &case.bodies[0].free,
+            share,
+            response: None,
+        }];
         let problem = crate::cluster::Problem {
             h_s: 0.01,
             members: &members,

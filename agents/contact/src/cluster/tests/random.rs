@@ -250,3 +250,19 @@ fn a_problem_solved_again_from_its_own_impulses_takes_few_factors() {
     println!("factors of {COUNT} problems solved four times: {factors:?}");
     assert!(factors[3] < factors[0] / 3, "{factors:?}");
 }
+
+#[test]
+fn zz_survey() {
+    let (mut factors, mut cut, mut beyond) = (0, Vec::new(), Vec::new());
+    for seed in 200..1000 {
+        let case = random_case(seed);
+        let solution = solved(&case, Settings::default());
+        factors += solution.report.factors;
+        if solution.report.cut {
+            cut.push((seed, case.contacts.len(), case.bodies.len(), solution.report.residual_m_s, solution.report.factors));
+        } else if miss(&case, &solution) > 2e-4 {
+            beyond.push((seed, miss(&case, &solution)));
+        }
+    }
+    println!("SURVEY {factors} factors; {} cut {cut:?}\n beyond {beyond:?}", cut.len());
+}

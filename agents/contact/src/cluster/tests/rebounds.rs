@@ -76,8 +76,11 @@ fn two_bodies_part_at_newtons_speed() {
 #[test]
 fn what_closes_slowly_or_not_within_the_step_does_not_rebound() {
     let mut case = row_of_balls(&[1.0, 1.0], &[0.5, 0.0], 1.0);
-    let members: Vec<_> =
-        case.bodies.iter().map(|b| crate::cluster::Member { blocks: &b.blocks, free: &b.free, share: 1.0 }).collect();
+    let members: Vec<_> = case
+        .bodies
+        .iter()
+        .map(|b| crate::cluster::Member { blocks: &b.blocks, free: &b.free, share: 1.0, response: None })
+        .collect();
     let problem = crate::cluster::Problem {
         h_s: 0.01,
         members: &members,

@@ -1,11 +1,11 @@
 //! An independent solution: projected Gauss–Seidel over the dense matrix of all contacts, in as many sweeps as it takes.
 
-use super::{Case, side_velocity};
+use super::{Body, Case, side_velocity};
 use crate::cluster::Side;
 use glam::DVec3;
 
 /// A dense square matrix by rows.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Dense {
     size: usize,
     values: Vec<f64>,
@@ -14,6 +14,23 @@ pub struct Dense {
 impl Dense {
     pub fn zero(size: usize) -> Self {
         Self { size, values: vec![0.0; size * size] }
+    }
+
+    /// The matrix of a body.
+    pub fn of(body: &Body) -> Self {
+        let mut dense = Dense::zero(3 * body.free.len());
+        for block in &body.blocks {
+            for i in 0..3 {
+                for j in 0..3 {
+                    let value = block.value.col(j)[i];
+                    *dense.at(3 * block.row + i, 3 * block.column + j) += value;
+                    if block.row != block.column {
+                        *dense.at(3 * block.column + j, 3 * block.row + i) += value;
+                    }
+                }
+            }
+        }
+        dense
     }
 
     pub fn at(&mut self, row: usize, column: usize) -> &mut f64 {
@@ -97,25 +114,7 @@ fn response(case: &Case, factors: &[Dense], sides: &[Side; 2], direction: DVec3)
 
 /// Sweeps until nothing changes by more than `tolerance` (as a velocity), or `sweeps` are done.
 pub fn gauss_seidel(case: &Case, compliances: &[f64], sweeps: usize, tolerance: f64) -> Slow {
-    let factors: Vec<_> = case
-        .bodies
-        .iter()
-        .map(|body| {
-            let mut dense = Dense::zero(3 * body.free.len());
-            for block in &body.blocks {
-                for i in 0..3 {
-                    for j in 0..3 {
-                        let value = block.value.col(j)[i];
-                        *dense.at(3 * block.row + i, 3 * block.column + j) += value;
-                        if block.row != block.column {
-                            *dense.at(3 * block.column + j, 3 * block.row + i) += value;
-                        }
-                    }
-                }
-            }
-            dense.factored()
-        })
-        .collect();
+    let factors: Vec<_> = case.bodies.iter().map(|body| Dense::of(body).factored()).collect();
     let lines = lines(case, compliances);
     let size = 3 * lines.len();
     let responses: Vec<_> = lines.iter().flat_map(|l| l.frame.map(|d| response(case, &factors, &l.sides, d))).collect();
