@@ -6,6 +6,7 @@ mod rounds;
 mod self_touches;
 mod static_solids;
 mod surfaces;
+mod swept;
 mod tubes;
 
 use super::*;

@@ -10,7 +10,7 @@ use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, sha
 use crate::near_triangle;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
-use crate::{Place, Touch};
+use crate::{Aabb, Place, Touch};
 use glam::DVec3;
 
 /// Deeper than this share of an edge a place is pushed out of the block by the shortest way.
@@ -24,8 +24,8 @@ const FLAT: f64 = 1.0 - 1e-9;
 /// Alternating projections between a triangle and a block: both are convex, so the two points approach each other.
 const PROJECTIONS: usize = 8;
 /// Limit of the cosine of a tool's normal with the skin's. A body that touches a skin from outside pushes it inwards. A tool that would
-/// push it aside or outwards has pierced it, and touches it no more until it is out again. At the edge of a box the cosine is 0.7, at a
-/// corner 0.6.
+/// push it aside or outwards has pierced it, and touches it no more until it is out again. Half way round the edge of a box the cosine with
+/// the nearer face is 0.7, at its corner 0.6.
 const PIERCED: f64 = -0.5;
 
 /// The point of a triangle that is nearest to a block.
@@ -129,6 +129,10 @@ impl SurfaceQuery<'_> {
             else {
                 continue;
             };
+            // a corner that is behind the face may have come past the skin's border, and not through it
+            if distance_m < 0.0 && !self.crosses([at, block.around.centre]) {
+                continue;
+            }
             let touch = signed_distance::Touch { normal: -local, distance_m };
             let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position: foot };
             let key = TouchKey::new(TouchKind::Triangle, [number, name]);
@@ -136,6 +140,19 @@ impl SurfaceQuery<'_> {
             any = true;
         }
         any
+    }
+
+    /// Whether a line crosses the skin.
+    fn crosses(&self, [from, to]: [DVec3; 2]) -> bool {
+        self.surface.triangles_in(Aabb::of(&[from, to])).any(|Triangle { corners, .. }| {
+            let [a, b, c] = corners;
+            let across = (b - a).cross(c - a);
+            let [before, after] = [from, to].map(|end| across.dot(end - a));
+            let cut = from.lerp(to, before / (before - after));
+            before * after <= 0.0
+                && before != after
+                && shares(cut, corners).is_some_and(|shares| shares.iter().all(|share| *share > -ROUNDING_SHARE))
+        })
     }
 
     /// The normal of a triangle towards a block: out of a closed skin, and of an open one on the side of the block's middle.
@@ -187,10 +204,18 @@ impl SurfaceQuery<'_> {
         })
     }
 
-    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
+    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there: through every
+    /// triangle that meets there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
-        let inside = spot.shares[2] > 0.0;
-        let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
-        self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
+        let form = self.surface.form;
+        let meets = |triangle: &&[u32; 3]| {
+            let mut counting = spot.vertices.iter().zip(spot.shares).filter(|(_, share)| *share != 0.0);
+            counting.all(|(vertex, _)| triangle.contains(vertex))
+        };
+        let faces = form.triangles.iter().filter(meets).filter_map(|triangle| {
+            let [a, b, c] = self.surface.corners(*triangle);
+            (b - a).cross(c - a).try_normalize()
+        });
+        form.closed && faces.into_iter().all(|face| face.dot(normal) > PIERCED)
     }
 }
