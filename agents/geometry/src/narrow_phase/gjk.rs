@@ -49,6 +49,14 @@ const ROUNDING: f64 = 1e-15;
 /// Closer than this share of the sizes, parts count as overlapping: the vector between them has no direction any more.
 const TOUCHING_SHARE: f64 = 1e-12;
 
+/// What a search finds.
+enum Found {
+    Apart(Separation),
+    /// They are farther than the reach, or not finite.
+    Far,
+    Overlap,
+}
+
 /// The difference of two parts: it holds the origin where they overlap.
 pub(super) struct Difference<'a> {
     parts: [&'a dyn Convex; 2],
@@ -123,6 +131,19 @@ impl<'a> Difference<'a> {
 
     /// Separation of the parts; `None` farther than `reach_m` apart.
     pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Separation> {
+        match self.search(reach_m) {
+            Found::Apart(separation) => Some(separation),
+            Found::Far => None,
+            Found::Overlap => hull.way_out(self),
+        }
+    }
+
+    /// The same; `None` where they overlap, too.
+    pub fn parted(&self, reach_m: f64) -> Option<Separation> {
+        if let Found::Apart(separation) = self.search(reach_m) { Some(separation) } else { None }
+    }
+
+    fn search(&self, reach_m: f64) -> Found {
         let start = self.parts[0].origin() - self.parts[1].origin();
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
         let mut best: Option<Separation> = None;
@@ -130,13 +151,13 @@ impl<'a> Difference<'a> {
             let near = simplex.nearest();
             let distance = near.way.length();
             if simplex.holds_origin || distance <= TOUCHING_SHARE * simplex.size() {
-                return hull.way_out(self);
+                return Found::Overlap;
             }
             let normal = near.way / distance;
             let corner = self.support(-normal);
             let floor_m = corner.way.dot(normal);
             if floor_m > reach_m {
-                return None;
+                return Found::Far;
             }
             if best.is_none_or(|best| floor_m > best.gap_m) {
                 best = Some(Separation { normal, gap_m: floor_m, on: near.on });
@@ -146,7 +167,7 @@ impl<'a> Difference<'a> {
                 break;
             }
         }
-        best.filter(|best| best.gap_m.is_finite())
+        best.filter(|best| best.gap_m.is_finite()).map_or(Found::Far, Found::Apart)
     }
 }
 

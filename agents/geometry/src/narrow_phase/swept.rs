@@ -18,10 +18,13 @@ use glam::{DQuat, DVec3};
 
 /// Shapes this much nearer than the reach count as touching, metres: a twentieth of the depth at which contacts rest.
 pub(super) const NEAR_M: f64 = 1e-6;
-/// Leaps of a pair of elements; two to four bring most together. One that takes more touches where it is then.
-const LEAPS: usize = 100;
+/// Leaps of a pair of elements; two to four bring most together, but one that turns by radians about a far pivot takes hundreds. One that
+/// takes more touches where it is then: early, not late.
+const LEAPS: usize = 1000;
 /// Swing of a jaw from shut to wide open, radians, at most.
 const JAW_RAD: f64 = 0.6;
+/// How many pieces of a tool are jaws: the first ones.
+const JAWS: usize = 2;
 
 /// A shape in motion.
 #[derive(Debug, Clone, Copy)]
@@ -166,7 +169,8 @@ impl<'a> SweptShape<'a> {
     }
 }
 
-/// The shortest rotation from one to another.
+/// The shortest rotation from one to another, radians.
+#[derive(Clone, Copy)]
 struct Turn {
     axis: DVec3,
     angle: f64,
@@ -197,8 +201,8 @@ pub(super) struct RigidWay {
     /// The point about which it turns, at the start, and its way, metres.
     pivot: DVec3,
     way: DVec3,
-    /// How far all of it turns, radians.
-    turn: f64,
+    /// How all of it turns.
+    turn: Turn,
     /// How far a jaw of a tool swings about the hinge besides, radians.
     swing: f64,
 }
@@ -220,8 +224,8 @@ pub(super) enum Element<'a> {
         way: RigidWay,
         piece: usize,
         part: usize,
-        /// No extent of it changes by more than this by turning, metres.
-        turned_m: f64,
+        /// No extent of it along the axis and across it changes by more than this by turning, metres.
+        turned_m: [f64; 2],
     },
     /// All that is behind a plane at rest.
     HalfSpace {
@@ -274,17 +278,12 @@ impl<'a> Elements<'a> {
             (
                 ShapePose::Solid { position: from, rotation: from_turn },
                 ShapePose::Solid { position: to, rotation: to_turn },
-            ) => Some(RigidWay {
-                pivot: from,
-                way: to - from,
-                turn: Turn::between(from_turn, to_turn).angle,
-                swing: 0.0,
-            }),
+            ) => Some(RigidWay { pivot: from, way: to - from, turn: Turn::between(from_turn, to_turn), swing: 0.0 }),
             (
                 ShapePose::Tool { tip: from, rotation: from_turn, jaw: from_jaw },
                 ShapePose::Tool { tip: to, rotation: to_turn, jaw: to_jaw },
             ) => {
-                let (turn, swing) = (Turn::between(from_turn, to_turn).angle, JAW_RAD * (to_jaw - from_jaw).abs());
+                let (turn, swing) = (Turn::between(from_turn, to_turn), JAW_RAD * (to_jaw - from_jaw).abs());
                 Some(RigidWay { pivot: from, way: to - from, turn, swing })
             }
             (ShapePose::Chain { positions: from, .. }, ShapePose::Chain { positions: to, radii_m }) => {
@@ -317,7 +316,7 @@ impl<'a> Elements<'a> {
             return Element::Corners { start: [DVec3::NAN; 3], ways: [DVec3::ZERO; 3], radii_m: [0.0; 3] };
         };
         if let Some(way) = self.rigid {
-            return Element::Rigid { elements: self, way, piece: number, part, turned_m: piece.turned_m(way) };
+            return Element::Rigid { elements: self, way, piece: number, part, turned_m: piece.turned_m(way, number) };
         }
         let (start, radii_m, nodes) = match piece {
             Piece::Strand(strand) => {
@@ -363,8 +362,8 @@ impl<'a> Elements<'a> {
             Element::Rigid { way, piece, turned_m, .. } => {
                 let around = self.pieces.iter().find(|(number, _)| *number == piece).map(|(_, piece)| piece.around());
                 let Some(around) = around else { return Aabb { low: DVec3::NAN, high: DVec3::NAN } };
-                let start = Aabb::about(around.centre, around.radius_m + turned_m);
-                start.union(Aabb::about(around.centre + way.way, around.radius_m + turned_m))
+                let wide_m = around.radius_m + turned_m[1];
+                Aabb::about(around.centre, wide_m).union(Aabb::about(around.centre + way.way, wide_m))
             }
             Element::HalfSpace { .. } => Aabb::everywhere(),
         }
@@ -382,14 +381,16 @@ impl Piece<'_> {
         }
     }
 
-    /// By how much a motion may change its extents by turning, metres. A ball about the pivot does not change.
-    fn turned_m(&self, way: RigidWay) -> f64 {
+    /// By how much a motion may change its extents by turning, along the axis of the turn and across it, metres. A ball about the pivot does not
+    /// change. Of a tool the first two pieces are jaws.
+    fn turned_m(&self, way: RigidWay, number: usize) -> [f64; 2] {
         let arm_m = match self {
             Self::Strand(strand) => strand.positions().iter().map(|node| node.distance(way.pivot)).fold(0.0, f64::max),
             _ => self.around().centre.distance(way.pivot) + self.around().radius_m,
         };
         // the hinge is in the jaw
-        way.turn * arm_m + way.swing * 2.0 * self.around().radius_m
+        let swung_m = if number < JAWS { way.swing * 2.0 * self.around().radius_m } else { 0.0 };
+        [swung_m, swung_m + way.turn.angle * arm_m]
     }
 }
 
@@ -430,6 +431,9 @@ impl<'a> Element<'a> {
                 let core = moment.convex();
                 let value_m =
                     along.dot(core.origin()) + along.dot(core.support(-along, core.origin())) - moment.radius_m;
+                // a point at r moves along n by n·(ω × r)
+                let across = along.cross(way.turn.axis).length();
+                let turned_m = turned_m[0] + (turned_m[1] - turned_m[0]) * across;
                 [Extent { value_m, slope_m: along.dot(way.way) - turned_m }; 3]
             }
             (Self::Corners { .. } | Self::HalfSpace { .. }, _) => {

@@ -1,6 +1,7 @@
 //! Contacts between forms against brute force, closed forms and each other.
 
 mod blocks;
+mod pairs;
 mod promises;
 mod rounds;
 mod self_touches;

@@ -3,6 +3,8 @@
 //! In: a surface and a block that may touch. Out: touching places. Never here: round pieces, other surfaces.
 //! Theory: docs/theory/soft.md, eq. 15a.
 
+use super::super::convex_convex::parts;
+use super::super::gjk::{Convex, Difference, Rounded, Separation};
 use super::super::primitives::Block;
 use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN_SHARE};
@@ -166,6 +168,9 @@ impl SurfaceQuery<'_> {
     fn project(&self, triangle: &Triangle, block: &Block<'_>, field: &Field) -> Option<Projected> {
         let corners = triangle.corners;
         let radius_m = self.surface.form.radius_m;
+        if let Some(projected) = self.nearest_of_hull(triangle, block) {
+            return Some(projected);
+        }
         let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
         let size_m = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
         let look_m = radius_m + self.reach_m + 2.0 * size_m;
@@ -181,6 +186,20 @@ impl SurfaceQuery<'_> {
         if touch.distance_m >= -BETTER_SHARE * self.surface.form.edge_m {
             touch.normal = block.rotation.conjugate() * -self.facing(corners, block)?;
         }
+        Some(Projected { point, touch, size_m })
+    }
+
+    /// The same for a block of hulls that the triangle is apart from.
+    fn nearest_of_hull(&self, triangle: &Triangle, block: &Block<'_>) -> Option<Projected> {
+        let look_m = self.surface.form.radius_m + self.reach_m;
+        let skin = Rounded { corners: triangle.corners, radii_m: [0.0; 3] };
+        let hulls = parts(block).filter(|part| part.shape.as_convex_polyhedron().is_some());
+        let nearest = hulls.filter_map(|part| Difference::new(&skin, &part).parted(look_m));
+        let Separation { normal, gap_m, on } = nearest.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;
+        let point = triangle.inside(skin.origin() + on[0])?;
+        let middle = (skin.corners[0] + skin.corners[1] + skin.corners[2]) / 3.0;
+        let size_m = skin.corners.iter().map(|corner| corner.distance(middle)).fold(0.0, f64::max);
+        let touch = signed_distance::Touch { normal: block.rotation.conjugate() * normal, distance_m: gap_m };
         Some(Projected { point, touch, size_m })
     }
 

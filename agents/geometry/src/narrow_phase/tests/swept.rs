@@ -91,10 +91,16 @@ proptest! {
         prop_assert!(lowest(&touches).gap_m.abs() < 2.0 * EARLY_M, "{touches:?}");
     }
 
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(6))]
+
     /// Of every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.
     #[test]
     fn before_the_first_touch_nothing_overlaps(
-        p in vector(0.15), q in vector(0.15), u in vector(0.3), v in vector(0.3), r in turn(), s in turn(), reach_m in 0.0..2e-3_f64,
+        p in vector(0.15), q in vector(0.15), u in vector(0.3), v in vector(0.3), r in turn(), s in turn(),
+        (axis, angle) in (vector(1.0), -0.6..0.6), reach_m in 0.0..2e-3_f64,
     ) {
         let half = DVec3::new(0.02, 0.03, 0.04);
         let (sheet, flat) = flat_sheet();
@@ -108,13 +114,15 @@ proptest! {
         };
         let moved = |points: &[DVec3], at: DVec3, turn: DQuat| points.iter().map(|x| at + turn * *x).collect::<Vec<_>>();
         let radii = [5e-3; 7];
+        let turned = DQuat::from_axis_angle(axis.normalize_or(DVec3::X), angle);
+        let (r1, s1) = (turned * r, turned.conjugate() * s);
         for one in &cast {
             for two in &cast {
-                let (a0, a1) = (moved(&local(one), p, r), moved(&local(one), p + u, s));
-                let (b0, b1) = (moved(&local(two), q, s), moved(&local(two), q + v, r));
+                let (a0, a1) = (moved(&local(one), p, r), moved(&local(one), p + u, r1));
+                let (b0, b1) = (moved(&local(two), q, s), moved(&local(two), q + v, s1));
                 let of = |form, points, at, turn| placed(form, points, &radii, (at, turn));
-                let a = swept(of(one, &a0, p, r), of(one, &a1, p + u, s));
-                let b = swept(of(two, &b0, q, s), of(two, &b1, q + v, r));
+                let a = swept(of(one, &a0, p, r), of(one, &a1, p + u, r1));
+                let b = swept(of(two, &b0, q, s), of(two, &b1, q + v, s1));
                 let found = first(&a, &b, reach_m);
                 let until = found.as_ref().map_or(1.0, |(share, _)| *share);
                 // what starts in or through another is told by nobody, or deeper
@@ -138,7 +146,7 @@ proptest! {
     }
 }
 
-fn placed<'a>(
+pub(super) fn placed<'a>(
     form: &'a CollisionShape,
     points: &'a [DVec3],
     radii_m: &'a [f64],
