@@ -75,15 +75,17 @@ pub(super) fn pose(position: DVec3, rotation: DQuat) -> Pose {
 }
 
 /// The convex parts of a block; a half space has none.
-pub(super) fn parts<'a>(block: &'a Block<'a>) -> impl Iterator<Item = Part<'a>> {
-    let whole = Part { number: 0, shape: block.shape, corners: None, origin: block.origin, rotation: block.rotation };
-    let compound = block.shape.as_compound();
-    let within = compound.into_iter().flat_map(|compound| (0..).zip(compound.shapes())).map(|(number, (at, shape))| {
-        let turn = at.rotation;
-        let turn = DQuat::from_xyzw(turn.x.into(), turn.y.into(), turn.z.into(), turn.w.into()).normalize();
-        let origin = block.origin + block.rotation * at.translation.as_dvec3();
-        Part { number, shape: shape.as_ref(), corners: None, origin, rotation: block.rotation * turn }
-    });
+pub(super) fn parts<'a>(block: &Block<'a>) -> impl Iterator<Item = Part<'a>> + use<'a> {
+    let Block { shape, origin, rotation, .. } = *block;
+    let whole = Part { number: 0, shape, origin, rotation };
+    let compound = shape.as_compound();
+    let within =
+        compound.into_iter().flat_map(|compound| (0..).zip(compound.shapes())).map(move |(number, (at, shape))| {
+            let turn = at.rotation;
+            let turn = DQuat::from_xyzw(turn.x.into(), turn.y.into(), turn.z.into(), turn.w.into()).normalize();
+            let origin = origin + rotation * at.translation.as_dvec3();
+            Part { number, shape: shape.as_ref(), origin, rotation: rotation * turn }
+        });
     let whole = Some(whole).filter(|whole| compound.is_none() && whole.shape.as_support_map().is_some());
     whole.into_iter().chain(within)
 }

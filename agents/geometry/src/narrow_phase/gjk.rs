@@ -14,8 +14,6 @@ pub(super) struct Part<'a> {
     pub number: u32,
     /// Its parry shape.
     pub shape: &'a dyn Shape,
-    /// The corners of a triangle in its axes, in double precision, metres.
-    pub corners: Option<[DVec3; 3]>,
     /// Where its axes' origin is.
     pub origin: DVec3,
     /// From its axes to the world's.
@@ -51,24 +49,65 @@ const ROUNDING: f64 = 1e-15;
 /// Closer than this share of the sizes, parts count as overlapping: the vector between them has no direction any more.
 const TOUCHING_SHARE: f64 = 1e-12;
 
-/// The difference of two parts: it holds the origin where they overlap.
-pub(super) struct Difference<'a> {
-    parts: [Part<'a>; 2],
+/// What a search finds.
+enum Found {
+    Apart(Separation),
+    /// They are farther than the reach, or not finite.
+    Far,
+    Overlap,
 }
 
-impl Part<'_> {
+/// The difference of two parts: it holds the origin where they overlap.
+pub(super) struct Difference<'a> {
+    parts: [&'a dyn Convex; 2],
+}
+
+/// What is convex.
+pub(super) trait Convex {
+    /// A point near it, metres.
+    fn origin(&self) -> DVec3;
+
     /// The point farthest along `way`, metres from `from`.
+    fn support(&self, way: DVec3, from: DVec3) -> DVec3;
+}
+
+/// The hull of three balls: a triangle, a span or a ball.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rounded {
+    /// Their centres, metres.
+    pub corners: [DVec3; 3],
+    /// Their radii, metres, ≥ 0.
+    pub radii_m: [f64; 3],
+}
+
+impl Convex for Rounded {
+    fn origin(&self) -> DVec3 {
+        self.corners[0]
+    }
+
+    fn support(&self, way: DVec3, from: DVec3) -> DVec3 {
+        let Self { corners, radii_m } = self;
+        let way = if radii_m.iter().all(|radius_m| *radius_m == 0.0) { way } else { way.normalize_or_zero() };
+        let far = |i: usize| (corners[i] - from).dot(way) + radii_m[i];
+        let best = [1, 2].into_iter().fold(0, |best, next| if far(next) > far(best) { next } else { best });
+        corners[best] - from + way * radii_m[best]
+    }
+}
+
+impl Convex for Part<'_> {
+    fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     fn support(&self, way: DVec3, from: DVec3) -> DVec3 {
         let way = self.rotation.conjugate() * way;
-        let far = |best: DVec3, next: DVec3| if next.dot(way) > best.dot(way) { next } else { best };
-        let corner = if let Some([a, b, c]) = self.corners {
-            far(far(a, b), c)
-        } else if let Some(cuboid) = self.shape.as_cuboid() {
+        let corner = if let Some(cuboid) = self.shape.as_cuboid() {
             cuboid.half_extents.as_dvec3().copysign(way)
         } else if let Some(round) = self.shape.as_cylinder() {
             let out = DVec3::new(way.x, 0.0, way.z).normalize_or_zero() * f64::from(round.radius);
             out.with_y(f64::from(round.half_height).copysign(way.y))
         } else if let Some(hull) = self.shape.as_convex_polyhedron() {
+            let far = |best: DVec3, next: DVec3| if next.dot(way) > best.dot(way) { next } else { best };
             hull.points().iter().map(|p| p.as_dvec3()).reduce(far).unwrap_or_default()
         } else {
             self.shape.as_support_map().map_or(DVec3::ZERO, |map| map.local_support_point(way.as_vec3()).as_dvec3())
@@ -79,33 +118,46 @@ impl Part<'_> {
 
 impl<'a> Difference<'a> {
     /// The difference first − second.
-    pub fn new(first: &Part<'a>, second: &Part<'a>) -> Self {
-        Self { parts: [*first, *second] }
+    pub fn new(first: &'a dyn Convex, second: &'a dyn Convex) -> Self {
+        Self { parts: [first, second] }
     }
 
     /// The corner farthest along `way`.
     pub fn support(&self, way: DVec3) -> Corner {
         let [a, b] = &self.parts;
-        let on = [a.support(way, a.origin), b.support(-way, a.origin)];
+        let on = [a.support(way, a.origin()), b.support(-way, a.origin())];
         Corner { way: on[0] - on[1], on }
     }
 
     /// Separation of the parts; `None` farther than `reach_m` apart.
     pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Separation> {
-        let start = self.parts[0].origin - self.parts[1].origin;
+        match self.search(reach_m) {
+            Found::Apart(separation) => Some(separation),
+            Found::Far => None,
+            Found::Overlap => hull.way_out(self),
+        }
+    }
+
+    /// The same; `None` where they overlap, too.
+    pub fn parted(&self, reach_m: f64) -> Option<Separation> {
+        if let Found::Apart(separation) = self.search(reach_m) { Some(separation) } else { None }
+    }
+
+    fn search(&self, reach_m: f64) -> Found {
+        let start = self.parts[0].origin() - self.parts[1].origin();
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
         let mut best: Option<Separation> = None;
         for _ in 0..ROUNDS {
             let near = simplex.nearest();
             let distance = near.way.length();
             if simplex.holds_origin || distance <= TOUCHING_SHARE * simplex.size() {
-                return hull.way_out(self);
+                return Found::Overlap;
             }
             let normal = near.way / distance;
             let corner = self.support(-normal);
             let floor_m = corner.way.dot(normal);
             if floor_m > reach_m {
-                return None;
+                return Found::Far;
             }
             if best.is_none_or(|best| floor_m > best.gap_m) {
                 best = Some(Separation { normal, gap_m: floor_m, on: near.on });
@@ -115,7 +167,7 @@ impl<'a> Difference<'a> {
                 break;
             }
         }
-        best.filter(|best| best.gap_m.is_finite())
+        best.filter(|best| best.gap_m.is_finite()).map_or(Found::Far, Found::Apart)
     }
 }
 

@@ -6,7 +6,7 @@
 //! two coplanar triangles is not caught by their edge. What comes from behind a triangle does not touch it.
 
 use super::convex_convex::{ConvexScratch, SAME_SHARE, SINGLE_SHARE, clip, parts, pose};
-use super::gjk::{Difference, Part, Separation};
+use super::gjk::{Difference, Part, Rounded, Separation};
 use super::primitives::Block;
 use super::touch_key::{TouchKey, TouchKind};
 use crate::mesh_distance::MeshField;
@@ -79,10 +79,13 @@ impl PartOnTriangle<'_> {
         let Self { part, mesh, near, .. } = self;
         let [a, b, c] = near.map(|corner| corner.as_vec3());
         let shape = Triangle::new(a, b, c);
-        let triangle =
-            Part { number: 0, shape: &shape, corners: Some(*near), origin: part.origin, rotation: mesh.rotation };
+        let triangle = Part { number: 0, shape: &shape, origin: part.origin, rotation: mesh.rotation };
+        let corners = near.map(|corner| part.origin + mesh.rotation * corner);
         let ConvexScratch { hull, manifold } = scratch;
-        let Some(apart) = Difference::new(part, &triangle).apart(self.reach_m, hull) else { return };
+        let Some(apart) = Difference::new(part, &Rounded { corners, radii_m: [0.0; 3] }).apart(self.reach_m, hull)
+        else {
+            return;
+        };
         let Some(normal) = self.allowed(apart.normal) else { return };
         let turned = normal != apart.normal;
         let facing = Separation { normal, ..apart };

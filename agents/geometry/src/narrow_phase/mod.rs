@@ -19,6 +19,7 @@ mod self_chain;
 mod shape_cache;
 mod static_solid;
 mod surface;
+mod swept;
 #[cfg(test)]
 mod tests;
 mod touch_key;
@@ -36,6 +37,8 @@ pub use self_chain::{FacingPoints, PLACES, RestedChain, SegmentPairs};
 use shape_cache::ShapeCache;
 pub use static_solid::{StaticSolid, StaticSolidError};
 use surface::SurfaceScratch;
+use swept::SweptScratch;
+pub use swept::{SweptShape, first_touch};
 pub use touch_key::{KEY_STEPS, TouchKey, TouchKind};
 pub use voronoi_regions::VoronoiRegions;
 
@@ -44,6 +47,7 @@ pub use voronoi_regions::VoronoiRegions;
 pub struct NarrowPhaseScratch {
     known: ShapeCache,
     searches: Searches,
+    swept: SweptScratch,
 }
 
 /// The searches between kinds of pieces, with their storage.
@@ -67,7 +71,7 @@ pub fn touches(
     into: &mut Vec<Touch>,
 ) {
     into.clear();
-    let NarrowPhaseScratch { known, searches } = scratch;
+    let NarrowPhaseScratch { known, searches, .. } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
@@ -152,7 +156,7 @@ pub fn self_touches(
     into: &mut Vec<Touch>,
 ) {
     into.clear();
-    let NarrowPhaseScratch { known, searches } = scratch;
+    let NarrowPhaseScratch { known, searches, .. } = scratch;
     match (placed.view, rest) {
         (ShapePose::Chain { positions, radii_m }, RestShape::Chain(arc_m)) => {
             let chain = RestedChain { positions, radii_m, arc_m };
@@ -196,7 +200,7 @@ pub fn gap(
     reach_m: f64,
     scratch: &mut NarrowPhaseScratch,
 ) -> Option<(DVec3, f64)> {
-    let NarrowPhaseScratch { known, searches } = scratch;
+    let NarrowPhaseScratch { known, searches, .. } = scratch;
     known.prepare(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;

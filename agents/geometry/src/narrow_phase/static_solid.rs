@@ -9,7 +9,8 @@
 
 use super::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
-use super::{NarrowPhaseScratch, finish, touches};
+use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
+use super::{NarrowPhaseScratch, SweptShape, finish, touches};
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape};
 use crate::{Touch, is_closed, mesh_triangles};
@@ -94,7 +95,6 @@ impl StaticSolid {
         into: &mut Vec<Touch>,
     ) {
         let is_rigid = matches!(body.form.kind, ShapeKind::Solid(_) | ShapeKind::Tool(_));
-        let is_plane = self.bounds == Aabb::everywhere();
         match &self.mesh {
             Some(mesh) => {
                 into.clear();
@@ -102,7 +102,7 @@ impl StaticSolid {
                 self.touch_mesh(mesh, body, reach_m, scratch, into);
                 finish(into);
             }
-            None if is_plane && is_rigid => {
+            None if self.is_plane() && is_rigid => {
                 into.clear();
                 scratch.known.prepare_pieces(body.form);
                 self.touch_slab(body, reach_m, scratch, into);
@@ -115,6 +115,78 @@ impl StaticSolid {
         }
     }
 
+    /// The share 0 … 1 of a body's motion at which it first comes within `reach_m` (metres, ≥ 0) of this, and its contacts at that moment, by
+    /// rising keys; `None` and no contacts where it does not ([`super::first_touch`]). Triangles of a mesh let through what comes from behind.
+    pub fn first_touch(
+        &self,
+        body: &SweptShape<'_>,
+        reach_m: f64,
+        scratch: &mut NarrowPhaseScratch,
+        into: &mut Vec<Touch>,
+    ) -> Option<f64> {
+        into.clear();
+        let mut swept = std::mem::take(&mut scratch.swept);
+        let share = self.first_share(body, reach_m, scratch, &mut swept);
+        let [storage, _] = &mut swept.placed;
+        if let Some(then) = share.and_then(|share| body.within(share, storage)) {
+            self.touches(&then, reach_m + 2.0 * NEAR_M, scratch, into);
+        }
+        scratch.swept = swept;
+        share
+    }
+
+    fn first_share(
+        &self,
+        body: &SweptShape<'_>,
+        reach_m: f64,
+        scratch: &mut NarrowPhaseScratch,
+        swept: &mut SweptScratch,
+    ) -> Option<f64> {
+        let plane = self.is_plane().then(|| Element::HalfSpace { point: self.position, up: self.rotation * DVec3::Z });
+        let field = self.mesh.as_ref().and_then(|mesh| mesh.field.mesh());
+        if plane.is_none() && field.is_none() {
+            let view = ShapePose::Solid { position: self.position, rotation: self.rotation };
+            let placed = PlacedShape { form: &self.form, view };
+            return first_share(body, &SweptShape { start: placed, end: placed }, reach_m, &mut scratch.known, swept);
+        }
+        scratch.known.prepare_pieces(body.start.form);
+        let elements = Elements::of(body, &scratch.known)?;
+        let mut earliest: Option<f64> = None;
+        let mut meet = |number: usize, other: Element<'_>, face: DVec3| {
+            let pair = ElementPair { elements: [elements.element(number), other], reach_m, latest: earliest };
+            let meeting = pair.meeting(&mut swept.hull).filter(|meeting| meeting.normal.dot(face) >= 0.0);
+            earliest = meeting.map(|meeting| meeting.share).or(earliest);
+        };
+        for number in 0..elements.count() {
+            let around = elements.bounds(number).grown(reach_m + NEAR_M);
+            if !(around.low.is_finite() && around.high.is_finite()) {
+                continue;
+            }
+            if let Some(Element::HalfSpace { point, up }) = plane {
+                meet(number, Element::HalfSpace { point, up }, up);
+            } else if let Some(field) = field {
+                field.triangles_in(self.inward(around), |_, corners, face| {
+                    let start = corners.map(|corner| self.position + self.rotation * corner);
+                    let other = Element::Corners { start, ways: [DVec3::ZERO; 3], radii_m: [0.0; 3] };
+                    meet(number, other, self.rotation * face);
+                });
+            }
+        }
+        earliest
+    }
+
+    /// A box around a box of the world, in this solid's axes.
+    fn inward(&self, Aabb { low, high }: Aabb) -> Aabb {
+        let back = DMat3::from_quat(self.rotation.conjugate());
+        let (middle, half) = (back * ((low + high) * 0.5 - self.position), (high - low) * 0.5);
+        let half = back.x_axis.abs() * half.x + back.y_axis.abs() * half.y + back.z_axis.abs() * half.z;
+        Aabb { low: middle - half, high: middle + half }
+    }
+
+    const fn is_plane(&self) -> bool {
+        matches!(&self.form.kind, ShapeKind::Solid(SolidShape { solid: Solid::Plane, .. }))
+    }
+
     /// Adds the places of a rigid body on a plane: each of its pieces on a slab under it.
     fn touch_slab(
         &self,
@@ -123,7 +195,7 @@ impl StaticSolid {
         scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) {
-        let NarrowPhaseScratch { known, searches } = scratch;
+        let NarrowPhaseScratch { known, searches, .. } = scratch;
         for (number, piece) in Pieces::of(body, known).iter() {
             let body = match &body.form.kind {
                 ShapeKind::Solid(form) => Ball { centre: solid_centre(body), radius_m: form.radius_m },
@@ -161,7 +233,7 @@ impl StaticSolid {
     ) {
         let ShapeKind::Solid(form) = &self.form.kind else { return };
         let (Some(triangles), Some(field)) = (form.shape.as_trimesh(), mesh.field.mesh()) else { return };
-        let NarrowPhaseScratch { known, searches } = scratch;
+        let NarrowPhaseScratch { known, searches, .. } = scratch;
         let (origin, rotation) = (self.position, self.rotation);
         let placed = PlacedMesh { field, triangles, origin, rotation };
         let around = Ball { centre: origin + rotation * mesh.around.centre, ..mesh.around };

@@ -1,11 +1,13 @@
 //! Contacts between forms against brute force, closed forms and each other.
 
 mod blocks;
+mod pairs;
 mod promises;
 mod rounds;
 mod self_touches;
 mod static_solids;
 mod surfaces;
+mod swept;
 mod tubes;
 
 use super::*;

@@ -3,6 +3,8 @@
 //! In: a surface and a block that may touch. Out: touching places. Never here: round pieces, other surfaces.
 //! Theory: docs/theory/soft.md, eq. 15a.
 
+use super::super::convex_convex::parts;
+use super::super::gjk::{Convex, Difference, Rounded, Separation};
 use super::super::primitives::Block;
 use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN_SHARE};
@@ -10,7 +12,7 @@ use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, sha
 use crate::near_triangle;
 use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
-use crate::{Place, Touch};
+use crate::{Aabb, Place, Touch};
 use glam::DVec3;
 
 /// Deeper than this share of an edge a place is pushed out of the block by the shortest way.
@@ -24,8 +26,8 @@ const FLAT: f64 = 1.0 - 1e-9;
 /// Alternating projections between a triangle and a block: both are convex, so the two points approach each other.
 const PROJECTIONS: usize = 8;
 /// Limit of the cosine of a tool's normal with the skin's. A body that touches a skin from outside pushes it inwards. A tool that would
-/// push it aside or outwards has pierced it, and touches it no more until it is out again. At the edge of a box the cosine is 0.7, at a
-/// corner 0.6.
+/// push it aside or outwards has pierced it, and touches it no more until it is out again. Half way round the edge of a box the cosine with
+/// the nearer face is 0.7, at its corner 0.6.
 const PIERCED: f64 = -0.5;
 
 /// The point of a triangle that is nearest to a block.
@@ -129,6 +131,10 @@ impl SurfaceQuery<'_> {
             else {
                 continue;
             };
+            // a corner that is behind the face may have come past the skin's border, and not through it
+            if distance_m < 0.0 && !self.crosses([at, block.around.centre]) {
+                continue;
+            }
             let touch = signed_distance::Touch { normal: -local, distance_m };
             let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position: foot };
             let key = TouchKey::new(TouchKind::Triangle, [number, name]);
@@ -136,6 +142,19 @@ impl SurfaceQuery<'_> {
             any = true;
         }
         any
+    }
+
+    /// Whether a line crosses the skin.
+    fn crosses(&self, [from, to]: [DVec3; 2]) -> bool {
+        self.surface.triangles_in(Aabb::of(&[from, to])).any(|Triangle { corners, .. }| {
+            let [a, b, c] = corners;
+            let across = (b - a).cross(c - a);
+            let [before, after] = [from, to].map(|end| across.dot(end - a));
+            let cut = from.lerp(to, before / (before - after));
+            before * after <= 0.0
+                && before != after
+                && shares(cut, corners).is_some_and(|shares| shares.iter().all(|share| *share > -ROUNDING_SHARE))
+        })
     }
 
     /// The normal of a triangle towards a block: out of a closed skin, and of an open one on the side of the block's middle.
@@ -149,6 +168,9 @@ impl SurfaceQuery<'_> {
     fn project(&self, triangle: &Triangle, block: &Block<'_>, field: &Field) -> Option<Projected> {
         let corners = triangle.corners;
         let radius_m = self.surface.form.radius_m;
+        if let Some(projected) = self.nearest_of_hull(triangle, block) {
+            return Some(projected);
+        }
         let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
         let size_m = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
         let look_m = radius_m + self.reach_m + 2.0 * size_m;
@@ -164,6 +186,20 @@ impl SurfaceQuery<'_> {
         if touch.distance_m >= -BETTER_SHARE * self.surface.form.edge_m {
             touch.normal = block.rotation.conjugate() * -self.facing(corners, block)?;
         }
+        Some(Projected { point, touch, size_m })
+    }
+
+    /// The same for a block of hulls that the triangle is apart from.
+    fn nearest_of_hull(&self, triangle: &Triangle, block: &Block<'_>) -> Option<Projected> {
+        let look_m = self.surface.form.radius_m + self.reach_m;
+        let skin = Rounded { corners: triangle.corners, radii_m: [0.0; 3] };
+        let hulls = parts(block).filter(|part| part.shape.as_convex_polyhedron().is_some());
+        let nearest = hulls.filter_map(|part| Difference::new(&skin, &part).parted(look_m));
+        let Separation { normal, gap_m, on } = nearest.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;
+        let point = triangle.inside(skin.origin() + on[0])?;
+        let middle = (skin.corners[0] + skin.corners[1] + skin.corners[2]) / 3.0;
+        let size_m = skin.corners.iter().map(|corner| corner.distance(middle)).fold(0.0, f64::max);
+        let touch = signed_distance::Touch { normal: block.rotation.conjugate() * normal, distance_m: gap_m };
         Some(Projected { point, touch, size_m })
     }
 
@@ -187,10 +223,18 @@ impl SurfaceQuery<'_> {
         })
     }
 
-    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
+    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there: through every
+    /// triangle that meets there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
-        let inside = spot.shares[2] > 0.0;
-        let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
-        self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
+        let form = self.surface.form;
+        let meets = |triangle: &&[u32; 3]| {
+            let mut counting = spot.vertices.iter().zip(spot.shares).filter(|(_, share)| *share != 0.0);
+            counting.all(|(vertex, _)| triangle.contains(vertex))
+        };
+        let faces = form.triangles.iter().filter(meets).filter_map(|triangle| {
+            let [a, b, c] = self.surface.corners(*triangle);
+            (b - a).cross(c - a).try_normalize()
+        });
+        form.closed && faces.into_iter().all(|face| face.dot(normal) > PIERCED)
     }
 }
