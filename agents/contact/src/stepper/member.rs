@@ -9,7 +9,8 @@ use metachron_geometry::{ContactSide, Place, PlacedShape};
 
 /// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
 ///
-/// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was.
+/// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was,
+/// and so does a `begin` with no `end`. `keep` and `go_back` frame several steps that may have to be made again.
 pub trait ClusterMember {
     /// How it takes part.
     fn role(&self) -> Role;
@@ -50,6 +51,12 @@ pub trait ClusterMember {
         let _ = (v, h_s);
         0.0
     }
+
+    /// Keeps the present state, at the end of a step.
+    fn keep(&mut self);
+
+    /// Goes back to the state kept last.
+    fn go_back(&mut self);
 
     /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start.
     fn move_to(&mut self, v: &[DVec3], t_s: f64);

@@ -2,4 +2,5 @@
 
 mod bodies;
 mod scenes;
+mod stacks;
 mod table;
