@@ -2,14 +2,15 @@
 //!
 //! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
 
-use crate::cluster::{Block, Side};
+use crate::cluster::{Block, Response, Side};
 use glam::DVec3;
 use metachron_core::{Anchor, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape};
 
 /// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
 ///
-/// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was.
+/// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was,
+/// and so does a `begin` with no `end`. `keep` and `go_back` frame several steps that may have to be made again.
 pub trait ClusterMember: Send {
     /// How it takes part.
     fn role(&self) -> Role;
@@ -23,6 +24,11 @@ pub trait ClusterMember: Send {
     /// The lower half of A = M + h C + h² K of the step begun: symmetric and positive definite, kg or kg·m². Blocks that never move
     /// stand for themselves, and no side refers to them.
     fn blocks(&self) -> &[Block];
+
+    /// The factor of that matrix, where `begin` has made one.
+    fn response(&self) -> Option<&dyn Response> {
+        None
+    }
 
     /// The velocity of each block at the end of the step begun, if nothing touched the body.
     fn free(&self) -> &[DVec3];
@@ -50,6 +56,12 @@ pub trait ClusterMember: Send {
         let _ = (v, h_s);
         0.0
     }
+
+    /// Keeps the present state, at the end of a step.
+    fn keep(&mut self);
+
+    /// Goes back to the state kept last.
+    fn go_back(&mut self);
 
     /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start.
     fn move_to(&mut self, v: &[DVec3], t_s: f64);

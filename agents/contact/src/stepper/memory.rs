@@ -32,7 +32,7 @@ pub(super) struct Remembered {
 }
 
 /// One pair, with its places by rising keys.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(super) struct PairMemory {
     pub partner: Partner,
     /// Until when the two count as near.
@@ -42,10 +42,34 @@ pub(super) struct PairMemory {
     pub next: Vec<Remembered>,
 }
 
+impl Clone for PairMemory {
+    fn clone(&self) -> Self {
+        let Self { partner, near_until, places, next } = self;
+        Self { partner: *partner, near_until: *near_until, places: places.clone(), next: next.clone() }
+    }
+
+    // into storage that is there
+    fn clone_from(&mut self, from: &Self) {
+        (self.partner, self.near_until) = (from.partner, from.near_until);
+        self.places.clone_from(&from.places);
+        self.next.clone_from(&from.next);
+    }
+}
+
 /// All that one body remembers: pairs with higher numbers, static solids, itself.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct ContactMemory {
     pairs: Vec<PairMemory>,
+}
+
+impl Clone for ContactMemory {
+    fn clone(&self) -> Self {
+        Self { pairs: self.pairs.clone() }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.pairs.clone_from(&from.pairs);
+    }
 }
 
 impl ContactMemory {

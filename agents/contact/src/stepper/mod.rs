@@ -3,11 +3,12 @@
 //! In: members at one common time, the static solids, what members remember of each other. Out: members a macro step later.
 //! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 7.
 //!
-//! plan      how many steps each member makes within the macro step
+//! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
 //! search    places that may close, joints, springs
 //! solve     one problem for all; again with the places that bodies struck would pass
+//! divide    where the solution strains a member too far, all begins again in shorter steps, once
 //! end       members move; those whose step ends take its velocities
 
 mod blows;
@@ -35,6 +36,8 @@ use std::f64::consts::SQRT_2;
 const PARTS_MAX: u32 = 16;
 /// No macro step is cut shorter than this: clocks count nanoseconds.
 const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
+/// The most times as many steps that a member makes whose motion strains it too far.
+const DIVIDED_MAX: u32 = 16;
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each.
 const ROUNDS_MAX: u32 = 4;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
@@ -78,7 +81,11 @@ pub struct ClusterReport {
     pub factors: u32,
     /// Convex passes in all fine steps.
     pub passes: u32,
-    /// Fine steps whose solve came to no end.
+    /// Solves in all fine steps.
+    pub solves: u32,
+    /// Those of them that went the convex way.
+    pub convex: u32,
+    /// Those of them that came to no end.
     pub cut: u32,
     /// The deepest overlap seen, metres.
     pub depth_m: f64,
@@ -104,6 +111,10 @@ pub struct PairTotal {
 /// How far a member is in its own step (eq. 18–20).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
+    /// How many steps it makes in the macro step, where it bends.
+    parts: u32,
+    /// The length of the step that it has begun before all others do, seconds; 0 for none.
+    begun_s: f64,
     /// Fine steps within its own step, and how many of them have begun.
     share: u32,
     part: u32,
@@ -134,6 +145,15 @@ pub struct ClusterStepper {
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
+    /// What participants remembered when the macro step began.
+    kept: Vec<ContactMemory>,
+}
+
+/// Whether a macro step may be left to make it again in shorter steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MayDivide {
+    Once,
+    NoMore,
 }
 
 impl ClusterStepper {
@@ -145,6 +165,9 @@ impl ClusterStepper {
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
+    /// A member whose motion would strain it too far makes 2, 4 … 16 times as many steps: its free motion before the solve, and what the
+    /// solve makes of it once again after, from the start of the macro step.
+    ///
     /// # Errors
     /// [`StepError::Diverged`] where the state of a member stops being finite: those that had not ended their step are as they were.
     pub fn step(
@@ -153,38 +176,127 @@ impl ClusterStepper {
         all: &mut [Participant<'_>],
         dt: SimSpan,
     ) -> Result<ClusterReport, StepError> {
-        let parts = all.iter().map(|one| one.parts).max().unwrap_or(1);
-        let mut dt = dt;
-        let mut h_s = dt.as_secs_f64() / f64::from(parts);
         self.progress.resize_with(all.len(), Progress::default);
-        self.totals.clear();
-        let mut report = ClusterReport { fine_steps: parts, ..ClusterReport::default() };
-        self.start(all, parts);
-        self.begin(all, h_s, &mut report)?;
-        self.search.find(scene, all, &self.progress, h_s);
-        let mut rebounds = Rebounds { macro_s: dt.as_secs_f64(), step_s: h_s, is_even: parts == 1 };
-        if let Some(blow) = rebounds.first(&self.search, &self.progress).filter(|_| parts == 1) {
-            dt = SimSpan::from_secs_f64(blow).unwrap_or(dt).clamp(SHORTEST.min(dt), dt);
-            h_s = dt.as_secs_f64();
-            rebounds.step_s = h_s;
-            self.start(all, parts);
-            self.begin(all, h_s, &mut report)?;
-            self.search.find(scene, all, &self.progress, h_s);
+        self.progress.iter_mut().for_each(|state| state.work = 0.0);
+        let mut report = ClusterReport { dt, ..ClusterReport::default() };
+        self.foresee(all, dt.as_secs_f64(), &mut report)?;
+        let blow = self.first_blow(scene, all, dt.as_secs_f64(), &mut report)?;
+        if let Some(cut) = blow.and_then(SimSpan::from_secs_f64) {
+            report.dt = cut.clamp(SHORTEST.min(dt), dt);
+            self.foresee(all, report.dt.as_secs_f64(), &mut report)?;
         }
-        report.dt = dt;
+        self.keep(all);
+        let asked_s = dt.as_secs_f64();
+        if !self.advance(scene, all, asked_s, MayDivide::Once, &mut report)? {
+            self.go_back(all);
+            self.advance(scene, all, asked_s, MayDivide::NoMore, &mut report)?;
+        }
+        Ok(report)
+    }
+
+    /// Begins the first step of every member, in as many parts as its free motion needs.
+    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            let own_s = dt_s / f64::from(one.parts);
+            one.member.begin(own_s)?;
+            report.work += one.member.work();
+            let more = times(one.member.strain(one.member.free(), own_s));
+            state.parts = one.parts * more;
+            state.begun_s = if more == 1 { own_s } else { 0.0 };
+        }
+        Ok(())
+    }
+
+    /// When the first contact closes that rebounds, seconds from the start of a macro step that all members make in one piece.
+    fn first_blow(
+        &mut self,
+        scene: &ClusterScene,
+        all: &mut [Participant<'_>],
+        dt_s: f64,
+        report: &mut ClusterReport,
+    ) -> Result<Option<f64>, StepError> {
+        let springs_back = |one: &Participant<'_>| one.member.skin().is_some_and(|skin| skin.form.restitution > 0.0);
+        let any = scene.statics().iter().any(|solid| solid.form.restitution > 0.0) || all.iter().any(springs_back);
+        if !any || self.progress.iter().any(|state| state.parts > 1) {
+            return Ok(None);
+        }
+        self.progress.iter_mut().for_each(|state| (state.share, state.part) = (1, 0));
+        self.begin(all, dt_s, report)?;
+        self.search.find(scene, all, &self.progress, dt_s);
+        // the steps begun are still those that are made where nothing rebounds
+        self.progress.iter_mut().for_each(|state| state.begun_s = dt_s);
+        Ok(Rebounds { macro_s: dt_s, step_s: dt_s, is_even: true }.first(&self.search, &self.progress))
+    }
+
+    /// Makes all fine steps of a macro step; false where it was left because a member needs shorter steps.
+    fn advance(
+        &mut self,
+        scene: &ClusterScene,
+        all: &mut [Participant<'_>],
+        asked_s: f64,
+        may_divide: MayDivide,
+        report: &mut ClusterReport,
+    ) -> Result<bool, StepError> {
+        let dt = report.dt;
+        let bent = |one: &Participant<'_>| one.member.role() == Role::Deformable;
+        let parts = self.progress.iter().map(|state| state.parts).max().unwrap_or(1);
+        let h_s = dt.as_secs_f64() / f64::from(parts);
+        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+            let own = if bent(one) { state.parts } else { parts };
+            (state.share, state.part) = (parts / own, 0);
+            one.grips.clear();
+        }
+        self.totals.clear();
+        report.fine_steps = parts;
+        report.depth_m = 0.0;
+        let rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
         for fine in 0..parts {
-            if fine > 0 {
-                self.begin(all, h_s, &mut report)?;
-                self.search.find(scene, all, &self.progress, h_s);
-            }
+            self.begin(all, h_s, report)?;
+            self.search.find(scene, all, &self.progress, h_s);
             rebounds.choose(&mut self.search, &self.progress);
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(scene, all, h_s, &rebounds, &mut report)?;
+            self.solve(scene, all, h_s, &rebounds, report)?;
+            if may_divide == MayDivide::Once && self.divide(all, h_s) {
+                return Ok(false);
+            }
             self.remember(all, h_s, fine + 1 == parts, dt);
             self.end(all, h_s)?;
         }
-        Ok(report)
+        Ok(true)
+    }
+
+    /// Gives shorter steps to members that the solution strains too far; whether there are any.
+    fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
+        let mut any = false;
+        for (one, state) in all.iter().zip(&mut self.progress) {
+            let more = times(one.member.strain(&state.before, h_s * f64::from(state.part)));
+            // what its free motion asked for counts
+            let most = one.parts * DIVIDED_MAX;
+            if more > 1 && state.parts < most {
+                state.parts = (state.parts * more).min(most);
+                any = true;
+            }
+        }
+        any
+    }
+
+    /// Keeps what a macro step starts from.
+    fn keep(&mut self, all: &mut [Participant<'_>]) {
+        self.kept.resize_with(all.len(), ContactMemory::default);
+        for (one, kept) in all.iter_mut().zip(&mut self.kept) {
+            one.member.keep();
+            kept.clone_from(one.memory);
+        }
+    }
+
+    /// Goes back to the start of the macro step.
+    fn go_back(&mut self, all: &mut [Participant<'_>]) {
+        for ((one, kept), state) in all.iter_mut().zip(&self.kept).zip(&mut self.progress) {
+            one.member.go_back();
+            one.memory.clone_from(kept);
+            state.begun_s = 0.0;
+        }
     }
 
     /// What pairs gave each other in the last macro step, by participants and partners.
@@ -203,21 +315,17 @@ impl ClusterStepper {
         &self.search.near
     }
 
-    /// Starts a macro step of so many fine ones.
-    fn start(&mut self, all: &mut [Participant<'_>], parts: u32) {
-        for (one, state) in all.iter_mut().zip(&mut self.progress) {
-            (state.share, state.part, state.work) = (parts / one.parts, 0, 0.0);
-            one.grips.clear();
-        }
-    }
-
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 18).
     fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             if state.part == 0 {
-                one.member.begin(h_s * f64::from(state.share))?;
-                state.work += one.member.work();
-                report.work += one.member.work();
+                let own_s = h_s * f64::from(state.share);
+                if state.begun_s != own_s {
+                    one.member.begin(own_s)?;
+                    state.work += one.member.work();
+                    report.work += one.member.work();
+                }
+                state.begun_s = 0.0;
                 state.start(one.member.velocities(), one.member.free());
             }
             state.part += 1;
@@ -274,6 +382,7 @@ impl ClusterStepper {
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
             blocks: one.member.blocks(),
+            response: one.member.response(),
             free: &state.seen,
             share: f64::from(state.part),
         }));
@@ -284,6 +393,8 @@ impl ClusterStepper {
         let took = outcome.map_err(|error| refused(&error, h_s))?;
         report.factors += took.factors as u32;
         report.passes += took.passes as u32;
+        report.solves += 1;
+        report.convex += u32::from(took.passes > 0);
         report.cut += u32::from(took.cut);
         Ok(())
     }
@@ -441,6 +552,15 @@ impl Plan {
     pub fn parts_in(&self, role: Role, wanted_s: f64) -> u32 {
         if role == Role::Deformable { self.parts_of(wanted_s) } else { self.parts }
     }
+}
+
+/// How many times as many steps a member needs that this one strains so far, as a share of what it can take.
+fn times(strain: f64) -> u32 {
+    let mut times = 1;
+    while times < DIVIDED_MAX && strain > f64::from(times) {
+        times *= 2;
+    }
+    times
 }
 
 /// Adds a contact's impulse to the total of its pair.

@@ -18,12 +18,22 @@ pub(super) struct Unknowns {
     /// Velocity and spin at the end of the step without contact, and now.
     free: [DVec3; 2],
     now: [DVec3; 2],
+    kept: Option<Kept>,
+}
+
+/// A state to go back to.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    motion: Motion,
+    calm_s: f64,
+    at_rest: bool,
+    steps: u64,
 }
 
 impl Default for Unknowns {
     fn default() -> Self {
         let block = |at| Block { row: at, column: at, value: DMat3::IDENTITY };
-        Self { blocks: [block(0), block(1)], free: [DVec3::ZERO; 2], now: [DVec3::ZERO; 2] }
+        Self { blocks: [block(0), block(1)], free: [DVec3::ZERO; 2], now: [DVec3::ZERO; 2], kept: None }
     }
 }
 
@@ -48,7 +58,7 @@ impl ClusterMember for RigidBody {
         let mut flight = self.motion;
         flight.fly(&self.spread, self.gravity, h_s);
         let inertia = self.inertia();
-        let Unknowns { blocks, free, now } = &mut self.unknowns;
+        let Unknowns { blocks, free, now, .. } = &mut self.unknowns;
         *now = [self.motion.velocity, self.motion.spin(&self.spread)];
         *free = [flight.velocity, flight.spin(&self.spread)];
         blocks[0].value = DMat3::from_diagonal(DVec3::splat(self.spread.mass_kg));
@@ -91,6 +101,17 @@ impl ClusterMember for RigidBody {
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
         v[0].length() + v[1].length() * self.world.mover.radius_m
+    }
+
+    fn keep(&mut self) {
+        let Self { motion, calm_s, at_rest, steps, .. } = *self;
+        self.unknowns.kept = Some(Kept { motion, calm_s, at_rest, steps });
+    }
+
+    fn go_back(&mut self) {
+        let Some(Kept { motion, calm_s, at_rest, steps }) = self.unknowns.kept else { return };
+        (self.motion, self.calm_s, self.at_rest, self.steps) = (motion, calm_s, at_rest, steps);
+        self.world.moved();
     }
 
     fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {

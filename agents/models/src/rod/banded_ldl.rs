@@ -14,6 +14,7 @@ pub use inverse::InverseBlocks;
 use super::block::{Column, Matrix, Number, Symmetric, positive};
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
+use metachron_contact::cluster::Response;
 use wide::f64x2;
 
 /// One block row of the system's lower half.
@@ -133,6 +134,12 @@ impl<T: Number> Front<T> {
     #[inline(always)]
     fn pass(&mut self, changed: Matrix<T>, inverse: Symmetric<T>) {
         *self = Self { before: self.last, last: inverse, last_near: changed };
+    }
+}
+
+impl Response for Factor {
+    fn respond(&self, impulses: &mut [DVec3]) {
+        self.solve(impulses);
     }
 }
 

@@ -4,13 +4,15 @@
 //! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 7.
 
 use super::banded_ldl::Row;
+use super::rest::RestDetector;
+use super::state::RodState;
 use super::step::{Divergence, Setting, TURN_MAX_RAD};
 use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Side, SideTerm};
+use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
-use metachron_core::{Anchor, SimSpan, StepError};
+use metachron_core::{Anchor, SimSpan, SimTime, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// Its unknowns in a cluster: one for each slot.
@@ -22,6 +24,18 @@ pub(super) struct Unknowns {
     places: Vec<DVec3>,
     radii_m: Vec<f64>,
     quiet_before: bool,
+    kept: Kept,
+}
+
+/// A state to go back to.
+#[derive(Debug, Clone, Default)]
+struct Kept {
+    now: RodState,
+    rest: RestDetector,
+    time: SimTime,
+    quiet_before: bool,
+    at_rest: bool,
+    steps: u64,
 }
 
 impl Tube {
@@ -76,6 +90,10 @@ impl ClusterMember for Tube {
         &self.unknowns.blocks
     }
 
+    fn response(&self) -> Option<&dyn Response> {
+        Some(self.stepper.factor())
+    }
+
     fn free(&self) -> &[DVec3] {
         &self.unknowns.free
     }
@@ -116,6 +134,22 @@ impl ClusterMember for Tube {
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
         spins * h_s / TURN_MAX_RAD
+    }
+
+    fn keep(&mut self) {
+        let Self { now, rest, time, at_rest, steps, unknowns, .. } = self;
+        let kept = &mut unknowns.kept;
+        kept.now.copy_from(now);
+        kept.rest.copy_from(rest);
+        (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
+    }
+
+    fn go_back(&mut self) {
+        let Self { now, rest, time, at_rest, steps, unknowns, .. } = self;
+        let kept = &unknowns.kept;
+        now.copy_from(&kept.now);
+        rest.copy_from(&kept.rest);
+        (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {

@@ -14,6 +14,12 @@ pub struct RestDetector {
 }
 
 impl RestDetector {
+    /// Becomes equal to another, in the storage that is there.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.quiet_s = other.quiet_s;
+        self.before.clone_from(&other.before);
+    }
+
     /// Restarts the count.
     pub fn wake(&mut self) {
         self.quiet_s = 0.0;

@@ -49,7 +49,7 @@ pub struct Tube {
     pub(super) ties: Vec<Tie>,
     pub(super) ties_before: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
-    rest: RestDetector,
+    pub(super) rest: RestDetector,
     pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
     /// Acceleration of the centre of mass in the last step, without what others gave at its start, m/s².

@@ -46,7 +46,7 @@ impl ImpulseResponse for SoftInertia {
 
     fn respond(&self, impulses: &mut [DVec3], supported: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        self.standing.factor().filter(|_| supported).unwrap_or(&self.factor).respond(impulses);
+        self.standing.factor().filter(|_| supported).unwrap_or(&self.factor).respond_at(impulses);
     }
 
     fn append_mobilities(&self, into: &mut Vec<f64>) {

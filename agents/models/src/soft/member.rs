@@ -7,7 +7,7 @@ use super::body::SoftBody;
 use super::step::EDGE_CHANGE_MAX;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
-use metachron_contact::cluster::{Block, Side, SideTerm};
+use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
@@ -19,6 +19,17 @@ pub(super) struct Unknowns {
     now: Vec<DVec3>,
     /// Positions at the start of the step begun, of all vertices.
     start: Vec<DVec3>,
+    kept: Kept,
+}
+
+/// A state to go back to.
+#[derive(Debug, Clone, Default)]
+struct Kept {
+    positions: Vec<DVec3>,
+    velocities: Vec<DVec3>,
+    quiet_s: f64,
+    at_rest: bool,
+    steps: u64,
 }
 
 impl SoftBody {
@@ -71,6 +82,10 @@ impl ClusterMember for SoftBody {
         self.system.blocks()
     }
 
+    fn response(&self) -> Option<&dyn Response> {
+        Some(self.system.answer())
+    }
+
     fn free(&self) -> &[DVec3] {
         &self.unknowns.free
     }
@@ -100,6 +115,20 @@ impl ClusterMember for SoftBody {
         let rows = self.system.rows();
         let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);
         self.mesh.edge_change(of, h_s) / EDGE_CHANGE_MAX
+    }
+
+    fn keep(&mut self) {
+        let kept = &mut self.unknowns.kept;
+        kept.positions.clone_from(&self.positions);
+        kept.velocities.clone_from(&self.velocities);
+        (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
+    }
+
+    fn go_back(&mut self) {
+        let kept = &self.unknowns.kept;
+        self.positions.clone_from(&kept.positions);
+        self.velocities.clone_from(&kept.velocities);
+        (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {

@@ -107,11 +107,11 @@ impl SoftBody {
                 *sum *= past.clamp(0.0, 1.0);
                 *given -= *sum;
             }
-            answer.respond(sums);
+            answer.respond_at(sums);
             if borne {
                 press(footing.stance.on_others(), sums, given);
             }
-            answer.respond(carried);
+            answer.respond_at(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
             positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);
         }

@@ -3,7 +3,7 @@
 //! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::Block;
+use metachron_contact::cluster::{Block, Response};
 use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
@@ -105,7 +105,7 @@ impl System {
 
     /// Replaces impulses, one for each vertex (N·s), by the velocities they cause (m/s) by the factor (eq. 2).
     pub fn respond(&self, impulses: &mut [DVec3]) {
-        self.matrix.respond(impulses);
+        self.matrix.respond_at(impulses);
     }
 
     /// The scale of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
@@ -131,6 +131,13 @@ impl System {
     }
 }
 
+impl Response for Factor {
+    /// One impulse for each moving vertex.
+    fn respond(&self, impulses: &mut [DVec3]) {
+        self.matrix.solve_vectors(impulses);
+    }
+}
+
 impl Factor {
     /// Number of vertices; zero before the first step.
     pub const fn vertices(&self) -> usize {
@@ -144,7 +151,7 @@ impl Factor {
     }
 
     /// A⁻¹ on impulses, one for each vertex; held vertices stay still.
-    pub fn respond(&self, impulses: &mut [DVec3]) {
+    pub fn respond_at(&self, impulses: &mut [DVec3]) {
         let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
         rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);
         self.matrix.solve_vectors(&mut impulses[..self.matrix.rows() / 3]);

@@ -32,6 +32,13 @@ pub fn solid(middle: DVec3, size_m: DVec3, segments: [u32; 3], young_pa: f64) ->
     soft(SoftShape::Box { size_m, segments }, middle - size_m * 0.5, young_pa)
 }
 
+/// The same, turned about z.
+pub fn turned(middle: DVec3, spec: SoftSpec, yaw_rad: f64) -> Placed {
+    let rotation = DQuat::from_rotation_z(yaw_rad);
+    let position = middle + rotation * (spec.position - middle);
+    placed(SoftBody::new(SoftSpec { position, rotation, ..spec }).unwrap(), false)
+}
+
 pub fn cube(middle: DVec3, size_m: f64) -> Placed {
     placed(SoftBody::new(solid(middle, DVec3::splat(size_m), [3; 3], 1e5)).unwrap(), false)
 }
@@ -42,10 +49,13 @@ pub fn slab(held: bool, young_pa: f64) -> Placed {
     placed(SoftBody::new(SoftSpec { held: sides, ..spec }).unwrap(), held)
 }
 
-pub fn cloth(middle: DVec3, size_m: f64, segments: u32) -> Placed {
+pub fn sheet(middle: DVec3, size_m: f64, segments: u32) -> SoftSpec {
     let shape = SoftShape::Sheet { size_m: [size_m; 2], thickness_m: 0.004, segments: [segments; 2] };
-    let corner = middle - DVec3::new(0.5 * size_m, 0.5 * size_m, 0.0);
-    placed(SoftBody::new(soft(shape, corner, 1e6)).unwrap(), false)
+    soft(shape, middle - DVec3::new(0.5 * size_m, 0.5 * size_m, 0.0), 1e6)
+}
+
+pub fn cloth(middle: DVec3, size_m: f64, segments: u32) -> Placed {
+    placed(SoftBody::new(sheet(middle, size_m, segments)).unwrap(), false)
 }
 
 pub fn rope(middle: DVec3, half: DVec3, radius_m: f64, young_pa: f64) -> Placed {

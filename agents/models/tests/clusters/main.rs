@@ -3,4 +3,5 @@
 mod bodies;
 mod rebounds;
 mod scenes;
+mod stacks;
 mod table;

@@ -259,7 +259,13 @@ fn zz_survey() {
         let solution = solved(&case, Settings::default());
         factors += solution.report.factors;
         if solution.report.cut {
-            cut.push((seed, case.contacts.len(), case.bodies.len(), solution.report.residual_m_s, solution.report.factors));
+            cut.push((
+                seed,
+                case.contacts.len(),
+                case.bodies.len(),
+                solution.report.residual_m_s,
+                solution.report.factors,
+            ));
         } else if miss(&case, &solution) > 2e-4 {
             beyond.push((seed, miss(&case, &solution)));
         }
