@@ -6,33 +6,43 @@
 //! plan      how many steps each member makes within the macro step
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close, joints, springs
-//! solve     one problem for all
+//! search    places that may close
+//! tie       springs, links, joints
+//! solve     one problem for all, again until joints hold where bodies will be
 //! end       members move; those whose step ends take its velocities
 
+mod joints;
+mod links;
 mod member;
 mod memory;
 mod scene;
 mod search;
 mod springs;
+mod ties;
 
 use crate::StepContext;
 use crate::cluster::{Member, Problem, ProblemError, Settings, Solver};
 use crate::law::Law;
 use glam::DVec3;
-pub use member::{ClusterMember, MaterialPoint, Role};
+use joints::Joints;
+pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
 pub use scene::ClusterScene;
 use search::Search;
-use springs::Springs;
+use springs::Moment;
 use std::f64::consts::SQRT_2;
+use ties::Ties;
 
 /// The most steps that a member makes within a macro step.
 const PARTS_MAX: u32 = 16;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
 const PART_S: f64 = 0.2;
+
+/// Solves of a fine step until joints hold, and the share of the depth of contacts to which they do, in metres and radians.
+const JOINT_SOLVES: u32 = 6;
+const JOINT_SHARE: f64 = 0.25;
 
 /// A body in its cluster's step.
 pub struct Participant<'a> {
@@ -52,8 +62,9 @@ pub struct Participant<'a> {
 
 impl Participant<'_> {
     /// Whether it touches `other` where the two meet.
-    fn may_touch(&self, other: AgentId) -> bool {
-        !self.context.neighbours.iter().any(|n| n.id == other && n.law == Law::Off)
+    fn may_touch(&self, other: &Self) -> bool {
+        let off = self.context.neighbours.iter().any(|n| n.id == other.id && n.law == Law::Off);
+        !(off || self.member.spares(other.id) || other.member.spares(self.id))
     }
 }
 
@@ -114,21 +125,37 @@ pub(crate) struct Progress {
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
-#[derive(Default)]
 pub struct ClusterStepper {
+    depth_m: f64,
     solver: Solver,
     search: Search,
-    springs: Springs,
+    ties: Ties,
+    joints: Joints,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
+}
+
+impl Default for ClusterStepper {
+    fn default() -> Self {
+        Self::new(Settings::default().depth_m)
+    }
 }
 
 impl ClusterStepper {
     /// A stepper whose contacts rest `depth_m` metres deep.
     #[must_use]
     pub fn new(depth_m: f64) -> Self {
-        Self { solver: Solver::new(Settings { depth_m, ..Settings::default() }), ..Self::default() }
+        Self {
+            depth_m,
+            solver: Solver::new(Settings { depth_m, ..Settings::default() }),
+            search: Search::default(),
+            ties: Ties::default(),
+            joints: Joints::default(),
+            progress: Vec::new(),
+            members: Vec::new(),
+            totals: Vec::new(),
+        }
     }
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
@@ -147,13 +174,14 @@ impl ClusterStepper {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             (state.share, state.part) = (parts / one.parts, 0);
             one.grips.clear();
+            one.member.look(&one.context, dt.as_secs_f64());
         }
         self.totals.clear();
         let mut report = ClusterReport { fine_steps: parts, ..ClusterReport::default() };
         for fine in 0..parts {
             self.begin(all, h_s, &mut report)?;
             self.search.find(scene, all, &self.progress, h_s);
-            self.springs.gather(all, h_s, f64::from(fine) * h_s);
+            self.tie(scene, all, Moment { h_s, after_s: f64::from(fine) * h_s });
             self.recall(all, h_s);
             self.solve(all, h_s, scene.gravity_m_s2 * dt.as_secs_f64(), &mut report)?;
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -186,6 +214,15 @@ impl ClusterStepper {
         Ok(())
     }
 
+    /// Lays out springs, links and joints.
+    fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], moment: Moment) {
+        let Self { ties, joints, progress, .. } = self;
+        ties.clear();
+        ties.gather_springs(all, moment);
+        ties.gather_links(all, moment);
+        joints.gather(scene, all, progress, ties, moment.h_s);
+    }
+
     /// Starts every contact from what the last step gave.
     fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
@@ -202,18 +239,45 @@ impl ClusterStepper {
         rebound_from_m_s: f64,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, springs, progress, members, .. } = self;
+        let Self { solver, search, ties, joints, progress, members, depth_m, .. } = self;
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
             blocks: one.member.blocks(),
             free: &state.seen,
             share: f64::from(state.part),
         }));
-        let problem =
-            Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s };
-        let outcome = solver.solve(&problem);
+        let (mut outcome, mut last_miss) = (Ok(()), f64::INFINITY);
+        for _ in 0..JOINT_SOLVES {
+            let problem =
+                Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, rebound_from_m_s };
+            let solution = match solver.solve(&problem) {
+                Ok(solution) => solution,
+                Err(error) => {
+                    outcome = Err(refused(&error, h_s));
+                    break;
+                }
+            };
+            report.factors += solution.report.factors as u32;
+            report.passes += solution.report.passes as u32;
+            let miss = joints.aim(all, ties, |member| solution.velocities(member), h_s);
+            if std::env::var("DBG").is_ok() {
+                eprintln!("miss {miss:e} {:?}", solution.report);
+            }
+            if miss < JOINT_SHARE * *depth_m || miss > last_miss {
+                break;
+            }
+            last_miss = miss;
+            // the next solve starts from this one
+            search
+                .contacts
+                .iter_mut()
+                .zip(&solution.contacts_n_s)
+                .for_each(|(contact, given)| contact.warm_n_s = *given);
+            ties.rows.iter_mut().zip(&solution.rows_n_s).for_each(|(row, given)| row.warm_n_s = *given);
+        }
         *members = emptied(list);
-        let solution = outcome.map_err(|error| refused(&error, h_s))?;
+        outcome?;
+        let solution = solver.solution();
         for (member, state) in progress.iter_mut().enumerate() {
             state.take(solution.velocities(member));
         }
@@ -222,13 +286,11 @@ impl ClusterStepper {
             progress[owner.member].touched = true;
             owner.other.into_iter().for_each(|other| progress[other].touched = true);
         }
-        for row in &springs.rows {
-            let moving = row.sides.iter().filter(|side| !side.terms().is_empty());
-            moving.for_each(|side| progress[side.member].touched = true);
+        for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| pushed(impulse)) {
+            progress[owner.member].touched = true;
+            owner.other.into_iter().for_each(|other| progress[other].touched = true);
         }
         report.contacts = search.contacts.len() as u32;
-        report.factors += solution.report.factors as u32;
-        report.passes += solution.report.passes as u32;
         report.cut += u32::from(solution.report.cut);
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
         Ok(())
@@ -236,7 +298,7 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, springs, .. } = self;
+        let Self { solver, search, ties, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -247,8 +309,8 @@ impl ClusterStepper {
                 add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);
             }
         }
-        for (owner, impulse) in springs.owners.iter().zip(&solution.rows_n_s) {
-            let place = Remembered { key: 0, force_n: *impulse / h_s, owed_slip_m: DVec3::ZERO };
+        for (owner, impulse) in ties.owners.iter().zip(&solution.rows_n_s) {
+            let place = Remembered { key: owner.key, force_n: *impulse / h_s, owed_slip_m: DVec3::ZERO };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         let part = SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
@@ -260,7 +322,7 @@ impl ClusterStepper {
         for (member, one) in all.iter_mut().enumerate() {
             one.memory.turn(one.context.time + dt);
             if last {
-                springs.grips(member, &solution.rows_n_s, h_s, one.grips);
+                ties.grips(member, &solution.rows_n_s, h_s, one.grips);
             }
         }
     }

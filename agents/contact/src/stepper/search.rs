@@ -70,7 +70,7 @@ impl Search {
         self.find_pairs(h_s);
         let near = std::mem::take(&mut self.near);
         for &[a, b] in &near {
-            self.find_between(all, progress, [a, b], h_s);
+            self.find_between(scene, all, progress, [a, b], h_s);
         }
         self.near = near;
         for member in 0..all.len() {
@@ -103,9 +103,16 @@ impl Search {
     }
 
     /// Places between two members.
-    fn find_between(&mut self, all: &[Participant<'_>], progress: &[Progress], [a, b]: [usize; 2], h_s: f64) {
+    fn find_between(
+        &mut self,
+        scene: &ClusterScene,
+        all: &[Participant<'_>],
+        progress: &[Progress],
+        [a, b]: [usize; 2],
+        h_s: f64,
+    ) {
         let (Some(here), Some(there)) = (all[a].member.skin(), all[b].member.skin()) else { return };
-        if !all[a].may_touch(all[b].id) {
+        if !all[a].may_touch(&all[b]) || scene.lets_through([all[a].id, all[b].id]) {
             return;
         }
         let reach_m = LOOK_M + (self.speed(a) + self.speed(b)) * h_s;
@@ -118,9 +125,10 @@ impl Search {
                 side(a, &touch.on_a, ContactSide::first(touch.normal)),
                 side(b, &touch.on_b, ContactSide::second(touch.normal)),
             ];
-            if closes(touch, &sides, progress, h_s) {
+            let led_m_s = [all[a].member.led_m_s(&touch.on_a), all[b].member.led_m_s(&touch.on_b)];
+            if closes(touch, &sides, led_m_s, progress, h_s) {
                 self.owners.push(Owner { member: a, partner, other: Some(b), key: touch.key });
-                self.contacts.push(contact(touch, sides, skins, progress));
+                self.contacts.push(contact(touch, sides, led_m_s, skins, progress));
             }
         }
     }
@@ -146,10 +154,11 @@ impl Search {
             for touch in &self.touches {
                 let place = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
                 let sides = [place.of_member(member), Side::FIXED];
-                if closes(touch, &sides, progress, h_s) {
+                let led_m_s = [all[member].member.led_m_s(&touch.on_a), DVec3::ZERO];
+                if closes(touch, &sides, led_m_s, progress, h_s) {
                     let partner = Partner::Static(number);
                     self.owners.push(Owner { member, partner, other: None, key: touch.key });
-                    self.contacts.push(contact(touch, sides, skins, progress));
+                    self.contacts.push(contact(touch, sides, led_m_s, skins, progress));
                 }
             }
         }
@@ -172,20 +181,28 @@ impl Search {
 
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
 /// lies on something that the ground stops would else not be seen.
-fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> bool {
+fn closes(touch: &Touch, sides: &[Side; 2], led_m_s: [DVec3; 2], progress: &[Progress], h_s: f64) -> bool {
     if sides.iter().all(|side| side.terms().is_empty()) {
         return false;
     }
+    let led = led_m_s.map(|led| led.dot(touch.normal));
     let along = |side: &Side, of: fn(&Progress) -> &[DVec3]| -> f64 {
         if side.terms().is_empty() { 0.0 } else { side.velocity(of(&progress[side.member])).dot(touch.normal) }
     };
     [(|p: &Progress| &p.before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.seen[..]].into_iter().any(|of| {
-        let (a, b) = (along(&sides[0], of), along(&sides[1], of));
+        let (a, b) = (along(&sides[0], of) + led[0], along(&sides[1], of) + led[1]);
         [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
     })
 }
 
-fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+fn contact(
+    touch: &Touch,
+    sides: [Side; 2],
+    led_m_s: [DVec3; 2],
+    skins: [&CollisionShape; 2],
+    progress: &[Progress],
+) -> Contact {
+    let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {
         key: touch.key,
@@ -196,8 +213,9 @@ fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progres
         // a pair takes the geometric mean of both frictions, and the larger restitution
         friction: (skins[0].friction * skins[1].friction).sqrt(),
         restitution: skins[0].restitution.max(skins[1].restitution),
-        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal),
-        surface_m_s: DVec3::ZERO,
+        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal)
+            + surface_m_s.dot(touch.normal),
+        surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
     }
