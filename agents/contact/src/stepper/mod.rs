@@ -260,9 +260,6 @@ impl ClusterStepper {
             report.factors += solution.report.factors as u32;
             report.passes += solution.report.passes as u32;
             let miss = joints.aim(all, ties, |member| solution.velocities(member), h_s);
-            if std::env::var("DBG").is_ok() {
-                eprintln!("miss {miss:e} {:?}", solution.report);
-            }
             if miss < JOINT_SHARE * *depth_m || miss > last_miss {
                 break;
             }

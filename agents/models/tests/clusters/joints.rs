@@ -87,9 +87,8 @@ fn a_rod_let_go_from_horizontal_keeps_its_energy_and_its_joint() {
         (worst, highest)
     };
     let ((coarse, _), (fine, highest)) = (error(60.0), error(240.0));
-    println!("{coarse:e} {fine:e} {highest:e}");
-    // of 4.9 J; second order
-    assert!(coarse < 0.05 && fine < 0.1 * coarse, "{coarse:e} J, {fine:e} J");
+    // of 4.9 J; second order: 1.6e-2 and 1.5e-3 in the middle of steps measured
+    assert!(coarse < 0.05 && fine < 0.15 * coarse, "{coarse:e} J, {fine:e} J");
     assert!(highest.abs() < 2e-3, "it comes back to {highest:e} m");
 }
 
@@ -132,7 +131,9 @@ fn a_chain_that_swings_a_weight_of_a_hundred_links_keeps_its_length() {
             factors += report.factors;
             cut += report.cut;
         }
-        println!("{ratio}: {worst:e} m, {factors} factors, {cut} cut, energy {} of {start}", table.energy_j());
+        // on its way down it has made nothing
+        assert!(table.energy_j() < start + 1e-3 * start.abs(), "{} J of {start}", table.energy_j());
+        assert!(factors < 1000, "{factors} factors");
         assert!(worst < 1e-5, "1 : {ratio}: a joint opened by {worst:e} m");
         assert_eq!(cut, 0);
     }
@@ -235,7 +236,6 @@ fn a_free_jointed_pair_keeps_its_momentum_and_stays_joined() {
         let after = momentum(&table);
         let wrong = [after.0.distance(before.0), after.1.distance(before.1)];
         // the two points of a joint are one to 5e-6 m, where impulses of some 0.01 N s act
-        println!("{kind:?} {wrong:?}");
         assert!(wrong[0] < 1e-12 && wrong[1] < 1e-4, "{kind:?}: {wrong:?}");
         let pose = |body: usize| {
             let RigidState { position, rotation, .. } = state(&table, body);

@@ -3,7 +3,6 @@
 use crate::bodies::{cube, rigid, tube};
 use crate::table::{GRAVITY, Placed, Table, placed, spring};
 use glam::DVec3;
-use metachron_contact::Agent;
 use metachron_core::{AgentId, Anchor};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
@@ -96,31 +95,33 @@ fn a_tube_hung_by_two_links_carries_its_weight() {
     assert!((borne.z - weight_n).abs() < 1e-3 * weight_n, "{borne}");
 }
 
-/// A heavy hook from which a soft cube hangs by a node, a tube from that, a ball from the tube.
+/// A heavy hook from which a soft cube hangs by a node, a tube from a node below, a ball of the cube's mass from the tube, all at rest
+/// and not yet stretched. They do not touch each other.
 fn hung(cube_hz: f64, others_hz: f64) -> Table {
-    let hook = free(ball(DVec3::new(0.0, 0.0, 1.0), 1e6, DVec3::ZERO));
+    let below = |z: f64| DVec3::new(0.0, 0.0, 1.0 - z);
     let mut table = Table::new(vec![
-        cube(DVec3::new(0.03, 0.03, 0.85), 0.06),
-        hook,
-        tube(DVec3::new(0.08, 0.0, 0.8), DVec3::new(0.08, 0.0, 0.0), 0.008),
-        free(ball(DVec3::new(0.16, 0.0, 0.75), 0.05, GRAVITY)),
+        cube(below(0.03) + DVec3::new(-0.01, -0.01, 0.0), 0.06),
+        free(ball(below(0.0), 1e6, DVec3::ZERO)),
+        tube(below(0.11), DVec3::Z * -0.05, 0.008),
+        free(ball(below(0.16), 0.216, GRAVITY)),
     ])
     .at_rates(cube_hz, others_hz);
-    let mut corner = |up: DVec3| {
-        let heights: Vec<f64> = (0..56).map(|vertex| table.place(0, Anchor::Vertex(vertex)).dot(up)).collect();
-        let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Anchor::Vertex(heights.iter().position(|height| *height == highest).unwrap() as u32)
+    table.touching = false;
+    let mut node = |z: f64| {
+        let at = |vertex: u32, table: &mut Table| table.place(0, Anchor::Vertex(vertex));
+        let vertex = (0..56).find(|&vertex| at(vertex, &mut table).distance(below(z)) < 1e-9);
+        Anchor::Vertex(vertex.unwrap())
     };
-    let (top, bottom) = (corner(DVec3::new(-1.0, -1.0, 1.0)), corner(-DVec3::ONE));
-    table.link([(0, top), (1, CENTRE)], spring(500.0, 0.0, 0.1));
-    table.link([(0, bottom), (2, Anchor::Arc(0.0))], spring(500.0, 0.0, 0.0));
-    table.link([(2, Anchor::Arc(0.16)), (3, CENTRE)], spring(500.0, 0.0, 0.05));
+    let (top, bottom) = (node(0.0), node(0.06));
+    let stiff = spring(2000.0, 0.0, 0.0);
+    table.link([(0, top), (1, CENTRE)], stiff);
+    table.link([(0, bottom), (2, Anchor::Arc(0.0))], stiff);
+    table.link([(2, Anchor::Arc(0.1)), (3, CENTRE)], stiff);
     table
 }
 
 /// The energy of a hung table with that of its springs.
 fn gained_j(table: &mut Table, seconds: f64) -> f64 {
-    let vertex = |table: &mut Table, body: usize, anchor: Anchor| table.place(body, anchor);
     let (mut least, mut gain) = (f64::INFINITY, 0.0_f64);
     while table.time.as_secs_f64() < seconds {
         table.step();
@@ -129,7 +130,7 @@ fn gained_j(table: &mut Table, seconds: f64) -> f64 {
             for link in table.bodies[body].links.clone() {
                 let other = link.other.0 as usize;
                 if body < other {
-                    let apart = vertex(table, body, link.here).distance(vertex(table, other, link.there));
+                    let apart = table.place(body, link.here).distance(table.place(other, link.there));
                     energy += 0.5 * link.stiffness_n_m * (apart - link.rest_m) * (apart - link.rest_m);
                 }
             }
@@ -142,10 +143,7 @@ fn gained_j(table: &mut Table, seconds: f64) -> f64 {
 
 #[test]
 fn links_at_unlike_steps_make_at_most_twice_what_they_make_at_equal_ones() {
-    let equal = gained_j(&mut hung(60.0, 60.0), 2.0);
-    for (cube_hz, others_hz) in [(60.0, 960.0), (960.0, 60.0)] {
-        let unlike = gained_j(&mut hung(cube_hz, others_hz), 2.0);
-        println!("{equal:e} {unlike:e}");
-        assert!(unlike < 2.0 * equal.max(1e-4), "{cube_hz} : {others_hz}: {unlike:e} J, {equal:e} at equal steps");
-    }
+    let [equal, unlike] = [60.0, 960.0].map(|others_hz| gained_j(&mut hung(60.0, others_hz), 2.0));
+    // measured: 1.2e-4 and 1.1e-4 J of the 9 mJ of its bouncing
+    assert!(unlike < 2.0 * equal && equal < 5e-4, "{unlike:e} J, {equal:e} J at equal steps");
 }

@@ -30,6 +30,8 @@ pub struct Placed {
 pub struct Table {
     pub bodies: Vec<Placed>,
     pub time: SimTime,
+    /// Whether bodies touch each other.
+    pub touching: bool,
     scene: ClusterScene,
     stepper: ClusterStepper,
     snapshot: Snapshot,
@@ -84,7 +86,8 @@ impl Table {
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles, GRAVITY).unwrap();
-        Self { bodies, time: SimTime::ZERO, scene, stepper: ClusterStepper::new(20e-6), snapshot: Snapshot::default() }
+        let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
+        Self { bodies, time: SimTime::ZERO, touching: true, scene, stepper, snapshot }
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
@@ -112,9 +115,9 @@ impl Table {
             let mut snapshot = Snapshot { time: self.time, ..Snapshot::default() };
             body.agent.write_snapshot(&mut snapshot);
             let seen = Neighbour::observed(AgentId(id), Arc::new(snapshot));
-            Neighbour { form: body.agent.form(), ..seen }
+            Neighbour { form: body.agent.form(), law: if self.touching { Law::Ledger } else { Law::Off }, ..seen }
         };
-        if self.bodies.iter().any(|body| body.agent.model() == "tool") {
+        if !self.touching || self.bodies.iter().any(|body| body.agent.model() == "tool") {
             (0..).zip(&self.bodies).map(of).collect()
         } else {
             vec![]
