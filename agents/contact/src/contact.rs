@@ -8,7 +8,7 @@ use metachron_core::ContactJacobian;
 pub const PUSH_OUT_SHARE: f64 = 0.2;
 
 /// The fastest push-out, m/s: a body found deep inside another comes out slowly instead of being shot out.
-const PUSH_OUT_MAX_M_S: f64 = 0.5;
+pub(crate) const PUSH_OUT_MAX_M_S: f64 = 0.5;
 
 /// The velocity by which an overlap, a gap below zero, is corrected over `span_s` seconds: below zero, m/s.
 pub(crate) fn push_out_m_s(gap_m: f64, span_s: f64) -> f64 {

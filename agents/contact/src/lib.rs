@@ -28,6 +28,7 @@ pub mod contact;
 pub mod crowd;
 pub mod delassus;
 pub mod exchange;
+pub mod joint;
 pub mod knock;
 pub mod lasting;
 pub mod law;

@@ -19,7 +19,7 @@ pub enum ProblemError {
         /// The speed given, m/s.
         rebound_from_m_s: f64,
     },
-    /// A member has no block, a share that is not above zero, or a number that is not finite.
+    /// A member has a block outside its matrix, a share that is not above zero, or a number that is not finite.
     Member {
         /// Its place in the problem.
         member: usize,

@@ -37,7 +37,7 @@ pub trait Response: fmt::Debug + Sync {
 pub struct Member<'a> {
     /// The lower half of A = M + h C + h² S: symmetric and positive definite; kg, or kg m² for spins.
     pub blocks: &'a [Block],
-    /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins.
+    /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that moves as it is told.
     pub free: &'a [DVec3],
     /// How much of its own step an impulse moves it by, in fine steps: f ≥ 1 where its step is longer than h, else 1.
     pub share: f64,

@@ -44,9 +44,6 @@ fn named(fault: Option<&'static str>, error: impl Fn(&'static str) -> ProblemErr
 
 fn member_fault(member: &Member<'_>) -> Option<&'static str> {
     let size = member.free.len();
-    if size == 0 {
-        return Some("it has no velocities");
-    }
     if !(member.share.is_finite() && member.share > 0.0) {
         return Some("its share must be finite and above zero");
     }

@@ -2,9 +2,10 @@
 //!
 //! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
 
+use crate::StepContext;
 use crate::cluster::{Block, Response, Side};
-use glam::DVec3;
-use metachron_core::{Anchor, StepError};
+use glam::{DQuat, DVec3};
+use metachron_core::{AgentId, Anchor, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape};
 
 /// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
@@ -14,6 +15,11 @@ use metachron_geometry::{ContactSide, Place, PlacedShape};
 pub trait ClusterMember: Send {
     /// How it takes part.
     fn role(&self) -> Role;
+
+    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: what leads it, what it may grasp.
+    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
+        let _ = (context, dt_s);
+    }
 
     /// Prepares a step of `h_s` seconds from its present state: its matrix A and the velocities at the step's end without contact.
     ///
@@ -42,8 +48,36 @@ pub trait ClusterMember: Send {
     /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
     fn side(&self, place: &Place, contact: ContactSide) -> Side;
 
+    /// The velocity of the point `place` of its skin in the step begun beyond that of its blocks, m/s: of a body that is led, all of it.
+    fn led_m_s(&self, place: &Place) -> DVec3 {
+        let _ = place;
+        DVec3::ZERO
+    }
+
     /// The material point `anchor`; `None` for one that the body does not have.
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint>;
+
+    /// Where it is once it has moved for `t_s` seconds with the velocities `v`; `None` for a body that does not move as a whole.
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let _ = (v, t_s);
+        None
+    }
+
+    /// The spring by which it follows what leads it; `None` for a body that nothing drives.
+    fn drive(&self) -> Option<Drive> {
+        None
+    }
+
+    /// Whether the springs of users lead it by its [`Self::drive`] instead of pulling at it.
+    fn is_led(&self) -> bool {
+        self.role() == Role::Kinematic
+    }
+
+    /// Whether it passes through `other` where the two meet, as jaws do through what they hold.
+    fn spares(&self, other: AgentId) -> bool {
+        let _ = other;
+        false
+    }
 
     /// The speed of its fastest point where its blocks have the velocities `v`, m/s.
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
@@ -103,4 +137,63 @@ pub struct MaterialPoint {
     pub position: DVec3,
     /// How it moves with the body's blocks.
     pub side: Side,
+    /// Its velocity beyond that, m/s: of a body that is led.
+    pub led_m_s: DVec3,
+}
+
+/// A body that moves as a whole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Its centre of mass, metres: the origin of [`Anchor::Local`].
+    pub centre_m: DVec3,
+    /// The origin of its shape's axes, metres.
+    pub origin_m: DVec3,
+    /// From its shape's axes to the world's.
+    pub rotation: DQuat,
+    /// How its spin follows from its blocks.
+    pub turns: Side,
+    /// Its spin beyond that, rad/s: of a body that is led.
+    pub led_rad_s: DVec3,
+}
+
+/// A spring between a point of a body and a place that is led, which gives no more than it can.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The point that is driven.
+    pub point: MaterialPoint,
+    /// Where it is led to when the step begins, metres.
+    pub target_m: DVec3,
+    /// How that moves within the step, m/s.
+    pub target_m_s: DVec3,
+    /// Stiffness, N/m, ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N s/m, ≥ 0; one of both above zero.
+    pub damping_n_s_m: f64,
+    /// The most force that it gives, N, ≥ 0.
+    pub limit_n: f64,
+}
+
+impl MaterialPoint {
+    /// A point that moves with its body's blocks alone.
+    #[must_use]
+    pub fn new(position: DVec3, side: Side) -> Self {
+        Self { position, side, led_m_s: DVec3::ZERO }
+    }
+
+    /// A point that no impulse moves.
+    #[must_use]
+    pub fn led(position: DVec3, led_m_s: DVec3) -> Self {
+        Self { position, side: Side::FIXED, led_m_s }
+    }
+}
+
+impl Pose {
+    /// What stands still, at the origin of the world.
+    pub const WORLD: Self = Self {
+        centre_m: DVec3::ZERO,
+        origin_m: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        turns: Side::FIXED,
+        led_rad_s: DVec3::ZERO,
+    };
 }

@@ -16,8 +16,14 @@ pub enum Partner {
     Static(u32),
     /// Another agent.
     Agent(AgentId),
-    /// The far end of a spring or joint, by the number of the spring among those of its body.
+    /// The far end of a spring of the user or of a grasp, by its number among those on its body.
     Tie(u32),
+    /// The far end of a link, by its number among those of its body.
+    Link(u32),
+    /// The far end of a joint, by its number in the scene.
+    Joint(u32),
+    /// What drives the body.
+    Drive,
 }
 
 /// What a contact or a joint hands to the next step.

@@ -6,31 +6,37 @@
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close, joints, springs
-//! solve     one problem for all; again with the places that bodies struck would pass
+//! search    places that may close
+//! tie       springs, links, joints
+//! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps, once
 //! end       members move; those whose step ends take its velocities
 
 mod blows;
+mod joints;
+mod links;
 mod member;
 mod memory;
 mod scene;
 mod search;
 mod springs;
+mod ties;
 
 use crate::StepContext;
 use crate::cluster::{Contact, Member, Problem, ProblemError, Settings, Solver};
 use crate::law::Law;
 use blows::Rebounds;
 use glam::DVec3;
-pub use member::{ClusterMember, MaterialPoint, Role};
+use joints::Joints;
+pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
 pub use scene::ClusterScene;
 use search::Search;
-use springs::Springs;
+use springs::Moment;
 use std::f64::consts::SQRT_2;
+use ties::{Ties, place_key};
 
 /// The most steps that a member makes within a macro step.
 const PARTS_MAX: u32 = 16;
@@ -38,10 +44,12 @@ const PARTS_MAX: u32 = 16;
 const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 16;
-/// The most solves of a fine step: what is struck reaches what it strikes one body further in each.
-const ROUNDS_MAX: u32 = 4;
+/// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
+const ROUNDS_MAX: u32 = 6;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
 const PART_S: f64 = 0.2;
+/// Joints hold to this share of the depth of contacts, in metres and radians.
+const JOINT_SHARE: f64 = 0.25;
 
 /// A body in its cluster's step.
 pub struct Participant<'a> {
@@ -62,9 +70,10 @@ pub struct Participant<'a> {
 }
 
 impl Participant<'_> {
-    /// Whether the cluster keeps it and `other` apart.
-    fn may_touch(&self, other: AgentId) -> bool {
-        self.laws.binary_search_by_key(&other, |(id, _)| *id).is_err()
+    /// Whether it touches `other` where the two meet.
+    fn may_touch(&self, other: &Self) -> bool {
+        let off = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).is_ok();
+        !(off || self.member.spares(other.id) || other.member.spares(self.id))
     }
 }
 
@@ -137,11 +146,12 @@ pub(crate) struct Progress {
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
-#[derive(Default)]
 pub struct ClusterStepper {
+    depth_m: f64,
     solver: Solver,
     search: Search,
-    springs: Springs,
+    ties: Ties,
+    joints: Joints,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
@@ -156,11 +166,27 @@ enum MayDivide {
     NoMore,
 }
 
+impl Default for ClusterStepper {
+    fn default() -> Self {
+        Self::new(Settings::default().depth_m)
+    }
+}
+
 impl ClusterStepper {
     /// A stepper whose contacts rest `depth_m` metres deep.
     #[must_use]
     pub fn new(depth_m: f64) -> Self {
-        Self { solver: Solver::new(Settings { depth_m, ..Settings::default() }), ..Self::default() }
+        Self {
+            depth_m,
+            solver: Solver::new(Settings { depth_m, ..Settings::default() }),
+            search: Search::default(),
+            ties: Ties::default(),
+            joints: Joints::default(),
+            progress: Vec::new(),
+            members: Vec::new(),
+            totals: Vec::new(),
+            kept: Vec::new(),
+        }
     }
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
@@ -198,6 +224,7 @@ impl ClusterStepper {
     fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             let own_s = dt_s / f64::from(one.parts);
+            one.member.look(&one.context, dt_s);
             one.member.begin(own_s)?;
             report.work += one.member.work();
             let more = times(one.member.strain(one.member.free(), own_s));
@@ -254,7 +281,7 @@ impl ClusterStepper {
             self.begin(all, h_s, report)?;
             self.search.find(scene, all, &self.progress, h_s);
             rebounds.choose(&mut self.search, &self.progress);
-            self.springs.gather(all, h_s, f64::from(fine) * h_s);
+            self.tie(scene, all, Moment { h_s, after_s: f64::from(fine) * h_s });
             self.recall(all, h_s);
             self.solve(scene, all, h_s, &rebounds, report)?;
             if may_divide == MayDivide::Once && self.divide(all, h_s) {
@@ -334,6 +361,15 @@ impl ClusterStepper {
         Ok(())
     }
 
+    /// Lays out springs, links and joints.
+    fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], moment: Moment) {
+        let Self { ties, joints, progress, .. } = self;
+        ties.clear();
+        ties.gather_springs(all, moment);
+        ties.gather_links(all, moment);
+        joints.gather(scene, all, progress, ties, moment.h_s);
+    }
+
     /// Starts every contact from what the last step gave.
     fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
@@ -353,22 +389,27 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         report.contacts = self.search.contacts.len() as u32;
-        if self.search.contacts.is_empty() && self.springs.rows.is_empty() {
+        if self.search.contacts.is_empty() && self.ties.rows.is_empty() {
             // what touches nothing moves as it would
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
+        let mut last_miss_m = f64::INFINITY;
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, report)?;
-            let Self { solver, search, springs, progress, .. } = &mut *self;
+            let Self { solver, search, ties, joints, progress, depth_m, .. } = &mut *self;
             let solution = solver.solution();
+            // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
                 contact.warm_n_s = *impulse;
             }
-            for (row, impulse) in springs.rows.iter_mut().zip(&solution.rows_n_s) {
+            for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            if round == ROUNDS_MAX || !search.add_passed(scene, all, progress, solution, h_s) {
+            let miss_m = joints.aim(all, ties, |member| solution.velocities(member), h_s);
+            let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
+            last_miss_m = miss_m;
+            if round == ROUNDS_MAX || !(search.add_passed(scene, all, progress, solution, h_s) || !joined) {
                 break;
             }
             rebounds.choose(search, progress);
@@ -378,7 +419,7 @@ impl ClusterStepper {
     }
 
     fn solve_once(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        let Self { solver, search, springs, progress, members, .. } = self;
+        let Self { solver, search, ties, progress, members, .. } = self;
         let mut list = emptied(std::mem::take(members));
         list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
             blocks: one.member.blocks(),
@@ -387,7 +428,7 @@ impl ClusterStepper {
             share: f64::from(state.part),
         }));
         let problem =
-            Problem { h_s, members: &list, contacts: &search.contacts, rows: &springs.rows, rebound_from_m_s: 0.0 };
+            Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, rebound_from_m_s: 0.0 };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = emptied(list);
         let took = outcome.map_err(|error| refused(&error, h_s))?;
@@ -401,7 +442,7 @@ impl ClusterStepper {
 
     /// Gives every member the impulses found.
     fn give(&mut self, report: &mut ClusterReport) {
-        let Self { solver, search, springs, progress, .. } = self;
+        let Self { solver, search, ties, progress, .. } = self;
         let solution = solver.solution();
         for (member, state) in progress.iter_mut().enumerate() {
             state.take(solution.velocities(member));
@@ -415,9 +456,9 @@ impl ClusterStepper {
                 owner.other.into_iter().for_each(|other| progress[other].touched = true);
             }
         }
-        for row in &springs.rows {
-            let moving = row.sides.iter().filter(|side| !side.terms().is_empty());
-            moving.for_each(|side| progress[side.member].touched = true);
+        for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| **impulse != DVec3::ZERO) {
+            progress[owner.member].touched = true;
+            owner.other.into_iter().for_each(|other| progress[other].touched = true);
         }
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
@@ -425,7 +466,7 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, springs, .. } = self;
+        let Self { solver, search, ties, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -436,8 +477,8 @@ impl ClusterStepper {
                 add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);
             }
         }
-        for (owner, impulse) in springs.owners.iter().zip(&solution.rows_n_s) {
-            let place = Remembered { force_n: *impulse / h_s, ..Remembered::default() };
+        for (owner, impulse) in ties.owners.iter().zip(&solution.rows_n_s) {
+            let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         let part = SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
@@ -449,7 +490,7 @@ impl ClusterStepper {
         for (member, one) in all.iter_mut().enumerate() {
             one.memory.turn(one.context.time + dt);
             if last {
-                springs.grips(member, &solution.rows_n_s, h_s, one.grips);
+                ties.grips(member, &solution.rows_n_s, h_s, one.grips);
             }
         }
     }

@@ -1,14 +1,22 @@
-//! What never changes around all clusters of a scene: static solids.
+//! What never changes around all clusters of a scene: static solids and joints.
 //!
-//! In: the obstacles of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
+//! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
 
+use crate::joint::{Joint, JointError};
+use metachron_core::AgentId;
 use metachron_geometry::Obstacle;
 use metachron_geometry::narrow_phase::{StaticSolid, StaticSolidError};
+use std::sync::Arc;
 
 /// The surroundings that all clusters of a scene share.
 #[derive(Debug, Default)]
 pub struct ClusterScene {
     statics: Vec<StaticSolid>,
+    joints: Arc<[Joint]>,
+    /// Numbers of joints, by their first bodies and then by themselves.
+    by_body: Vec<u32>,
+    /// Pairs of jointed bodies that do not collide, the lower number first, sorted.
+    apart: Vec<[AgentId; 2]>,
 }
 
 impl ClusterScene {
@@ -18,7 +26,35 @@ impl ClusterScene {
     /// [`StaticSolidError`] for an invalid solid.
     pub fn new(obstacles: &[Obstacle]) -> Result<Self, StaticSolidError> {
         let statics = obstacles.iter().map(StaticSolid::new).collect::<Result<_, _>>()?;
-        Ok(Self { statics })
+        Ok(Self { statics, ..Self::default() })
+    }
+
+    /// The same with `joints` between rigid bodies.
+    ///
+    /// # Errors
+    /// [`JointError`] for a number outside its range.
+    pub fn jointed(self, joints: Arc<[Joint]>) -> Result<Self, JointError> {
+        joints.iter().try_for_each(Joint::check)?;
+        let mut by_body: Vec<u32> = (0..).zip(joints.iter()).map(|(number, _)| number).collect();
+        by_body.sort_by_key(|&number| joints[number as usize].a);
+        let passing = joints.iter().filter(|joint| !joint.collide);
+        let pairs = passing.filter_map(|joint| joint.b.map(|b| [joint.a.min(b), joint.a.max(b)]));
+        let mut apart: Vec<_> = pairs.collect();
+        apart.sort_unstable();
+        apart.dedup();
+        Ok(Self { joints, by_body, apart, ..self })
+    }
+
+    /// The joints whose first body is `id`, with their numbers.
+    pub fn joints_of(&self, id: AgentId) -> impl Iterator<Item = (u32, &Joint)> {
+        let first = self.by_body.partition_point(|&number| self.joints[number as usize].a < id);
+        let joints = self.by_body[first..].iter().map(|&number| (number, &self.joints[number as usize]));
+        joints.take_while(move |(_, joint)| joint.a == id)
+    }
+
+    /// Whether two jointed bodies pass through each other; the lower number first.
+    pub fn lets_through(&self, pair: [AgentId; 2]) -> bool {
+        self.apart.binary_search(&pair).is_ok()
     }
 
     /// The static solids, by their numbers.

@@ -71,6 +71,13 @@ pub(super) struct Search {
     scratch: NarrowPhaseScratch,
 }
 
+/// The two sides of a touch.
+struct Facing {
+    sides: [Side; 2],
+    /// The velocity of each side that it is led by, beyond that of its blocks, m/s.
+    led_m_s: [DVec3; 2],
+}
+
 /// A member and its partner that were looked at.
 #[derive(Debug, Clone, Copy)]
 struct Look {
@@ -175,9 +182,9 @@ impl Search {
 
     /// Places between two members.
     fn find_between(&mut self, round: &Round<'_, '_>, [a, b]: [usize; 2]) {
-        let Round { all, h_s, .. } = *round;
+        let Round { scene, all, h_s, .. } = *round;
         let (Some(here), Some(there)) = (all[a].member.skin(), all[b].member.skin()) else { return };
-        if !all[a].may_touch(all[b].id) {
+        if !all[a].may_touch(&all[b]) || scene.lets_through([all[a].id, all[b].id]) {
             return;
         }
         let partner = Partner::Agent(all[b].id);
@@ -190,16 +197,19 @@ impl Search {
         let side = |member: usize, place: &Place, contact: ContactSide| {
             all[member].member.side(place, contact).of_member(member)
         };
-        let sides = |touch: &Touch| {
+        let facing = |touch: &Touch| {
             let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
-            [side(a, &touch.on_a, first), side(b, &touch.on_b, second)]
+            Facing {
+                sides: [side(a, &touch.on_a, first), side(b, &touch.on_b, second)],
+                led_m_s: [all[a].member.led_m_s(&touch.on_a), all[b].member.led_m_s(&touch.on_b)],
+            }
         };
         self.take(
             round,
             Owner { member: a, partner, other: Some(b), key: TouchKey::default() },
             [here.form, there.form],
             reach_m,
-            sides,
+            facing,
         );
     }
 
@@ -217,16 +227,17 @@ impl Search {
                 continue;
             }
             solid.touches(&skin, reach_m, &mut self.scratch, &mut self.touches);
-            let sides = |touch: &Touch| {
+            let facing = |touch: &Touch| {
                 let side = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
-                [side.of_member(member), Side::FIXED]
+                let led_m_s = [all[member].member.led_m_s(&touch.on_a), DVec3::ZERO];
+                Facing { sides: [side.of_member(member), Side::FIXED], led_m_s }
             };
             self.take(
                 round,
                 Owner { member, partner, other: None, key: TouchKey::default() },
                 [skin.form, &solid.form],
                 reach_m,
-                sides,
+                facing,
             );
         }
     }
@@ -238,25 +249,25 @@ impl Search {
         owner: Owner,
         skins: [&CollisionShape; 2],
         reach_m: f64,
-        sides: impl Fn(&Touch) -> [Side; 2],
+        facing: impl Fn(&Touch) -> Facing,
     ) {
         let Self { contacts, owners, touches, looks, known, .. } = self;
         let mut clear_m = reach_m;
         for touch in touches.iter() {
-            let (owner, sides) = (Owner { key: touch.key, ..owner }, sides(touch));
-            if sides.iter().all(|side| side.terms().is_empty()) {
+            let (owner, facing) = (Owner { key: touch.key, ..owner }, facing(touch));
+            if facing.sides.iter().all(|side| side.terms().is_empty()) {
                 continue;
             }
             let taken = match round.judge {
-                Judge::Foreseen => closes(touch, &sides, round.progress, round.h_s),
+                Judge::Foreseen => closes(touch, &facing, round.progress, round.h_s),
                 Judge::Solved(solved) => {
                     let known = owners[..*known].binary_search_by_key(&owner.name(), Owner::name).is_ok();
-                    !known && touch.gap_m + opening_m_s(touch, &sides, solved) * round.h_s < 0.0
+                    !known && touch.gap_m + opening_m_s(touch, &facing, solved) * round.h_s < 0.0
                 }
             };
             if taken {
                 owners.push(owner);
-                contacts.push(contact(touch, sides, skins, round.progress));
+                contacts.push(contact(touch, &facing, skins, round.progress));
             } else {
                 clear_m = clear_m.min(touch.gap_m);
             }
@@ -310,25 +321,30 @@ fn find_pairs(boxes: &[Reach], after_s: f64, near: &mut Vec<[usize; 2]>) {
 
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
 /// lies on something that the ground stops would else not be seen.
-fn closes(touch: &Touch, sides: &[Side; 2], progress: &[Progress], h_s: f64) -> bool {
+fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bool {
+    let led = facing.led_m_s.map(|led| led.dot(touch.normal));
     let along = |side: &Side, of: fn(&Progress) -> &[DVec3]| -> f64 {
         if side.terms().is_empty() { 0.0 } else { side.velocity(of(&progress[side.member])).dot(touch.normal) }
     };
     [(|p: &Progress| &p.before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.seen[..]].into_iter().any(|of| {
-        let (a, b) = (along(&sides[0], of), along(&sides[1], of));
+        let (a, b) = (along(&facing.sides[0], of) + led[0], along(&facing.sides[1], of) + led[1]);
         [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
     })
 }
 
 /// How fast a gap opens with the velocities of a solution, m/s.
-fn opening_m_s(touch: &Touch, sides: &[Side; 2], solved: &Solution) -> f64 {
-    let [a, b] = sides.each_ref().map(|side| {
-        if side.terms().is_empty() { 0.0 } else { side.velocity(solved.velocities(side.member)).dot(touch.normal) }
+fn opening_m_s(touch: &Touch, facing: &Facing, solved: &Solution) -> f64 {
+    let [a, b] = [0, 1].map(|at| {
+        let side = &facing.sides[at];
+        let moved = if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(solved.velocities(side.member)) };
+        (moved + facing.led_m_s[at]).dot(touch.normal)
     });
     a - b
 }
 
-fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+    let Facing { sides, led_m_s } = *facing;
+    let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {
         key: 0,
@@ -339,8 +355,9 @@ fn contact(touch: &Touch, sides: [Side; 2], skins: [&CollisionShape; 2], progres
         // a pair takes the geometric mean of both frictions, and the larger restitution
         friction: (skins[0].friction * skins[1].friction).sqrt(),
         restitution: skins[0].restitution.max(skins[1].restitution),
-        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal),
-        surface_m_s: DVec3::ZERO,
+        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal)
+            + surface_m_s.dot(touch.normal),
+        surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
     }

@@ -1,79 +1,189 @@
-//! Springs, grasps and links of members as rows of the cluster's problem: implicit at both ends, whatever the ends are.
+//! Springs between two points, the springs of users and grasps, drives: rows that are implicit at both ends, whatever the ends are.
 //!
-//! In: what members see of springs on them and links between them. Out: rows, and the forces that they gave. Never here: contacts.
+//! In: what members see of springs on them, what drives them. Out: rows. Never here: contacts, links (`links.rs`), joints.
 //! Theory: docs/theory/clusters.md, eq. 14.
 
 use super::Participant;
+use super::member::MaterialPoint;
 use super::memory::Partner;
+use super::ties::{Holders, RowOwner, Ties, place_of};
 use crate::AnchorSpring;
+use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use glam::DVec3;
-use metachron_core::{AgentId, Grip};
-use metachron_geometry::narrow_phase::TouchKey;
+use glam::{DQuat, DVec3};
+use metachron_core::{AgentId, Anchor, Body};
 
-/// Where a row belongs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct RowOwner {
-    /// The participant on side 0, which remembers it.
+/// A fine step within its macro step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    /// How long it is, seconds.
+    pub h_s: f64,
+    /// How long after the start of the macro step it begins, seconds.
+    pub after_s: f64,
+}
+
+/// One end of a spring.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct End {
+    /// The participant; `None` where the end is led from outside.
+    pub member: Option<usize>,
+    pub point: MaterialPoint,
+}
+
+/// What is between two ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pull {
+    pub stiffness_n_m: f64,
+    pub damping_n_s_m: f64,
+    pub rest_m: f64,
+}
+
+/// Keys of the rows of a tie: along the line between its ends, across it, and of turns.
+const ALONG: u32 = 0;
+const ACROSS: u32 = 1;
+const TURN: u32 = 2;
+
+/// A name for a spring between others, so that its rows are told apart and remembered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Name {
+    /// The participant that remembers it.
     pub member: usize,
     pub partner: Partner,
-    /// The agent that pulls; `None` for the user's spring.
-    pub by: Option<AgentId>,
+    pub hold: Option<Holders>,
 }
 
-/// The rows of a fine step.
-#[derive(Debug, Default)]
-pub(super) struct Springs {
-    pub rows: Vec<JointRow>,
-    /// One for each row.
-    pub owners: Vec<RowOwner>,
+impl Name {
+    pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
+        let Self { member, partner, hold } = self;
+        RowOwner { member, other, partner, key, hold }
+    }
 }
 
-impl Springs {
-    /// Lays out all rows of a fine step of `h_s` seconds that begins `after_s` seconds into the macro step.
-    pub fn gather(&mut self, all: &[Participant<'_>], h_s: f64, after_s: f64) {
-        self.rows.clear();
-        self.owners.clear();
+impl End {
+    pub fn side(&self) -> Side {
+        self.member.map_or(Side::FIXED, |member| self.point.side.of_member(member))
+    }
+}
+
+impl Ties {
+    /// Lays out the springs of users and grasps, and the drives.
+    pub fn gather_springs(&mut self, all: &[Participant<'_>], moment: Moment) {
         for (member, one) in all.iter().enumerate() {
-            let mut number = 0..;
-            for spring in one.context.anchor_springs() {
-                let number = number.next().unwrap_or(0);
-                self.pull(all, member, &spring, number, (h_s, after_s));
+            let is_led = one.member.is_led();
+            for (number, spring) in (0..).zip(one.context.anchor_springs()) {
+                let led_by_user = spring.by.is_none() && is_led;
+                if !led_by_user {
+                    self.hold(all, member, &spring, number, moment);
+                }
             }
+            self.drive(all, member, moment);
         }
     }
 
-    /// A spring to a point that moves by itself.
-    fn pull(
+    /// A spring of the user or of a grasp on `member`.
+    fn hold(&mut self, all: &[Participant<'_>], member: usize, spring: &AnchorSpring, number: u32, moment: Moment) {
+        let Some(point) = all[member].member.anchor(spring.anchor) else { return };
+        let by = spring.by.and_then(|by| place_of(all, by));
+        let tip = by.and_then(|by| all[by].member.anchor(Anchor::Local(DVec3::ZERO)));
+        let far = tip.unwrap_or_else(|| {
+            let position = spring.target + spring.target_velocity * moment.after_s;
+            MaterialPoint::led(position, spring.target_velocity)
+        });
+        let hold = Holders { side_0: all[member].id, side_1: spring.by };
+        let name = Name { member, partner: Partner::Tie(number), hold: Some(hold) };
+        let AnchorSpring { stiffness_n_m, damping_n_s_m, .. } = *spring;
+        let pull = Pull { stiffness_n_m, damping_n_s_m, rest_m: 0.0 };
+        let ends = [End { member: Some(member), point }, End { member: by.filter(|_| tip.is_some()), point: far }];
+        self.spring(all, &ends, &pull, name, moment.h_s);
+        if let Some(by) = spring.by {
+            self.hold_turn(all, (member, by), &pull, name, moment);
+        }
+    }
+
+    /// The torsional spring by which jaws keep a body from turning between them.
+    fn hold_turn(
         &mut self,
         all: &[Participant<'_>],
-        member: usize,
-        spring: &AnchorSpring,
-        number: u32,
-        (h_s, after_s): (f64, f64),
+        (member, by): (usize, AgentId),
+        pull: &Pull,
+        name: Name,
+        moment: Moment,
     ) {
-        let Some(point) = all[member].member.anchor(spring.anchor) else { return };
-        let target = spring.target + spring.target_velocity * after_s;
-        let law = Spring {
-            stiffness_n_m: spring.stiffness_n_m,
-            damping_n_s_m: spring.damping_n_s_m,
-            stretch_m: point.position - target,
-        };
-        let strength = law.stiffness_n_m * h_s + law.damping_n_s_m;
-        if !(strength > 0.0 && strength.is_finite() && target.is_finite() && spring.target_velocity.is_finite()) {
+        let context = &all[member].context;
+        let Some(mine) = all[member].member.pose(&[], 0.0) else { return };
+        let Some(seen) = context.neighbours.iter().find(|other| other.id == by).map(|other| &other.snapshot) else {
             return;
-        }
-        let partner = Partner::Tie(number);
-        let sides = [point.side.of_member(member), Side::FIXED];
-        let warm_n_s = all[member].memory.recall(partner, TouchKey::default()).force_n * h_s;
-        let row = JointRow { warm_n_s, ..JointRow::new(0, sides, Hold::ALL) }.with_spring(law, h_s);
-        self.rows.push(JointRow { target_m_s: row.target_m_s + spring.target_velocity, ..row });
-        self.owners.push(RowOwner { member, partner, by: spring.by });
+        };
+        let Body::Tool(tool) = &seen.body else { return };
+        let Some(clasp) = tool.grasp.and_then(|grasp| grasp.orientation) else { return };
+        let place = place_of(all, by);
+        let (rotation, side, led_rad_s) = match place.and_then(|at| Some((at, all[at].member.pose(&[], 0.0)?))) {
+            Some((at, pose)) => (pose.rotation, pose.turns.of_member(at), pose.led_rad_s),
+            None => {
+                let age_s = tool_extrapolation_s(context.time, seen.time) + moment.after_s;
+                (DQuat::from_scaled_axis(tool.spin * age_s) * tool.rotation, Side::FIXED, tool.spin)
+            }
+        };
+        let square = clasp.arm_m * clasp.arm_m;
+        let law = Spring {
+            stiffness_n_m: pull.stiffness_n_m * square,
+            damping_n_s_m: pull.damping_n_s_m * square,
+            stretch_m: turn_between(mine.rotation, rotation * clasp.rotation),
+        };
+        let sides = [mine.turns.of_member(member), side];
+        let row = JointRow::new(u64::from(TURN), sides, Hold::ALL).with_spring(law, moment.h_s);
+        let row = JointRow { target_m_s: row.target_m_s + led_rad_s - mine.led_rad_s, ..row };
+        let owner = Name { hold: None, ..name }.row(TURN, place);
+        self.push(all, row, owner, moment.h_s);
     }
 
-    /// The forces of springs on `member` that gave `impulses` within a fine step of `h_s` seconds, added to `grips`.
-    pub fn grips(&self, member: usize, impulses: &[DVec3], h_s: f64, grips: &mut Vec<Grip>) {
-        let mine = self.owners.iter().zip(impulses).filter(|(owner, _)| owner.member == member);
-        grips.extend(mine.map(|(owner, impulse)| Grip { by: owner.by, force_n: *impulse / h_s }));
+    /// The drive of a member.
+    fn drive(&mut self, all: &[Participant<'_>], member: usize, moment: Moment) {
+        let Some(drive) = all[member].member.drive() else { return };
+        let h_s = moment.h_s;
+        let law = Spring {
+            stiffness_n_m: drive.stiffness_n_m,
+            damping_n_s_m: drive.damping_n_s_m,
+            stretch_m: drive.point.position - drive.target_m,
+        };
+        let sides = [drive.point.side.of_member(member), Side::FIXED];
+        let row =
+            JointRow::new(u64::from(ALONG), sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
+        let target_m_s = row.target_m_s + drive.target_m_s - drive.point.led_m_s;
+        let name = Name { member, partner: Partner::Drive, hold: None };
+        self.push(all, JointRow { target_m_s, ..row }, name.row(ALONG, None), h_s);
     }
+
+    /// A spring between two points: in all directions where it has no length of its own, else along the line between them. Where it is
+    /// stretched, a turn of that line is taken back as well, with the stiffness that its tension gives: what is light would tremble.
+    pub fn spring(&mut self, all: &[Participant<'_>], ends: &[End; 2], pull: &Pull, name: Name, h_s: f64) {
+        let [a, b] = ends;
+        let sides = [a.side(), b.side()];
+        let apart = a.point.position - b.point.position;
+        let led_m_s = b.point.led_m_s - a.point.led_m_s;
+        let mut push = |key: u32, hold: Hold, law: Spring| {
+            let row = JointRow::new(u64::from(key), sides, hold).with_spring(law, h_s);
+            let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
+            self.push(all, row, name.row(key, b.member), h_s);
+        };
+        let Pull { stiffness_n_m, damping_n_s_m, rest_m } = *pull;
+        if rest_m == 0.0 {
+            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
+            return;
+        }
+        let axis = apart.try_normalize().unwrap_or(DVec3::Z);
+        let stretch_m = apart - axis * rest_m;
+        push(ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m });
+        let stretched = 1.0 - rest_m / apart.length();
+        if stretched > 0.0 {
+            let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
+            push(ACROSS, Hold::across(axis), law);
+        }
+    }
+}
+
+/// The shortest rotation that leads from one attitude to another's, as a rotation vector in world axes: that of `a` against `b`.
+pub(super) fn turn_between(a: DQuat, b: DQuat) -> DVec3 {
+    let turned = a * b.conjugate();
+    if turned.w < 0.0 { (-turned).to_scaled_axis() } else { turned.to_scaled_axis() }
 }

@@ -7,9 +7,12 @@ use super::company::placed;
 use super::motion::Motion;
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_core::{Anchor, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape};
+
+/// The block of its spin; block 0 is the velocity of its centre of mass.
+const SPIN: usize = 1;
 
 /// Its unknowns in a cluster.
 #[derive(Debug, Clone)]
@@ -42,6 +45,21 @@ impl RigidBody {
     fn inertia(&self) -> DMat3 {
         let to_world = DMat3::from_quat(self.motion.rotation * self.spread.axes);
         to_world * DMat3::from_diagonal(self.spread.moments) * to_world.transpose()
+    }
+
+    /// Its motion after `h_s` seconds with the velocities `v`; by its own free flight where nothing has touched it.
+    fn moved(&self, v: &[DVec3], h_s: f64, touched: bool) -> Motion {
+        let mut motion = self.motion;
+        motion.angular += self.motion.inertia_times(&self.spread, v[SPIN] - self.unknowns.free[SPIN]);
+        if !touched {
+            motion.velocity += v[0] - self.unknowns.free[0];
+            motion.fly(&self.spread, self.gravity, h_s);
+            return motion;
+        }
+        motion.velocity = v[0];
+        motion.position += v[0] * h_s;
+        motion.turn(&self.spread, h_s);
+        motion
     }
 
     fn diverged(&self, dt_s: f64, what: &str) -> StepError {
@@ -96,7 +114,15 @@ impl ClusterMember for RigidBody {
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let Anchor::Local(local) = anchor else { return None };
         let arm = self.motion.rotation * local;
-        Some(MaterialPoint { position: self.motion.position + arm, side: Side::rigid(0, arm) })
+        Some(MaterialPoint::new(self.motion.position + arm, Side::rigid(0, arm)))
+    }
+
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
+        let Motion { position, rotation, .. } = motion;
+        let origin_m = position - rotation * self.spread.com;
+        let turns = Side::node(0, SPIN);
+        Some(Pose { centre_m: position, origin_m, rotation, turns, led_rad_s: DVec3::ZERO })
     }
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
@@ -120,16 +146,7 @@ impl ClusterMember for RigidBody {
 
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
         let before = self.motion;
-        let [moved, turned] = [v[0] - self.unknowns.free[0], v[1] - self.unknowns.free[1]];
-        self.motion.angular += self.motion.inertia_times(&self.spread, turned);
-        if touched {
-            self.motion.velocity = v[0];
-            self.motion.position += v[0] * h_s;
-            self.motion.turn(&self.spread, h_s);
-        } else {
-            self.motion.velocity += moved;
-            self.motion.fly(&self.spread, self.gravity, h_s);
-        }
+        self.motion = self.moved(v, h_s, touched);
         if !self.motion.is_sane(&self.spread) {
             self.motion = before;
             return Err(self.diverged(h_s, "the body left the coordinate range"));

@@ -22,7 +22,6 @@ mod exchange;
 mod footing;
 mod hold;
 mod island;
-mod joint;
 mod leant;
 mod linear_spring;
 mod mass_properties;
@@ -38,7 +37,7 @@ mod spring_set;
 mod world;
 
 pub use body::RigidBody;
-pub use joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind};
+pub use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind};
 pub use spec::{RigidError, RigidSpec};
 
 #[cfg(test)]

@@ -122,7 +122,7 @@ impl ClusterMember for Tube {
         let (segment, share) = self.division.locate(arc_m);
         let places = &self.unknowns.places;
         let position = places.get(segment)?.lerp(*places.get(segment + 1)?, share);
-        Some(MaterialPoint { position, side: self.point_side(segment, share, DVec3::ZERO) })
+        Some(MaterialPoint::new(position, self.point_side(segment, share, DVec3::ZERO)))
     }
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {

@@ -108,7 +108,7 @@ impl ClusterMember for SoftBody {
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let Anchor::Vertex(vertex) = anchor else { return None };
         let position = *self.positions.get(vertex as usize)?;
-        Some(MaterialPoint { position, side: self.shared_side([vertex; 3], [1.0, 0.0, 0.0]) })
+        Some(MaterialPoint::new(position, self.shared_side([vertex; 3], [1.0, 0.0, 0.0])))
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {

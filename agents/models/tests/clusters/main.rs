@@ -1,6 +1,8 @@
 //! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
 
 mod bodies;
+mod joints;
+mod links;
 mod rebounds;
 mod scenes;
 mod stacks;

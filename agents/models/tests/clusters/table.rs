@@ -1,12 +1,14 @@
 //! A table on which bodies are put and stepped as one cluster, and what is measured of them.
 
 use glam::DVec3;
+use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
 };
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
+use metachron_core::{AgentId, Anchor, Grip, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
+use std::sync::Arc;
 
 /// Gravity, m/s².
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -17,14 +19,19 @@ pub struct Placed {
     pub rate_hz: f64,
     /// Whether a part of it is held in place.
     pub held: bool,
+    /// Its links, as its scene gives them, and the springs of the user on it.
+    pub links: Vec<Link>,
+    pub hands: Vec<AnchorSpring>,
     memory: ContactMemory,
-    grips: Vec<metachron_core::Grip>,
+    grips: Vec<Grip>,
 }
 
 /// Bodies on a floor at z = 0.
 pub struct Table {
     pub bodies: Vec<Placed>,
     pub time: SimTime,
+    /// Whether bodies touch each other.
+    pub touching: bool,
     scene: ClusterScene,
     stepper: ClusterStepper,
     snapshot: Snapshot,
@@ -52,9 +59,16 @@ pub struct Findings {
     pub factors_at_rest: f64,
 }
 
+/// A spring whose ends are still to be named.
+pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
+    let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
+    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Ledger }
+}
+
 /// A body with its rate.
 pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
-    Placed { agent: Box::new(agent), rate_hz: 60.0, held, memory: ContactMemory::default(), grips: vec![] }
+    let (links, hands, memory, grips) = (vec![], vec![], ContactMemory::default(), vec![]);
+    Placed { agent: Box::new(agent), rate_hz: 60.0, held, links, hands, memory, grips }
 }
 
 impl Table {
@@ -72,7 +86,42 @@ impl Table {
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
-        Self { bodies, time: SimTime::ZERO, scene, stepper: ClusterStepper::new(20e-6), snapshot: Snapshot::default() }
+        let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
+        Self { bodies, time: SimTime::ZERO, touching: true, scene, stepper, snapshot }
+    }
+
+    /// The same with joints between its bodies, which are numbered in their order.
+    pub fn jointed(self, joints: impl IntoIterator<Item = Joint>) -> Self {
+        Self { scene: self.scene.jointed(joints.into_iter().collect()).unwrap(), ..self }
+    }
+
+    /// Links two bodies by a spring, as both of them see it.
+    pub fn link(&mut self, ends: [(usize, Anchor); 2], spring: Link) {
+        for (at, (body, here)) in ends.into_iter().enumerate() {
+            let (other, there) = ends[1 - at];
+            let link = Link { other: AgentId(other as u32), here, there, ..spring };
+            self.bodies[body].links.push(link);
+        }
+    }
+
+    /// The forces by which a body was held at the end of the last step.
+    pub fn grips(&self, body: usize) -> &[Grip] {
+        &self.bodies[body].grips
+    }
+
+    /// What all bodies have published, as each other sees it.
+    fn published(&self) -> Vec<Neighbour> {
+        let of = |(id, body): (u32, &Placed)| {
+            let mut snapshot = Snapshot { time: self.time, ..Snapshot::default() };
+            body.agent.write_snapshot(&mut snapshot);
+            let seen = Neighbour::observed(AgentId(id), Arc::new(snapshot));
+            Neighbour { form: body.agent.form(), law: if self.touching { Law::Ledger } else { Law::Off }, ..seen }
+        };
+        if !self.touching || self.bodies.iter().any(|body| body.agent.model() == "tool") {
+            (0..).zip(&self.bodies).map(of).collect()
+        } else {
+            vec![]
+        }
     }
 
     /// Gives the lowest body one rate and all others another.
@@ -92,9 +141,11 @@ impl Table {
         let plan = Plan::of(wishes.iter().copied());
         let dt = SimSpan::from_secs_f64(plan.macro_s).unwrap();
         let mut all = vec![];
+        let neighbours = self.published();
         for ((id, body), (role, wanted_s)) in (0..).zip(&mut self.bodies).zip(wishes) {
-            let Placed { agent, memory, grips, .. } = body;
-            let context = StepContext::alone(AgentId(id), self.time);
+            let Placed { agent, memory, grips, links, hands, .. } = body;
+            let context =
+                StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(AgentId(id), self.time) };
             let member = agent.member().unwrap();
             let parts = plan.parts_in(role, wanted_s);
             all.push(Participant { id: AgentId(id), member, context, laws: &[], memory, parts, grips });
@@ -124,6 +175,11 @@ impl Table {
             Body::Curve(curve) => (mean(&curve.positions), mean(&curve.velocities)),
             _ => (DVec3::ZERO, DVec3::ZERO),
         }
+    }
+
+    /// Where a material point is.
+    pub fn place(&mut self, body: usize, anchor: Anchor) -> DVec3 {
+        self.bodies[body].agent.member().unwrap().anchor(anchor).unwrap().position
     }
 
     /// The upward impulse of the last macro step by the floor, or by what is held.

@@ -1,6 +1,6 @@
 //! Joints between rigid bodies: the data a scene gives, and their checks.
 //!
-//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`island/`).
+//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`stepper/`).
 
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
@@ -177,6 +177,8 @@ impl Joint {
     }
 }
 
+/// The largest coordinate of an anchor, metres.
+const REACH_MAX_M: f64 = 1e6;
 /// The largest number accepted in a joint.
 const NUMBER_MAX: f64 = 1e9;
 
@@ -195,7 +197,7 @@ fn range(what: &'static str, [low, high]: [f64; 2], most: f64, wanted: &'static 
 }
 
 fn place(what: &'static str, value: DVec3) -> Result<(), JointError> {
-    let good = value.abs().max_element() <= super::spec::REACH_MAX && value.is_finite();
+    let good = value.abs().max_element() <= REACH_MAX_M && value.is_finite();
     if good { Ok(()) } else { Err(JointError::BadVector { what }) }
 }
 

@@ -1,0 +1,83 @@
+//! Links between agents as springs of the cluster's problem.
+//!
+//! In: the links that members see. Out: rows of springs. Never here: links by wave variables, which are no part of a cluster.
+//! Theory: docs/theory/clusters.md, eq. 14.
+
+use super::Participant;
+use super::member::MaterialPoint;
+use super::memory::Partner;
+use super::springs::{End, Moment, Name, Pull};
+use super::ties::{Holders, Ties, place_of};
+use crate::agent::tool_extrapolation_s;
+use crate::law::{Law, Link};
+use glam::DVec3;
+use metachron_core::{Anchor, Body};
+
+impl Ties {
+    /// Lays out all links. Both agents see a link: of two participants the lower number takes it.
+    pub fn gather_links(&mut self, all: &[Participant<'_>], moment: Moment) {
+        for (member, one) in all.iter().enumerate() {
+            for (number, link) in (0..).zip(one.context.links) {
+                let other = place_of(all, link.other);
+                let is_mine = other.is_none_or(|other| member < other);
+                if is_mine && matches!(link.law, Law::Ledger) {
+                    self.link(all, (member, other), link, number, moment);
+                }
+            }
+        }
+    }
+
+    fn link(
+        &mut self,
+        all: &[Participant<'_>],
+        (member, other): (usize, Option<usize>),
+        link: &Link,
+        number: u32,
+        moment: Moment,
+    ) {
+        let there = match other {
+            Some(other) => all[other].member.anchor(link.there),
+            None => seen_point(&all[member], link, moment),
+        };
+        let (Some(here), Some(there)) = (all[member].member.anchor(link.here), there) else { return };
+        let Link { stiffness_n_m, damping_n_s_m, rest_m, .. } = *link;
+        let hold = Holders { side_0: all[member].id, side_1: Some(link.other) };
+        let name = Name { member, partner: Partner::Link(number), hold: Some(hold) };
+        let ends = [End { member: Some(member), point: here }, End { member: other, point: there }];
+        self.spring(all, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name, moment.h_s);
+    }
+}
+
+/// Where the far end of a link is that is no participant: it moves on as it was last published.
+fn seen_point(one: &Participant<'_>, link: &Link, moment: Moment) -> Option<MaterialPoint> {
+    let seen = &one.context.neighbours.iter().find(|other| other.id == link.other)?.snapshot;
+    let MaterialPoint { position, led_m_s, .. } = published_point(&seen.body, link.there)?;
+    let age_s = tool_extrapolation_s(one.context.time, seen.time) + moment.after_s;
+    let point = MaterialPoint::led(position + led_m_s * age_s, led_m_s);
+    (point.position.is_finite() && led_m_s.is_finite()).then_some(point)
+}
+
+/// A material point of a published body.
+fn published_point(body: &Body, anchor: Anchor) -> Option<MaterialPoint> {
+    let of_whole = |centre: DVec3, arm: DVec3, velocity: DVec3, spin: DVec3| {
+        MaterialPoint::led(centre + arm, velocity + spin.cross(arm))
+    };
+    match (body, anchor) {
+        (Body::Curve(curve), Anchor::Arc(arc_m)) => {
+            let (segment, share) = curve.locate(arc_m)?;
+            let mix = |list: &[DVec3]| Some(list.get(segment)?.lerp(*list.get(segment + 1)?, share));
+            Some(MaterialPoint::led(mix(&curve.positions)?, mix(&curve.velocities)?))
+        }
+        (Body::Soft(soft), Anchor::Vertex(vertex)) => {
+            let at = vertex as usize;
+            Some(MaterialPoint::led(*soft.positions.get(at)?, *soft.velocities.get(at)?))
+        }
+        (Body::Rigid(rigid), Anchor::Local(local)) => {
+            Some(of_whole(rigid.position, rigid.rotation * local, rigid.velocity, rigid.spin))
+        }
+        (Body::Tool(tool), Anchor::Local(local)) => {
+            Some(of_whole(tool.tip, tool.rotation * local, tool.velocity, tool.spin))
+        }
+        _ => None,
+    }
+}

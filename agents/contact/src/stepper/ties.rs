@@ -1,0 +1,89 @@
+//! Rows of the cluster's problem that hold two points or two spins together: springs, links, drives, joints.
+//!
+//! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
+
+use super::Participant;
+use super::memory::Partner;
+use crate::cluster::JointRow;
+use glam::DVec3;
+use metachron_core::{AgentId, Grip};
+use metachron_geometry::narrow_phase::TouchKey;
+
+/// Where a row belongs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RowOwner {
+    /// The participant that remembers it: side 0, the lower number of two.
+    pub member: usize,
+    /// The participant on side 1, where there is one.
+    pub other: Option<usize>,
+    pub partner: Partner,
+    /// The name of the row within its tie.
+    pub key: u32,
+    /// Who pulls at whom, where it is a force by which somebody holds a body.
+    pub hold: Option<Holders>,
+}
+
+/// The two ends of a force, as each is told to the other: `None` is the user.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Holders {
+    pub side_0: AgentId,
+    pub side_1: Option<AgentId>,
+}
+
+/// The rows of a fine step.
+#[derive(Debug, Default)]
+pub(super) struct Ties {
+    pub rows: Vec<JointRow>,
+    /// One for each row.
+    pub owners: Vec<RowOwner>,
+}
+
+impl Ties {
+    pub fn clear(&mut self) {
+        self.rows.clear();
+        self.owners.clear();
+    }
+
+    /// Adds a row, which starts from what it gave in the last step. Left out is one of which neither side moves.
+    pub fn push(&mut self, all: &[Participant<'_>], row: JointRow, owner: RowOwner, h_s: f64) {
+        let sound = row.target_m_s.is_finite() && row.compliance_per_kg.is_none_or(|r| r > 0.0 && r.is_finite());
+        if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
+            return;
+        }
+        let warm_n_s = all[owner.member].memory.recall(owner.partner, place_key(owner.key)).force_n * h_s;
+        self.rows.push(JointRow { key: u64::from(owner.key), warm_n_s, ..row });
+        self.owners.push(owner);
+    }
+
+    /// The forces by which `member` is held, of rows that gave `impulses` within a fine step of `h_s` seconds, added to `grips`.
+    pub fn grips(&self, member: usize, impulses: &[DVec3], h_s: f64, grips: &mut Vec<Grip>) {
+        let mut last = None;
+        for (owner, impulse) in self.owners.iter().zip(impulses) {
+            let Some(hold) = owner.hold else { continue };
+            let (by, force_n) = if owner.member == member {
+                (hold.side_1, *impulse / h_s)
+            } else if owner.other == Some(member) {
+                (Some(hold.side_0), -*impulse / h_s)
+            } else {
+                continue;
+            };
+            // the rows of one spring are one force
+            let tie = Some((owner.member, owner.partner));
+            match grips.last_mut().filter(|_| last == tie) {
+                Some(grip) => grip.force_n += force_n,
+                None => grips.push(Grip { by, force_n }),
+            }
+            last = tie;
+        }
+    }
+}
+
+/// The name of a row in the memory of its pair.
+pub(super) fn place_key(row: u32) -> TouchKey {
+    TouchKey { place: row, ..TouchKey::default() }
+}
+
+/// The place of the agent `id` among the participants.
+pub(super) fn place_of(all: &[Participant<'_>], id: AgentId) -> Option<usize> {
+    all.binary_search_by_key(&id, |one| one.id).ok()
+}

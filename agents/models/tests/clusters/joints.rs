@@ -1,0 +1,264 @@
+//! Joints of rigid bodies in a cluster, against closed forms.
+
+use crate::bodies::rigid;
+use crate::table::{GRAVITY, Table, placed};
+use glam::{DQuat, DVec3};
+use metachron_contact::joint::{Joint, JointKind};
+use metachron_core::{AgentId, Body, RigidState, Snapshot};
+use metachron_geometry::Solid;
+use metachron_models::rigid::{RigidBody, RigidSpec};
+
+const G: f64 = -GRAVITY.z;
+
+/// Bodies on joints, far from the floor.
+fn party(specs: impl IntoIterator<Item = RigidSpec>, joints: impl IntoIterator<Item = Joint>, rate_hz: f64) -> Table {
+    let bodies = specs.into_iter().map(|spec| placed(RigidBody::new(spec).unwrap(), false)).collect();
+    let mut table = Table::among(bodies, &[]).jointed(joints);
+    table.bodies.iter_mut().for_each(|body| body.rate_hz = rate_hz);
+    table
+}
+
+fn state(table: &Table, body: usize) -> RigidState {
+    let mut snapshot = Snapshot::default();
+    table.bodies[body].agent.write_snapshot(&mut snapshot);
+    let Body::Rigid(state) = snapshot.body else { panic!("body {body} is not rigid") };
+    state
+}
+
+fn block(half_m: DVec3, position: DVec3, mass_kg: f64) -> RigidSpec {
+    rigid(Solid::Box { half_extents_m: half_m }, position, mass_kg)
+}
+
+fn rod(length_m: f64, top: DVec3) -> RigidSpec {
+    block(DVec3::new(0.005, 0.005, 0.5 * length_m), top - DVec3::Z * (0.5 * length_m), 1.0)
+}
+
+fn on_world(kind: JointKind) -> Joint {
+    Joint::new(AgentId(0), None, kind)
+}
+
+const HINGE: JointKind = JointKind::Revolute { axis: DVec3::Y, range_rad: None };
+
+/// A rod of 1 m on a hinge in the origin, tilted.
+fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
+    let rotation = DQuat::from_rotation_y(tilt_rad);
+    let start = rod(1.0, DVec3::ZERO);
+    let spec = RigidSpec { rotation, position: rotation * start.position, ..start };
+    party([spec], [Joint { anchor_a_m: DVec3::Z * 0.5, ..on_world(kind) }], rate_hz)
+}
+
+/// Moment of inertia of the rod about its end, kg m².
+const ROD_KG_M2: f64 = (1.0 + 0.005 * 0.005) / 3.0;
+
+#[test]
+fn a_pendulum_on_a_hinge_swings_with_its_closed_form_period() {
+    let mut table = pendulum(0.02, HINGE, 120.0);
+    let (mut rises, mut last) = (vec![], state(&table, 0).position.x);
+    for step in 1..=1200 {
+        table.step();
+        let now = state(&table, 0).position.x;
+        if last < 0.0 && now >= 0.0 {
+            rises.push((f64::from(step) - now / (now - last)) / 120.0);
+        }
+        last = now;
+    }
+    let period = (rises[rises.len() - 1] - rises[0]) / (rises.len() - 1) as f64;
+    let wanted = std::f64::consts::TAU * (ROD_KG_M2 / (G * 0.5)).sqrt() * (1.0 + 0.02 * 0.02 / 16.0);
+    // (ω h)²/24 = 4e-5, and the crossings' interpolation
+    assert!((period / wanted - 1.0).abs() < 1e-4, "{period} is not {wanted}");
+}
+
+#[test]
+fn a_rod_let_go_from_horizontal_keeps_its_energy_and_its_joint() {
+    let error = |rate_hz: f64| {
+        let mut table = pendulum(-std::f64::consts::FRAC_PI_2, HINGE, rate_hz);
+        let (mut worst, mut highest) = (0.0_f64, f64::NEG_INFINITY);
+        for step in 0..(10.0 * rate_hz) as u32 {
+            table.step();
+            let RigidState { position, rotation, velocity, spin, .. } = state(&table, 0);
+            let gap = (position + rotation * DVec3::Z * 0.5).length();
+            assert!(gap < 1e-5, "step {step}: {gap:e} m off its joint");
+            // the velocity is that of the middle of the step
+            let height = position.z - 0.5 * velocity.z / rate_hz;
+            let energy = 0.5 * ROD_KG_M2 * spin.y * spin.y + G * height;
+            worst = worst.max(energy.abs());
+            highest = highest.max(if step > 20 { position.z } else { highest });
+        }
+        (worst, highest)
+    };
+    let ((coarse, _), (fine, highest)) = (error(60.0), error(240.0));
+    // of 4.9 J; second order: 1.6e-2 and 1.5e-3 in the middle of steps measured
+    assert!(coarse < 0.05 && fine < 0.15 * coarse, "{coarse:e} J, {fine:e} J");
+    assert!(highest.abs() < 2e-3, "it comes back to {highest:e} m");
+}
+
+/// Twenty capsules of 0.2 m on ball joints, the last one heavier by `ratio`, hung from the origin along `along`.
+fn chain(ratio: f64, along: DVec3, rate_hz: f64) -> Table {
+    let rotation = DQuat::from_rotation_arc(DVec3::NEG_Z, along);
+    let solid = Solid::Capsule { radius_m: 0.03, half_height_m: 0.06 };
+    let links = (0..20).map(|i| RigidSpec {
+        rotation,
+        ..rigid(solid.clone(), along * (0.1 + 0.2 * f64::from(i)), if i == 19 { ratio } else { 1.0 })
+    });
+    let joints = (0..20_u32).map(|i| Joint {
+        anchor_a_m: DVec3::Z * 0.1,
+        anchor_b_m: if i == 0 { DVec3::ZERO } else { DVec3::Z * -0.1 },
+        ..Joint::new(AgentId(i), i.checked_sub(1).map(AgentId), JointKind::Spherical)
+    });
+    party(links, joints, rate_hz)
+}
+
+fn stretch(table: &Table, links: usize) -> f64 {
+    let mut end = DVec3::ZERO;
+    let gaps = (0..links).map(|link| {
+        let RigidState { position, rotation, .. } = state(table, link);
+        let gap = (position + rotation * DVec3::Z * 0.1).distance(end);
+        end = position - rotation * DVec3::Z * 0.1;
+        gap
+    });
+    gaps.fold(0.0, f64::max)
+}
+
+#[test]
+fn a_chain_that_swings_a_weight_of_a_hundred_links_keeps_its_length() {
+    for (ratio, rate_hz) in [(100.0, 60.0), (1000.0, 120.0)] {
+        let mut table = chain(ratio, DVec3::new(1.0, 0.0, -1.0).normalize(), rate_hz);
+        let (mut worst, mut factors, mut cut) = (0.0_f64, 0, 0);
+        let start = table.energy_j();
+        for _ in 0..(2.0 * rate_hz) as u32 {
+            let (report, _) = table.step();
+            worst = worst.max(stretch(&table, 20));
+            factors += report.factors;
+            cut += report.cut;
+        }
+        // on its way down it has made nothing
+        assert!(table.energy_j() < start + 1e-3 * start.abs(), "{} J of {start}", table.energy_j());
+        assert!(factors < 1000, "{factors} factors");
+        assert!(worst < 1e-5, "1 : {ratio}: a joint opened by {worst:e} m");
+        assert_eq!(cut, 0);
+    }
+}
+
+#[test]
+fn a_hinge_stops_at_both_ends_of_its_range() {
+    // let go from horizontal it falls towards +x at first, b's angle against a is minus its own
+    let range_rad = Some([-0.4, 0.3]);
+    let kind = JointKind::Revolute { axis: DVec3::Y, range_rad };
+    for (tilt, push) in [(0.0, DVec3::X), (0.0, DVec3::NEG_X)] {
+        let mut table = pendulum(tilt, kind, 60.0);
+        let mut farthest = 0.0_f64;
+        for step in 0..120 {
+            if step == 0 {
+                let spring = metachron_contact::AnchorSpring {
+                    by: None,
+                    anchor: metachron_core::Anchor::Local(DVec3::Z * -0.5),
+                    target: push * 10.0,
+                    target_velocity: DVec3::ZERO,
+                    stiffness_n_m: 10.0,
+                    damping_n_s_m: 0.0,
+                };
+                table.bodies[0].hands.push(spring);
+            }
+            table.step();
+            let rotation = state(&table, 0).rotation;
+            let angle = rotation.to_scaled_axis().y;
+            farthest = if push.x * -angle > farthest.abs() { -angle } else { farthest };
+        }
+        // the rod's end goes to +x where it turns by −y; the world lies behind by the same
+        let limit = if push.x > 0.0 { 0.3 } else { -0.4 };
+        assert!((farthest - limit).abs() < 1e-5, "pushed to {push} it turned to {farthest}, not {limit}");
+    }
+}
+
+#[test]
+fn a_body_on_a_slide_falls_along_it_and_stops_at_its_end() {
+    let slope = 0.6;
+    let rotation = DQuat::from_rotation_y(slope);
+    let axis = rotation * DVec3::X;
+    let built = |range_m| {
+        // the world is b: it lies behind a by what a has slid, against a's own axis
+        let kind = JointKind::Prismatic { axis: DVec3::NEG_X * 2.0, range_m };
+        let tilted = RigidSpec { rotation, ..block(DVec3::splat(0.1), DVec3::ZERO, 1.0) };
+        party([tilted.clone()], [on_world(kind).at_rest_in(rotation, DQuat::IDENTITY)], 100.0)
+    };
+    let run = |table: &mut Table| {
+        for _ in 0..100 {
+            table.step();
+        }
+        state(table, 0).position
+    };
+    let place = run(&mut built(None));
+    // implicit Euler goes ½ g h t farther than the parabola
+    let wanted = axis * (0.5 * G * libm::sin(slope) * 1.01);
+    // the turn is held to 5e-6 rad, of an arm of up to 2.8 m
+    assert!(place.distance(wanted) < 5e-5, "{place} is not {wanted}");
+    let slid = run(&mut built(Some([-0.3, 0.5]))).dot(axis);
+    assert!((slid - 0.5).abs() < 1e-5, "stopped at {slid} m");
+}
+
+#[test]
+fn a_rope_is_never_longer_than_it_is() {
+    let thrown = RigidSpec { velocity: DVec3::new(3.0, 1.0, 2.0), ..block(DVec3::splat(0.05), DVec3::X * 0.3, 1.0) };
+    let mut table = party([thrown], [on_world(JointKind::Rope { length_m: 0.7 })], 60.0);
+    let mut longest = 0.0_f64;
+    for _ in 0..300 {
+        table.step();
+        longest = longest.max(state(&table, 0).position.length());
+    }
+    assert!(longest > 0.6999 && longest < 0.7 + 1e-5, "{longest} m");
+}
+
+#[test]
+fn a_free_jointed_pair_keeps_its_momentum_and_stays_joined() {
+    for kind in [
+        JointKind::Fixed,
+        JointKind::Spherical,
+        JointKind::Revolute { axis: DVec3::new(1.0, 0.3, -0.2), range_rad: Some([-0.5, 0.5]) },
+        JointKind::Prismatic { axis: DVec3::X, range_m: Some([-0.2, 0.2]) },
+    ] {
+        let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.0) };
+        let first = RigidSpec { spin: DVec3::new(2.0, -3.0, 4.0), ..at(0.0) };
+        let second = RigidSpec { velocity: DVec3::new(0.5, 1.0, 0.2), mass_kg: 3.0, ..at(0.3) };
+        let joint = Joint {
+            anchor_a_m: DVec3::X * 0.15,
+            anchor_b_m: DVec3::X * -0.15,
+            ..Joint::new(AgentId(0), Some(AgentId(1)), kind)
+        };
+        let mut table = party([first, second], [joint], 100.0);
+        let momentum = |table: &Table| {
+            let [a, b] = [0, 1].map(|body| table.bodies[body].agent.momentum());
+            (a.0 + b.0, a.1 + b.1)
+        };
+        let before = momentum(&table);
+        for _ in 0..200 {
+            table.step();
+        }
+        let after = momentum(&table);
+        let wrong = [after.0.distance(before.0), after.1.distance(before.1)];
+        // the two points of a joint are one to 5e-6 m, where impulses of some 0.01 N s act
+        assert!(wrong[0] < 1e-12 && wrong[1] < 1e-4, "{kind:?}: {wrong:?}");
+        let pose = |body: usize| {
+            let RigidState { position, rotation, .. } = state(&table, body);
+            (position, rotation)
+        };
+        assert_eq!(joint.check_start(pose(0), pose(1)), Ok(()));
+    }
+}
+
+#[test]
+fn jointed_bodies_that_overlap_pass_through_each_other_unless_they_collide() {
+    for collide in [false, true] {
+        let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.0) };
+        // a slide along x, on which one comes to the other at 1 m/s
+        let kind = JointKind::Prismatic { axis: DVec3::X, range_m: None };
+        let second = RigidSpec { velocity: DVec3::NEG_X, ..at(0.3) };
+        let joint = Joint { collide, ..Joint::new(AgentId(0), Some(AgentId(1)), kind) };
+        let mut table = party([at(0.0), second], [joint], 100.0);
+        for _ in 0..40 {
+            table.step();
+        }
+        let apart = state(&table, 1).position.x - state(&table, 0).position.x;
+        let wanted = if collide { 0.2 } else { -0.1 };
+        assert!((apart - wanted).abs() < 1e-4, "collide {collide}: {apart} m apart");
+    }
+}
