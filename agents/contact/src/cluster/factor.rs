@@ -112,14 +112,6 @@ impl Cholesky {
             fronts
         });
         self.lay_out();
-        eprintln!(
-            "COST {} fronts {} size {} update {} lower {}",
-            self.fronts.cost,
-            self.layouts.len(),
-            size,
-            self.update.len(),
-            self.lower.len()
-        );
         true
     }
 

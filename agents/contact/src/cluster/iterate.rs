@@ -116,12 +116,24 @@ impl Iterate {
     }
 
     /// Makes impulses those that laws allow, and velocities theirs. Returns whether anything was off.
-    pub fn refine(&mut self, members: &[Member<'_>]) -> bool {
-        let off = self.allow() || self.state.left.iter().any(|left| *left != DVec3::ZERO);
+    pub fn refine(&mut self, form: Form, members: &[Member<'_>]) -> bool {
+        let off = self.obey(form) || self.state.left.iter().any(|left| *left != DVec3::ZERO);
         if off {
             self.respond(members);
         }
         off
+    }
+
+    /// Makes impulses those that laws ask for at the velocities as they are; returns whether any was not.
+    fn obey(&mut self, form: Form) -> bool {
+        let Self { rows, state, .. } = self;
+        let mut any = false;
+        for (row, (impulse, velocity)) in rows.rows.iter().zip(state.lambda.iter_mut().zip(&state.velocity)) {
+            let asked = row.natural_map(form, Point { impulse: *impulse, velocity: *velocity }).value;
+            any |= asked != *impulse;
+            *impulse = asked;
+        }
+        any
     }
 
     /// Makes impulses those that laws allow; returns whether any was not.

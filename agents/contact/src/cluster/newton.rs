@@ -45,7 +45,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
     let (mut leave, mut stuck) = (LEAVE_MOST, false);
     for step in 0..=STEPS_MAX {
         let mut miss = linearise(iterate, aim.form);
-        if miss < aim.tolerance_m_s && iterate.refine(aim.members) {
+        if miss < aim.tolerance_m_s && iterate.refine(aim.form, aim.members) {
             miss = linearise(iterate, aim.form);
         }
         if miss < aim.tolerance_m_s {
