@@ -7,6 +7,7 @@ use super::cone::Form;
 use super::iterate::{Iterate, Kept, Quadratic};
 use super::newton::{Aim, harden, largest_miss};
 use super::problem::Member;
+use super::shifts::Shifts;
 use glam::DVec3;
 
 /// Most steps of the first pass from the last step's impulses: it knows the answer or it does not.
@@ -43,7 +44,7 @@ pub(super) struct Passes {
 /// Storage of the way.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Stores {
-    shifts: Vec<f64>,
+    shifts: Shifts,
     pass: Kept,
     rest: Kept,
     soft: Kept,
@@ -59,11 +60,10 @@ struct Pass<'a> {
 
 /// Solves by up to `passes_max` passes. The iterate holds the impulses of the last finished one, or of a softer problem.
 pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, passes_max: usize) -> Passes {
-    stores.shifts.clear();
-    stores.shifts.resize(iterate.rows.len(), 0.0);
+    stores.shifts.reset(iterate.rows.len());
     let first = Pass { members: aim.members, steps: WARM_STEPS, tolerance_m_s: PASS_TOLERANCE * aim.tolerance_m_s };
     let later = Pass { steps: FULL_STEPS, ..first };
-    if !descend(iterate, &stores.shifts, first) && !restart(iterate, stores, later) {
+    if !descend(iterate, &stores.shifts.values, first) && !restart(iterate, stores, later) {
         return Passes { finished: 0, settled: false };
     }
     for finished in 1..passes_max {
@@ -72,10 +72,9 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, p
         if !hardened && largest_miss(iterate, Form::Disc) < aim.tolerance_m_s {
             return Passes { finished, settled: true };
         }
-        for (k, row) in iterate.rows.rows.iter().enumerate() {
-            stores.shifts[k] = row.shift(iterate.state.point(k));
-        }
-        if !descend(iterate, &stores.shifts, later) {
+        let rows = iterate.rows.rows.iter().enumerate();
+        stores.shifts.follow(rows.map(|(k, row)| row.shift(iterate.state.point(k))));
+        if !descend(iterate, &stores.shifts.values, later) {
             iterate.restore(aim.members, &stores.pass);
             return Passes { finished, settled: false };
         }
@@ -86,7 +85,7 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, p
 /// The first pass again from rest: soft first, then at the wanted compliance. Where that is not reached the soft answer stands,
 /// and where not even that is found there are no impulses.
 fn restart(iterate: &mut Iterate, stores: &mut Stores, full: Pass<'_>) -> bool {
-    let Stores { shifts, rest, soft: answer, .. } = stores;
+    let Stores { shifts: Shifts { values: shifts, .. }, rest, soft: answer, .. } = stores;
     iterate.state.lambda.fill(DVec3::ZERO);
     iterate.keep(rest);
     let soft = [(SOFT_SHARE, SOFT_STEPS), (SOFTEST_SHARE, FULL_STEPS)].iter().any(|&(share, steps)| {

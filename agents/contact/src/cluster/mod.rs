@@ -59,6 +59,7 @@ mod problem;
 mod rebound;
 mod rows;
 mod scale;
+mod shifts;
 mod side;
 mod solver;
 mod system;

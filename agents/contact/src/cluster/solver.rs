@@ -37,7 +37,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         let form = StepForm::Direct;
-        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 5, convex_only: false, form, response_share: 1e-9 }
+        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 60, convex_only: false, form, response_share: 1e-9 }
     }
 }
 

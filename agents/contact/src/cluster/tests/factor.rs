@@ -78,6 +78,31 @@ fn the_order_is_kept_while_the_structure_holds_the_couplings() {
 }
 
 #[test]
+fn a_structure_that_grows_is_solved_as_well() {
+    let (mut pairs, mut dense) = random_matrix(50, 12);
+    let mut sparse = Cholesky::default();
+    sparse.shape(50, &pairs);
+    // couplings of far blocks, one by one, until a new order is made
+    for k in 0..12 {
+        let (row, column) = (49 - k, 2 * k);
+        pairs.push(Pair { row, column });
+        for i in 0..3 {
+            *dense.at(3 * row + i, 3 * column + i) += 0.01;
+            *dense.at(3 * column + i, 3 * row + i) += 0.01;
+        }
+        sparse.shape(50, &pairs);
+        sparse.set(&blocks(&pairs, &mut dense));
+        sparse.factor(|_, _| ()).unwrap();
+        let mut x: Vec<_> = (0..50).map(|i| DVec3::new(1.0, f64::from(i), -1.0)).collect();
+        let mut y: Vec<_> = x.iter().flat_map(|v| v.to_array()).collect();
+        sparse.solve(&mut x);
+        dense.clone().factored().solve(&mut y);
+        let apart = x.iter().flat_map(|v| v.to_array()).zip(y).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        assert!(apart < 1e-9, "{apart} after {k}"); // of numbers up to some hundred
+    }
+}
+
+#[test]
 fn refactoring_and_solving_allocate_nothing() {
     let (pairs, mut dense) = random_matrix(40, 5);
     let mut sparse = Cholesky::default();

@@ -32,7 +32,7 @@ impl Lent {
 /// The answer where every second member lends its factor, and how often they were asked.
 fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
     let lent: Vec<_> = case.bodies.iter().map(Lent::new).collect();
-    let response = |k: usize| (lends && k % 2 == 0).then(|| &lent[k] as &dyn Response);
+    let response = |k: usize| (lends && k.is_multiple_of(2)).then(|| &lent[k] as &dyn Response);
     let bodies = case.bodies.iter().enumerate();
     let members: Vec<_> = bodies
         .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, share: 1.5, response: response(k) })

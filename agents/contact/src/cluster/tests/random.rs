@@ -123,7 +123,7 @@ pub const FINE: Settings = Settings {
 #[test]
 fn the_laws_hold_in_random_problems_and_no_answer_makes_energy() {
     let (mut factors, mut most, mut convex, mut cut, mut worst) = (0, 0, 0, 0, 0.0_f64);
-    for seed in 0..COUNT {
+    for seed in 0..2 * COUNT {
         let case = random_case(seed);
         let solution = solved(&case, Settings::default());
         let report = solution.report;
@@ -132,14 +132,14 @@ fn the_laws_hold_in_random_problems_and_no_answer_makes_energy() {
         convex += usize::from(report.way == Way::Convex);
         cut += usize::from(report.cut);
         let (miss, work) = (miss(&case, &solution), work(&case, &solution));
-        // an impulse that is off by the tolerance over a heavy contact's scale moves the light ones beside it by some tolerances
-        assert!(report.cut || miss < 2e-4, "seed {seed} misses by {miss}: {report:?}");
-        worst = worst.max(if report.cut { 0.0 } else { miss });
+        // twice the tolerance of the solve: impulses are what laws ask for, and their velocities may differ by as much again
+        assert!(miss < 1e-5, "seed {seed} misses by {miss}: {report:?}");
+        worst = worst.max(miss);
         // rounding of sums of joules
         assert!(work < 1e-11 && report.work_j < 1e-11, "seed {seed} makes {work} J");
     }
     println!("{factors} factors, most {most}, {convex} convex, {cut} cut, worst miss {worst:.1e} m/s");
-    assert!(cut <= 10, "{cut} cut"); // 5 when this was written: forty contacts of random directions jam six bodies
+    assert_eq!(cut, 0);
 }
 
 #[test]
