@@ -142,13 +142,15 @@ impl Table {
         let dt = SimSpan::from_secs_f64(plan.macro_s).unwrap();
         let mut all = vec![];
         let neighbours = self.published();
+        let apart: Vec<_> = (0..self.bodies.len() as u32).map(|id| (AgentId(id), Law::Off)).collect();
+        let laws = if self.touching { &[][..] } else { &apart };
         for ((id, body), (role, wanted_s)) in (0..).zip(&mut self.bodies).zip(wishes) {
             let Placed { agent, memory, grips, links, hands, .. } = body;
             let context =
                 StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(AgentId(id), self.time) };
             let member = agent.member().unwrap();
             let parts = plan.parts_in(role, wanted_s);
-            all.push(Participant { id: AgentId(id), member, context, laws: &[], memory, parts, grips });
+            all.push(Participant { id: AgentId(id), member, context, laws, memory, parts, grips });
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
         self.time = self.time + report.dt;
