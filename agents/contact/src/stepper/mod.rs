@@ -8,7 +8,7 @@
 //! seen      velocities with the impulses that each has been given since its step began
 //! search    places that may close, joints, springs
 //! solve     one problem for all; again with the places that bodies struck would pass
-//! divide    where the solution strains a member too far, all begins again in shorter steps, once
+//! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
 
 mod member;
@@ -137,13 +137,6 @@ pub struct ClusterStepper {
     kept: Vec<ContactMemory>,
 }
 
-/// Whether a macro step may be left to make it again in shorter steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum MayDivide {
-    Once,
-    NoMore,
-}
-
 impl ClusterStepper {
     /// A stepper whose contacts rest `depth_m` metres deep.
     #[must_use]
@@ -154,7 +147,7 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 16 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it once again after, from the start of the macro step.
+    /// solve makes of it after, from the start of the macro step.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state of a member stops being finite: those that had not ended their step are as they were.
@@ -168,9 +161,9 @@ impl ClusterStepper {
         let mut report = ClusterReport::default();
         self.foresee(all, dt.as_secs_f64(), &mut report)?;
         self.keep(all);
-        if !self.advance(scene, all, dt, MayDivide::Once, &mut report)? {
+        // each time at least one member makes twice as many steps, at most 16 times as many as it began with
+        while !self.advance(scene, all, dt, &mut report)? {
             self.go_back(all);
-            self.advance(scene, all, dt, MayDivide::NoMore, &mut report)?;
         }
         Ok(report)
     }
@@ -194,7 +187,6 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         dt: SimSpan,
-        may_divide: MayDivide,
         report: &mut ClusterReport,
     ) -> Result<bool, StepError> {
         let bent = |one: &Participant<'_>| one.member.role() == Role::Deformable;
@@ -214,7 +206,7 @@ impl ClusterStepper {
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(scene, all, h_s, dt.as_secs_f64(), report)?;
-            if may_divide == MayDivide::Once && self.divide(all, h_s) {
+            if self.divide(all, h_s) {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -227,7 +219,9 @@ impl ClusterStepper {
     fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress) {
-            let more = times(one.member.strain(&state.before, h_s * f64::from(state.part)));
+            let so_far = one.member.strain(&state.before, h_s * f64::from(state.part));
+            // what is too much already grows through the rest of its step
+            let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
             // what its free motion asked for counts
             let most = one.parts * DIVIDED_MAX;
             if more > 1 && state.parts < most {
