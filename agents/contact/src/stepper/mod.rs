@@ -9,7 +9,7 @@
 //! search    places that may close
 //! tie       springs, links, joints
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
-//! divide    where the solution strains a member too far, all begins again in shorter steps, once
+//! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
 
 mod blows;
@@ -159,13 +159,6 @@ pub struct ClusterStepper {
     kept: Vec<ContactMemory>,
 }
 
-/// Whether a macro step may be left to make it again in shorter steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum MayDivide {
-    Once,
-    NoMore,
-}
-
 impl Default for ClusterStepper {
     fn default() -> Self {
         Self::new(Settings::default().depth_m)
@@ -192,7 +185,7 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 16 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it once again after, from the start of the macro step.
+    /// solve makes of it after, from the start of the macro step.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state of a member stops being finite: those that had not ended their step are as they were.
@@ -213,9 +206,9 @@ impl ClusterStepper {
         }
         self.keep(all);
         let asked_s = dt.as_secs_f64();
-        if !self.advance(scene, all, asked_s, MayDivide::Once, &mut report)? {
+        // each time at least one member makes twice as many steps, at most 16 times as many as it began with
+        while !self.advance(scene, all, asked_s, &mut report)? {
             self.go_back(all);
-            self.advance(scene, all, asked_s, MayDivide::NoMore, &mut report)?;
         }
         Ok(report)
     }
@@ -261,7 +254,6 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         asked_s: f64,
-        may_divide: MayDivide,
         report: &mut ClusterReport,
     ) -> Result<bool, StepError> {
         let dt = report.dt;
@@ -284,7 +276,7 @@ impl ClusterStepper {
             self.tie(scene, all, Moment { h_s, after_s: f64::from(fine) * h_s });
             self.recall(all, h_s);
             self.solve(scene, all, h_s, &rebounds, report)?;
-            if may_divide == MayDivide::Once && self.divide(all, h_s) {
+            if self.divide(all, h_s) {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -297,7 +289,9 @@ impl ClusterStepper {
     fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress) {
-            let more = times(one.member.strain(&state.before, h_s * f64::from(state.part)));
+            let so_far = one.member.strain(&state.before, h_s * f64::from(state.part));
+            // what is too much already grows through the rest of its step
+            let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
             // what its free motion asked for counts
             let most = one.parts * DIVIDED_MAX;
             if more > 1 && state.parts < most {

@@ -13,7 +13,7 @@ mod surface_surface;
 
 use super::primitives::{Piece, Strand, StrandPoint, Surface};
 use super::touch_key::{TouchKey, TouchKind};
-use super::voronoi_regions::{Feature, LEAN_SHARE};
+use super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
 use crate::{Aabb, BoxGrid, Place, Touch};
@@ -325,9 +325,11 @@ impl SurfaceQuery<'_> {
             let core = ball_at(strand, nearest).centre;
             // a point behind the skin of a closed body is pushed out by its triangles
             let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
-            if outside && Feature::Vertex(vertex).is_nearest(self.surface, core - at) {
-                let point = SkinPoint::vertex(vertex, at);
-                into.extend(self.strand_contact(vertex_key(vertex), point, strand, nearest));
+            let (key, point) = (vertex_key(vertex), SkinPoint::vertex(vertex, at));
+            if self.is_rope() {
+                into.extend(self.beside_rope(key, point, strand, nearest));
+            } else if outside && Feature::Vertex(vertex).is_nearest(self.surface, core - at) {
+                into.extend(self.strand_contact(key, point, strand, nearest));
             }
         }
         for edge in self.surface.edges_in(self.region) {
@@ -358,6 +360,21 @@ impl SurfaceQuery<'_> {
         }
     }
 
+    fn is_rope(&self) -> bool {
+        self.surface.form.triangles.is_empty()
+    }
+
+    /// The contact of a vertex of a rope with a strand that may run beside it, and then touch it at one node after the other: its normal
+    /// is across the rope, so that none of them is a wall to the next.
+    fn beside_rope(&self, key: TouchKey, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
+        let ball = ball_at(strand, there);
+        let way = (ball.centre - here.position).try_normalize()?;
+        let feature = Feature::Vertex(here.spot.vertices[0]);
+        let out = feature.out(self.surface, way).filter(|_| feature.faces(self.surface, way, LEAN))?;
+        let distance_m = out.dot(ball.centre - here.position);
+        self.strand_touch(key, here, -out, distance_m, (strand, there))
+    }
+
     /// The contact between a point of the skin and one of a strand, unless they are too far.
     fn strand_contact(&self, key: TouchKey, here: SkinPoint, strand: &Strand<'_>, there: StrandPoint) -> Option<Touch> {
         let SkinPoint { spot, position: point } = here;
@@ -376,13 +393,26 @@ impl SurfaceQuery<'_> {
             }
             (normal, distance) = (-normal, -distance);
         }
-        let gap_m = distance - ball.radius_m - self.surface.form.radius_m;
+        self.strand_touch(key, here, normal, distance, (strand, there))
+    }
+
+    /// A touch with this normal, and this distance along it from the strand's core to the point, unless they are too far.
+    fn strand_touch(
+        &self,
+        key: TouchKey,
+        here: SkinPoint,
+        normal: DVec3,
+        distance_m: f64,
+        (strand, there): (&Strand<'_>, StrandPoint),
+    ) -> Option<Touch> {
+        let ball = ball_at(strand, there);
+        let gap_m = distance_m - ball.radius_m - self.surface.form.radius_m;
         let half = 0.5 * gap_m;
         let on_b = match strand.place(there.span, there.share, ball, normal) {
-            Place::Chain { segment, share, .. } => Place::Chain { segment, share, radius_m: distance - half },
-            _ => Place::Point(point - normal * half),
+            Place::Chain { segment, share, .. } => Place::Chain { segment, share, radius_m: distance_m - half },
+            _ => Place::Point(here.position - normal * half),
         };
-        (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: spot.place(), on_b })
+        (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: here.spot.place(), on_b })
     }
 
     /// Whether a point is in front of a triangle that is nearer than `within_m`.

@@ -10,6 +10,9 @@ use glam::DVec3;
 const NONE: u32 = u32::MAX;
 /// How far a vector may lean over a neighbouring edge and still belong to the spot, as a share of that edge.
 pub(super) const LEAN_SHARE: f64 = 1e-3;
+/// By how much two features may lean over what is next to them, where their own directions make the normal: about what a body turns by in
+/// a step, radians.
+pub(super) const LEAN: f64 = 0.1;
 /// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;
 

@@ -83,12 +83,9 @@ fn body(draw: &mut Draw, height_m: &mut f64) -> Placed {
         5 => tube(up(0.01), along(0.08), 0.01),
         6 => {
             let half = draw.between(0.02, 0.035);
-            tilted(draw, Solid::Box { half_extents_m: DVec3::splat(half) }, up(half), (-1.3, 0.3), yaw)
+            tilted(draw, DVec3::splat(half), (-1.3, 0.3), yaw, up)
         }
-        7 => {
-            let half_extents_m = DVec3::new(0.05, 0.05, 0.005);
-            tilted(draw, Solid::Box { half_extents_m }, up(0.005), (-1.0, -0.4), yaw)
-        }
+        7 => tilted(draw, DVec3::new(0.05, 0.05, 0.005), (-1.0, -0.4), yaw, up),
         _ => {
             let radius_m = draw.between(0.02, 0.035);
             let mass_kg = draw.power(-1.3, 0.3);
@@ -97,11 +94,18 @@ fn body(draw: &mut Draw, height_m: &mut f64) -> Placed {
     }
 }
 
-/// A rigid body turned about z and a little about x.
-fn tilted(draw: &mut Draw, solid: Solid, middle: DVec3, masses: (f64, f64), yaw: f64) -> Placed {
+/// A rigid box turned about z and a little about x; `up` gives its middle by half its height.
+fn tilted(
+    draw: &mut Draw,
+    half_extents_m: DVec3,
+    masses: (f64, f64),
+    yaw: f64,
+    mut up: impl FnMut(f64) -> DVec3,
+) -> Placed {
     let mass_kg = draw.power(masses.0, masses.1);
     let tilt = draw.between(0.0, 0.1);
-    let spec = rigid(solid, middle + DVec3::Z * (0.05 * tilt), mass_kg);
+    let middle = up(half_extents_m.z + half_extents_m.y * tilt);
+    let spec = rigid(Solid::Box { half_extents_m }, middle, mass_kg);
     let rotation = DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(tilt);
     placed(RigidBody::new(RigidSpec { rotation, ..spec }).unwrap(), false)
 }

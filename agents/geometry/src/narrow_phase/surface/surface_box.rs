@@ -8,17 +8,17 @@
 
 use super::super::primitives::Block;
 use super::super::touch_key::{TouchKey, TouchKind};
-use super::super::voronoi_regions::LEAN_SHARE;
+use super::super::voronoi_regions::{LEAN, LEAN_SHARE};
 use super::{BarycentricPoint, DEEP_SHARE, Edge, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::{Aabb, Place, Touch, near_segments};
 use glam::DVec3;
 
 /// A skin meets a face by which it can have come in: their normals are opposed by this cosine at least.
 const FACING: f64 = 0.1;
-/// By how much two features may lean over what is next to them: about what a body turns by in a step, radians.
-const LEAN: f64 = 0.1;
 /// Edges whose directions have a sine below this have no place of their own: their ends tell it.
 const PARALLEL: f64 = 1e-3;
+/// A vertex deeper than this share of an edge may have come in sideways.
+const DEEP_FROM_SHARE: f64 = 0.02;
 /// Edges that have passed each other did so only where each lies at least this share of that depth inside the other body.
 const HALF: f64 = 0.5;
 
@@ -85,6 +85,7 @@ impl SurfaceQuery<'_> {
     /// Every place of a closed skin on a box with these half extents.
     pub(super) fn box_touches(&self, block: &Block<'_>, half_m: DVec3, into: &mut Vec<Touch>) {
         let cuboid = PlacedBox::of(block, half_m);
+        self.corners_over(&cuboid, into);
         for (vertex, at) in self.surface.vertices_in(self.region) {
             into.extend(self.vertex_on(&cuboid, vertex, at));
         }
@@ -93,9 +94,15 @@ impl SurfaceQuery<'_> {
                 into.extend(self.edge_across(&cuboid, &edge, &rim));
             }
         }
-        for bits in 0..8 {
-            into.extend(self.corner_over(&cuboid, bits));
-        }
+    }
+
+    /// The corners of a box over triangles.
+    pub(super) fn corners_over_skin(&self, block: &Block<'_>, half_m: DVec3, into: &mut Vec<Touch>) {
+        self.corners_over(&PlacedBox::of(block, half_m), into);
+    }
+
+    fn corners_over(&self, cuboid: &PlacedBox, into: &mut Vec<Touch>) {
+        into.extend((0..8).filter_map(|bits| self.corner_over(cuboid, bits)));
     }
 
     /// How deep two bodies may overlap, metres.
@@ -103,13 +110,14 @@ impl SurfaceQuery<'_> {
         DEEP_SHARE * self.surface.form.edge_m
     }
 
-    /// A place whose normal and gap at the skin are known, unless it is too far.
+    /// A place whose normal and gap at the skin's core are known, unless it is too far.
     fn place_on_box(&self, key: TouchKey, here: SkinPoint, normal: DVec3, gap_m: f64) -> Option<Touch> {
         let on_b = Place::Point(here.position - normal * (0.5 * gap_m));
         (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: here.spot.place(), on_b })
     }
 
-    /// A vertex over or under a face that looks against the skin: of several the one that it is least deep under.
+    /// A vertex over or under a face that looks against the skin: of several the one that it is least deep under. One that is deep has
+    /// come in sideways where that way out is much shorter.
     fn vertex_on(&self, cuboid: &PlacedBox, vertex: u32, at: DVec3) -> Option<Touch> {
         let out = self.normals[vertex as usize].try_normalize()?;
         let (local, rim_m) = (cuboid.local(at), LEAN_SHARE * self.surface.form.edge_m);
@@ -120,12 +128,18 @@ impl SurfaceQuery<'_> {
             let side = -lean.signum();
             let gap_m = side * local[axis] - cuboid.half_m[axis];
             let within = beyond[(axis + 1) % 3] <= rim_m && beyond[(axis + 2) % 3] <= rim_m;
-            let is_under = gap_m > -2.0 * cuboid.half_m[axis];
+            // beyond the middle it is nearer to the far side
+            let is_under = gap_m > -cuboid.half_m[axis];
             if lean.abs() >= FACING && within && is_under && nearest.is_none_or(|(least_m, _)| gap_m > least_m) {
                 nearest = Some((gap_m, cuboid.axes[axis] * side));
             }
         }
-        let (gap_m, normal) = nearest?;
+        let (mut gap_m, mut normal) = nearest?;
+        let shortest_m = beyond.max_element();
+        if gap_m < -DEEP_FROM_SHARE * self.surface.form.edge_m && shortest_m > HALF * gap_m {
+            let axis = (0..3).find(|axis| beyond[*axis] == shortest_m)?;
+            (gap_m, normal) = (shortest_m, cuboid.axes[axis] * local[axis].signum());
+        }
         self.place_on_box(vertex_key(vertex), SkinPoint::vertex(vertex, at), normal, gap_m)
     }
 
@@ -162,10 +176,12 @@ impl SurfaceQuery<'_> {
     /// A corner over or under a triangle: of several the nearest.
     fn corner_over(&self, cuboid: &PlacedBox, bits: usize) -> Option<Touch> {
         let (at, faces) = (cuboid.corner(bits), cuboid.faces(bits));
-        let around = Aabb::about(at, self.reach_m.max(self.deep_m()));
+        let radius_m = self.surface.form.radius_m;
+        let around = Aabb::about(at, radius_m + self.reach_m.max(self.deep_m()));
         let mut nearest: Option<(f64, DVec3, SkinPoint)> = None;
         for Triangle { vertices, corners, .. } in self.surface.triangles_in(around) {
-            let Some(out) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { continue };
+            let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize();
+            let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { continue };
             let gap_m = out.dot(at - corners[0]);
             let position = at - out * gap_m;
             let is_near = nearest.is_none_or(|(least_m, ..)| gap_m.abs() < least_m.abs());
@@ -178,6 +194,18 @@ impl SurfaceQuery<'_> {
             }
         }
         let (gap_m, normal, point) = nearest?;
-        self.place_on_box(TouchKey::new(TouchKind::Triangle, [0, bits as u32]), point, normal, gap_m)
+        self.place_on_box(TouchKey::new(TouchKind::Triangle, [0, bits as u32]), point, normal, gap_m - radius_m)
+    }
+
+    /// The side of a triangle with the normal `across` on which a corner is: outside of a closed skin; of an open one where the middle of
+    /// the box's edge from there through the skin is.
+    fn out_toward(&self, cuboid: &PlacedBox, bits: usize, origin: DVec3, across: DVec3) -> DVec3 {
+        if self.surface.form.closed {
+            return across;
+        }
+        let steep = |axis: &usize| cuboid.axes[*axis].dot(across).abs();
+        let axis = (0..3).max_by(|a, b| steep(a).total_cmp(&steep(b))).unwrap_or(0);
+        let middle = 0.5 * (cuboid.corner(bits) + cuboid.corner(bits ^ 1 << axis));
+        across * across.dot(middle - origin).signum()
     }
 }

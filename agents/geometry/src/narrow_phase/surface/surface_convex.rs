@@ -70,6 +70,10 @@ impl SurfaceQuery<'_> {
                 into.extend(self.block_contact(key, edge.at(share), block, touch));
             }
         }
+        if let (Some(half_m), false) = (field.half_extents_m(), block.pierces) {
+            self.corners_over_skin(block, half_m, into);
+            return;
+        }
         for triangle in self.surface.triangles_in(self.region) {
             if self.corners(&triangle, block, field, into) {
                 continue;

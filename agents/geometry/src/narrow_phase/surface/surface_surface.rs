@@ -4,7 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
 use super::super::touch_key::{TouchKey, TouchKind};
-use super::super::voronoi_regions::{Feature, LEAN_SHARE};
+use super::super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
 use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::capsule_chain::CROSSING_M;
 use crate::{Aabb, Touch};
@@ -213,7 +213,13 @@ impl<'a> SkinPair<'a> {
             let normal = face * face.dot(normal).signum();
             return Some(SkinContact { spot, normal, distance_m: normal.dot(at - foot) });
         }
-        let nearest = Feature::Vertex(vertex).is_nearest(a.surface, -normal * distance_m);
+        // ropes that run beside each other touch at one node after the other
+        let here = Feature::Vertex(vertex);
+        let nearest = if a.is_rope() {
+            here.faces(a.surface, -normal, LEAN)
+        } else {
+            here.is_nearest(a.surface, -normal * distance_m)
+        };
         nearest.then_some(SkinContact { spot, normal: -out_here, distance_m: -out_here.dot(normal) * distance_m })
     }
 
