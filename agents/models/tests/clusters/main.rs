@@ -3,5 +3,7 @@
 mod bodies;
 mod joints;
 mod links;
+mod own_model;
 mod scenes;
 mod table;
+mod tools;
