@@ -136,6 +136,11 @@ impl Drive {
         self.rate
     }
 
+    /// Whether it gives all that it can.
+    pub(super) fn is_saturated(&self) -> bool {
+        self.saturated_force.is_some()
+    }
+
     /// Ends a step of `h` seconds in which the commanded point moved with `led` to `to`, and the tip with the velocity `moved` that the
     /// drive gave it together with all that touched it (clusters.md, eq. 14). Where the drive gave all that it can, the commanded
     /// point stays as far from the tip as that stretches its spring (eq. 9f).

@@ -92,7 +92,9 @@ impl ClusterMember for Tool {
         let led_m_s = (led.tip - self.commanded.position) / h_s;
         let unknowns = &mut self.unknowns;
         unknowns.now = [self.tool.velocity];
-        unknowns.free = [led_m_s + self.drive.rate()];
+        // a drive at its limit has nothing left to bring the tip's mass along with the commanded point
+        let carried = if self.drive.is_saturated() { self.tool.velocity } else { led_m_s + self.drive.rate() };
+        unknowns.free = [carried];
         unknowns.led_rad_s = spin(self.tool.rotation, led.rotation, h_s);
         unknowns.jaw_per_s = (led.jaw - self.tool.jaw) / h_s;
         (unknowns.led, unknowns.led_m_s) = (led, led_m_s);

