@@ -90,6 +90,16 @@ impl ToolShape {
         ]
     }
 
+    /// The velocity of the point `local_m` of the skin, in the tool's axes, while the jaws open by `rate_per_s` of their way a second, m/s.
+    #[must_use]
+    pub fn opening_m_s(&self, local_m: DVec3, rate_per_s: f64) -> DVec3 {
+        let hinge = DVec3::new(0.0, 0.0, -JAW_BEHIND * JAW_LENGTH * self.shaft_radius_m);
+        let arm = local_m - hinge;
+        // what lies behind the hinge is no jaw; one is on either side of the middle
+        let swing = if arm.z > 0.0 { JAW_SWING_RAD * rate_per_s * local_m.x.signum() } else { 0.0 };
+        (DVec3::Y * swing).cross(arm)
+    }
+
     /// Triangles of the tool at level `n`.
     #[must_use]
     pub const fn triangles(n: u8) -> u32 {

@@ -8,7 +8,6 @@ use super::world::WorldError;
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
-use metachron_geometry::narrow_phase::StaticSolidError;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -27,20 +26,20 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 /// [`WorldError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    let clusters = if scene.clusters {
-        let built = ClusterScene::new(&scene.obstacles);
-        let failed =
-            |error: StaticSolidError| WorldError::Build { name: "world".to_owned(), reason: error.to_string() };
-        Some(Arc::new(built.map_err(failed)?))
-    } else {
-        None
-    };
+    let clusters = if scene.clusters { Some(Arc::new(clusters(scene)?)) } else { None };
     let all = scene.agents.iter();
     all.map(|member| {
         let spawn = spawn(scene, member, executor, &mut *govern, &mut ties)?;
         Ok(AgentSpawn { clusters: clusters.clone(), ..spawn })
     })
     .collect()
+}
+
+/// What all contact clusters of a scene share: its static solids and joints.
+fn clusters(scene: &Scene) -> Result<ClusterScene, WorldError> {
+    let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
+    let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
+    among.jointed(Arc::clone(&scene.joints)).map_err(|error| failed(error.to_string()))
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.

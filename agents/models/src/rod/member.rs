@@ -10,6 +10,7 @@ use super::step::{Divergence, Setting, TURN_MAX_RAD};
 use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
+use metachron_contact::StepContext;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
@@ -65,6 +66,10 @@ impl Tube {
 impl ClusterMember for Tube {
     fn role(&self) -> Role {
         Role::Deformable
+    }
+
+    fn look(&mut self, context: &StepContext<'_>, _dt_s: f64) {
+        self.time = context.time;
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {

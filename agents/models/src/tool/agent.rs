@@ -9,11 +9,13 @@
 use super::drive::{Drive, PointMotion};
 use super::force_sensor::ContactForces;
 use super::gripper::{Jaws, nearest, open_for};
+use super::member::Unknowns;
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
 use crate::limits::PART_MAX_S;
 use glam::{DQuat, DVec3};
+use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_contact::{Knock, beside};
 use metachron_core::{
@@ -28,22 +30,24 @@ use std::sync::Arc;
 /// A driven tool with its own clock.
 #[derive(Clone)]
 pub struct Tool {
-    spec: ToolSpec,
-    script: Script,
-    tool: ToolState,
+    pub(super) spec: ToolSpec,
+    pub(super) script: Script,
+    pub(super) tool: ToolState,
     /// The commanded point and its velocity: the tip is there if no contact pushes it.
-    commanded: PointMotion,
-    drive: Drive,
+    pub(super) commanded: PointMotion,
+    pub(super) drive: Drive,
     /// Distance of the tip from the target of the script or the user spring, metres.
-    lag_m: f64,
-    jaws: Jaws,
+    pub(super) lag_m: f64,
+    pub(super) jaws: Jaws,
     forces: ContactForces,
     knock: Knock,
-    form: Arc<CollisionShape>,
+    pub(super) form: Arc<CollisionShape>,
     /// Speed of its fastest point in the last step, m/s.
-    speed_m_s: f64,
-    at_rest: bool,
-    steps: u64,
+    pub(super) speed_m_s: f64,
+    pub(super) at_rest: bool,
+    pub(super) steps: u64,
+    /// What it is in a contact cluster.
+    pub(super) unknowns: Unknowns,
 }
 
 impl fmt::Debug for Tool {
@@ -66,7 +70,7 @@ const CATCH_SHARE: f64 = 0.5;
 /// A tip closer than this to its script has arrived, metres (and m/s).
 const ARRIVED: f64 = 1e-7;
 /// A tool on which sleeping bodies rest keeps still below this speed, m/s.
-const SUPPORTING_MAX_M_S: f64 = 2e-3;
+pub(super) const SUPPORTING_MAX_M_S: f64 = 2e-3;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
@@ -86,6 +90,7 @@ impl Tool {
         let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, forces, knock) = (Jaws::new(), ContactForces::default(), Knock::default());
         let (commanded, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
+        let unknowns = Unknowns::new(&tool, drive.mass_kg());
         Ok(Self {
             spec,
             script,
@@ -100,29 +105,33 @@ impl Tool {
             speed_m_s: 0.0,
             at_rest: false,
             steps: 0,
+            unknowns,
         })
     }
 
     /// Target of the user spring for the tip.
-    fn user_target(&self, spring: &AnchorSpring) -> PointMotion {
+    pub(super) fn user_target(&self, spring: &AnchorSpring) -> PointMotion {
         let local = if let Anchor::Local(local) = spring.anchor { local } else { DVec3::ZERO };
         PointMotion { position: spring.target - self.tool.rotation * local, velocity: spring.target_velocity }
     }
 
-    /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
-    fn follow_user_spring(&self, spring: &AnchorSpring, dt: f64, context: &StepContext<'_>) -> ToolState {
+    /// Whether jaws led by a user would close on what is near.
+    pub(super) fn may_catch(&self, context: &StepContext<'_>) -> bool {
+        nearest(&self.spec, self.tool.tip, context).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m)
+    }
+
+    /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that `is_near`.
+    pub(super) fn follow_user_spring(&self, spring: &AnchorSpring, dt: f64, is_near: bool) -> ToolState {
         let target = self.user_target(spring);
         let off = decay(self.commanded.relative_to(target), USER_RATE_PER_S, dt);
         let tip = target.position + target.velocity * dt + off.position;
-        let near = nearest(&self.spec, self.tool.tip, context)
-            .is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
-        let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
+        let wanted = if is_near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         ToolState { tip, velocity: target.velocity + off.velocity, jaw, ..self.tool }
     }
 
     /// Follows the script; the offset from it decays.
-    fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
+    pub(super) fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
         let start = PointMotion { position: from.tip, velocity: from.velocity };
         let off = decay(self.commanded.relative_to(start), RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
@@ -161,14 +170,14 @@ impl Tool {
     }
 
     /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
-    fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
+    pub(super) fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let open = self.tool.jaw > GRASP_BELOW;
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
         if open { open_for(&self.spec, self.tool.tip, context, reach_m) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
+    pub(super) fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
         let placed = PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } };
@@ -176,7 +185,7 @@ impl Tool {
     }
 
     /// Whether the commanded point has reached the end of the script: an obstacle that saturates the drive holds it back.
-    fn has_reached(&self, end: &Pose) -> bool {
+    pub(super) fn has_reached(&self, end: &Pose) -> bool {
         (self.commanded.position - end.tip).length() < ARRIVED && self.commanded.velocity.length() < ARRIVED
     }
 
@@ -196,12 +205,12 @@ impl Tool {
 }
 
 /// The shape of every tool.
-fn shape() -> ToolShape {
+pub(super) fn shape() -> ToolShape {
     ToolShape::default()
 }
 
 /// The ends of a tool in its own axes, and its sideways extent from the line between them, metres.
-fn reach() -> (DVec3, DVec3, f64) {
+pub(super) fn reach() -> (DVec3, DVec3, f64) {
     let ToolShape { shaft_radius_m: r, shaft_length_m } = shape();
     // jaws: 2 radii before the tip and 6 behind it, 4 to the side when they are wide open; clevis and ring, then the shaft
     (DVec3::Z * (2.0 * r), DVec3::NEG_Z * (10.0 * r + shaft_length_m), 5.0 * r)
@@ -215,14 +224,14 @@ fn bounds(tool: &ToolState, speed_m_s: f64) -> Bounds {
 }
 
 /// Speed of a tool's fastest point between two states `dt` seconds apart, m/s.
-fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
+pub(super) fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
     let (front, back, side_m) = reach();
     let way = |end: DVec3| (after.tip + after.rotation * end).distance(before.tip + before.rotation * end);
     (way(front).max(way(back)) + (after.jaw - before.jaw).abs() * side_m) / dt
 }
 
 /// The angular velocity that turns one rotation into another in `dt` seconds, world axes, rad/s.
-fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
+pub(super) fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
     let turned = to * from.conjugate();
     let shorter = if turned.w < 0.0 { -turned } else { turned };
     if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
@@ -252,7 +261,7 @@ impl Agent for Tool {
         let end = self.script.at(end_s);
         let spring = context.hands.first();
         let led = match spring {
-            Some(spring) => self.follow_user_spring(spring, dt_s, context),
+            Some(spring) => self.follow_user_spring(spring, dt_s, self.may_catch(context)),
             None => self.follow_script(&self.script.at(start_s), &end, dt_s),
         };
         let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
@@ -325,6 +334,10 @@ impl Agent for Tool {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
+    }
+
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        Some(self)
     }
 
     /// A tool is driven from outside and has no mass here.

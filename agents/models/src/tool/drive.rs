@@ -25,6 +25,15 @@ impl PointMotion {
     }
 }
 
+/// A step of the drive within a contact cluster.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Driven {
+    pub commanded: PointMotion,
+    pub tip: PointMotion,
+    /// What the drive gave the tip, N·s.
+    pub impulse_n_s: DVec3,
+}
+
 /// The impulses that the tip received in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct ReceivedImpulses {
@@ -75,15 +84,15 @@ impl Drive {
         [stiffness_n_m, self.damping_n_s_m()]
     }
 
-    fn damping_n_s_m(&self) -> f64 {
+    pub(super) fn damping_n_s_m(&self) -> f64 {
         2.0 * SWING_PER_S * self.mass_kg()
     }
 
-    fn stiffness_n_m(&self) -> f64 {
+    pub(super) fn stiffness_n_m(&self) -> f64 {
         self.limit_n / GIVE_M
     }
 
-    fn mass_kg(&self) -> f64 {
+    pub(super) fn mass_kg(&self) -> f64 {
         self.stiffness_n_m() / (SWING_PER_S * SWING_PER_S)
     }
 
@@ -120,6 +129,40 @@ impl Drive {
         let led =
             self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.saturate(from, force, given.lasting, dt));
         [led, self.tip(led)]
+    }
+
+    /// How the tip moves against the commanded point, m/s.
+    pub(super) fn rate(&self) -> DVec3 {
+        self.rate
+    }
+
+    /// Whether it gives all that it can.
+    pub(super) fn is_saturated(&self) -> bool {
+        self.saturated_force.is_some()
+    }
+
+    /// Ends a step of `h` seconds in which the commanded point moved with `led` to `to`, and the tip with the velocity `moved` that the
+    /// drive gave it together with all that touched it (clusters.md, eq. 14). Where the drive gave all that it can, the commanded
+    /// point stays as far from the tip as that stretches its spring (eq. 9f).
+    pub(super) fn follow(&mut self, to: PointMotion, [led, moved]: [DVec3; 2], h: f64) -> Driven {
+        let (k, c) = (self.stiffness_n_m(), self.damping_n_s_m());
+        let rate = moved - led;
+        let asked = -(self.off * k + rate * (h * k + c));
+        let force = asked.clamp_length_max(self.limit_n);
+        self.off += rate * h;
+        self.rate = rate;
+        let impulse_n_s = force * h;
+        if self.off.length() < REACHED && rate.length() < REACHED {
+            (self.off, self.rate) = (DVec3::ZERO, DVec3::ZERO);
+        }
+        if asked.length() <= self.limit_n {
+            self.saturated_force = None;
+            return Driven { commanded: to, tip: self.tip(to), impulse_n_s };
+        }
+        let tip = to.position + self.off;
+        (self.off, self.rate, self.saturated_force) = (-force / k, DVec3::ZERO, Some(force));
+        let commanded = PointMotion { position: tip - self.off, velocity: moved };
+        Driven { commanded, tip: self.tip(commanded), impulse_n_s }
     }
 
     /// The tip, for this commanded point.

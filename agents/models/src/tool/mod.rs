@@ -4,12 +4,13 @@
 //! Never here: the grasp force. The held agent solves it in its own step and books it in a ledger (`force_sensor.rs` reads it).
 //!
 //! `trajectory.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `gripper.rs` the
-//! grasp, `agent.rs` is the agent.
+//! grasp, `agent.rs` is the agent, `member.rs` what it is in a contact cluster.
 
 mod agent;
 mod drive;
 mod force_sensor;
 mod gripper;
+mod member;
 mod spec;
 mod trajectory;
 

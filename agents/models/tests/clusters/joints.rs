@@ -30,7 +30,7 @@ fn block(half_m: DVec3, position: DVec3, mass_kg: f64) -> RigidSpec {
 }
 
 fn rod(length_m: f64, top: DVec3) -> RigidSpec {
-    block(DVec3::new(0.005, 0.005, 0.5 * length_m), top - DVec3::Z * (0.5 * length_m), 1.0)
+    block(DVec3::new(0.05, 0.05, 0.5 * length_m), top - DVec3::Z * (0.5 * length_m), 1.0)
 }
 
 fn on_world(kind: JointKind) -> Joint {
@@ -48,7 +48,7 @@ fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
 }
 
 /// Moment of inertia of the rod about its end, kg m².
-const ROD_KG_M2: f64 = (1.0 + 0.005 * 0.005) / 3.0;
+const ROD_KG_M2: f64 = (1.0 + 0.05 * 0.05) / 3.0;
 
 #[test]
 fn a_pendulum_on_a_hinge_swings_with_its_closed_form_period() {

@@ -3,7 +3,9 @@
 mod bodies;
 mod joints;
 mod links;
+mod own_model;
 mod rebounds;
 mod scenes;
 mod stacks;
 mod table;
+mod tools;

@@ -32,6 +32,8 @@ pub struct Table {
     pub time: SimTime,
     /// Whether bodies touch each other.
     pub touching: bool,
+    /// How long the last macro step was, seconds.
+    last_s: f64,
     scene: ClusterScene,
     stepper: ClusterStepper,
     snapshot: Snapshot,
@@ -87,7 +89,7 @@ impl Table {
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
         let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
-        Self { bodies, time: SimTime::ZERO, touching: true, scene, stepper, snapshot }
+        Self { bodies, time: SimTime::ZERO, touching: true, last_s: 0.0, scene, stepper, snapshot }
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
@@ -154,7 +156,8 @@ impl Table {
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
         self.time = self.time + report.dt;
-        (report, report.dt.as_secs_f64())
+        self.last_s = report.dt.as_secs_f64();
+        (report, self.last_s)
     }
 
     pub fn energy_j(&mut self) -> f64 {
@@ -177,6 +180,17 @@ impl Table {
             Body::Curve(curve) => (mean(&curve.positions), mean(&curve.velocities)),
             _ => (DVec3::ZERO, DVec3::ZERO),
         }
+    }
+
+    /// The mean upward force of contacts of a body, the lower number of two, in the last macro step, N.
+    pub fn given_n(&self, body: usize, partner: Partner) -> f64 {
+        self.given_n_along(body, partner, DVec3::Z)
+    }
+
+    /// The same along another axis.
+    pub fn given_n_along(&self, body: usize, partner: Partner, axis: DVec3) -> f64 {
+        let of_pair = self.stepper.totals().iter().filter(|total| total.member == body && total.partner == partner);
+        of_pair.map(|total| total.impulse_n_s.dot(axis)).sum::<f64>() / self.last_s
     }
 
     /// Where a material point is.

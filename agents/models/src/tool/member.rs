@@ -1,0 +1,250 @@
+//! A tool in a contact cluster: its tip is a mass on a drive that follows the commanded point; its turns and its jaws are led.
+//!
+//! In: what leads it, steps, the velocity of its tip. Out: the tip's mass, its drive, its skin. Never here: contacts, the path.
+//! Theory: docs/theory/coupling.md, eq. 9d and 9f; docs/theory/clusters.md, section 7.
+
+use super::Tool;
+use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin};
+use super::drive::{Drive, PointMotion};
+use super::gripper::Jaws;
+use super::spec::REACH_MAX_M;
+use glam::{DMat3, DQuat, DVec3};
+use metachron_contact::cluster::{Block, Side};
+use metachron_contact::stepper::{self, ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::{AnchorSpring, StepContext};
+use metachron_core::{AgentId, Anchor, SimSpan, SimTime, StepError, ToolState};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+
+/// What it is in a cluster.
+#[derive(Debug, Clone)]
+pub(super) struct Unknowns {
+    time: SimTime,
+    /// The spring of a user, from the start of the macro step on, and whether there is something near that jaws would grasp.
+    hand: Option<AnchorSpring>,
+    is_near: bool,
+    /// The opening of the jaws when the last macro step began.
+    jaw_before: f64,
+    block: [Block; 1],
+    free: [DVec3; 1],
+    now: [DVec3; 1],
+    /// Where the step begun leads it, and how fast: the commanded point, m/s, its turn, rad/s, its jaws, 1/s.
+    led: ToolState,
+    led_m_s: DVec3,
+    led_rad_s: DVec3,
+    jaw_per_s: f64,
+    /// What the macro step may begin again from.
+    kept: Option<Kept>,
+}
+
+/// The state of a tool.
+#[derive(Debug, Clone, Copy)]
+struct Kept {
+    tool: ToolState,
+    commanded: PointMotion,
+    drive: Drive,
+    jaws: Jaws,
+    lag_m: f64,
+    speed_m_s: f64,
+    at_rest: bool,
+    steps: u64,
+    time: SimTime,
+    hand: Option<AnchorSpring>,
+}
+
+impl Unknowns {
+    pub fn new(tool: &ToolState, mass_kg: f64) -> Self {
+        let value = DMat3::from_diagonal(DVec3::splat(mass_kg));
+        Self {
+            time: SimTime::ZERO,
+            hand: None,
+            is_near: false,
+            jaw_before: tool.jaw,
+            block: [Block { row: 0, column: 0, value }],
+            free: [DVec3::ZERO],
+            now: [tool.velocity],
+            led: *tool,
+            led_m_s: DVec3::ZERO,
+            led_rad_s: DVec3::ZERO,
+            jaw_per_s: 0.0,
+            kept: None,
+        }
+    }
+}
+
+impl Tool {
+    /// Where it is led to in `h_s` seconds.
+    fn lead(&self, h_s: f64) -> ToolState {
+        let Unknowns { hand, is_near, time, .. } = &self.unknowns;
+        match hand {
+            Some(spring) => self.follow_user_spring(spring, h_s, *is_near),
+            None => {
+                let start_s = time.as_secs_f64();
+                self.follow_script(&self.script.at(start_s), &self.script.at(start_s + h_s), h_s)
+            }
+        }
+    }
+}
+
+impl ClusterMember for Tool {
+    fn role(&self) -> Role {
+        Role::Rigid
+    }
+
+    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
+        let hand = context.hands.first().copied();
+        let is_near = hand.is_some() && self.may_catch(context);
+        let was = std::mem::replace(&mut self.unknowns.jaw_before, self.tool.jaw);
+        (self.unknowns.time, self.unknowns.hand, self.unknowns.is_near) = (context.time, hand, is_near);
+        self.jaws.move_to(&self.spec, was, &self.tool, context);
+        self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.tool.admits = self.open_for(context, dt_s);
+        self.wake_others(context, dt_s);
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        let led = self.lead(h_s);
+        let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
+        if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
+            let what = format!("what leads it moves the tip to {}", led.tip);
+            return Err(StepError::Diverged { model: "tool", dt_s: h_s, what });
+        }
+        let led_m_s = (led.tip - self.commanded.position) / h_s;
+        let unknowns = &mut self.unknowns;
+        unknowns.now = [self.tool.velocity];
+        // a drive at its limit has nothing left to bring the tip's mass along with the commanded point
+        let carried = if self.drive.is_saturated() { self.tool.velocity } else { led_m_s + self.drive.rate() };
+        unknowns.free = [carried];
+        unknowns.led_rad_s = spin(self.tool.rotation, led.rotation, h_s);
+        unknowns.jaw_per_s = (led.jaw - self.tool.jaw) / h_s;
+        (unknowns.led, unknowns.led_m_s) = (led, led_m_s);
+        Ok(())
+    }
+
+    fn blocks(&self) -> &[Block] {
+        &self.unknowns.block
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &self.unknowns.free
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &self.unknowns.now
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        let ToolState { tip, rotation, jaw, .. } = self.tool;
+        Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
+    }
+
+    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
+        Side::node(0, 0)
+    }
+
+    fn led_m_s(&self, place: &Place) -> DVec3 {
+        let Place::Point(point) = *place else { return DVec3::ZERO };
+        let (arm, rotation) = (point - self.tool.tip, self.tool.rotation);
+        let opening = shape().opening_m_s(rotation.conjugate() * arm, self.unknowns.jaw_per_s);
+        self.unknowns.led_rad_s.cross(arm) + rotation * opening
+    }
+
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        let arm = self.tool.rotation * local;
+        let led_m_s = self.unknowns.led_rad_s.cross(arm);
+        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(self.tool.tip + arm, Side::node(0, 0)) })
+    }
+
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let way = v.first().map_or(DVec3::ZERO, |v| *v * t_s);
+        let led_rad_s = self.unknowns.led_rad_s;
+        let centre_m = self.tool.tip + way;
+        let rotation = DQuat::from_scaled_axis(led_rad_s * t_s) * self.tool.rotation;
+        Some(Pose { centre_m, origin_m: centre_m, rotation, turns: Side::FIXED, led_rad_s })
+    }
+
+    fn drive(&self) -> Option<stepper::Drive> {
+        Some(stepper::Drive {
+            point: MaterialPoint::new(self.tool.tip, Side::node(0, 0)),
+            target_m: self.commanded.position,
+            target_m_s: self.unknowns.led_m_s,
+            stiffness_n_m: self.drive.stiffness_n_m(),
+            damping_n_s_m: self.drive.damping_n_s_m(),
+            limit_n: self.spec.max_force_n,
+        })
+    }
+
+    fn is_led(&self) -> bool {
+        true
+    }
+
+    fn spares(&self, other: AgentId) -> bool {
+        self.tool.grasp.is_some_and(|grasp| grasp.target == other) || self.tool.admits == Some(other)
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let (front, back, side_m) = reach();
+        let Unknowns { led_rad_s, jaw_per_s, .. } = self.unknowns;
+        v[0].length() + led_rad_s.length() * (front.length().max(back.length()) + side_m) + jaw_per_s.abs() * side_m
+    }
+
+    fn keep(&mut self) {
+        let Unknowns { time, hand, .. } = self.unknowns;
+        let Self { tool, commanded, lag_m, speed_m_s, at_rest, steps, .. } = *self;
+        let (drive, jaws) = (self.drive, self.jaws);
+        let kept = Kept { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand };
+        self.unknowns.kept = Some(kept);
+    }
+
+    fn go_back(&mut self) {
+        let Some(kept) = self.unknowns.kept else { return };
+        let Kept { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand } = kept;
+        (self.tool, self.commanded, self.drive, self.jaws) = (tool, commanded, drive, jaws);
+        (self.lag_m, self.speed_m_s, self.at_rest, self.steps) = (lag_m, speed_m_s, at_rest, steps);
+        (self.unknowns.time, self.unknowns.hand) = (time, hand);
+    }
+
+    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
+        // its steps are the shortest of its cluster: it is never within one
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        if !v[0].is_finite() {
+            let what = "its tip is not at a finite place".to_owned();
+            return Err(StepError::Diverged { model: "tool", dt_s: h_s, what });
+        }
+        let Unknowns { led, led_m_s, led_rad_s, free, .. } = self.unknowns;
+        let pushed_n_s = (v[0] - free[0]) * self.drive.mass_kg();
+        let to = PointMotion { position: led.tip, velocity: led.velocity };
+        let driven = self.drive.follow(to, [led_m_s, v[0]], h_s);
+        self.commanded = driven.commanded;
+        let tip = ToolState { tip: driven.tip.position, velocity: driven.tip.velocity, ..led };
+        self.speed_m_s = speed(&self.tool, &tip, h_s);
+        let force_n = (pushed_n_s - driven.impulse_n_s).length() / h_s;
+        let unknowns = &mut self.unknowns;
+        unknowns.time = unknowns.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        if let Some(hand) = &mut unknowns.hand {
+            hand.target += hand.target_velocity * h_s;
+        }
+        let end = self.script.at(self.unknowns.time.as_secs_f64());
+        let wanted = self.unknowns.hand.map_or(end.tip, |spring| self.user_target(&spring).position);
+        self.lag_m = tip.tip.distance(wanted);
+        let over = self.script.is_over(self.unknowns.time.as_secs_f64());
+        let is_idle = self.unknowns.hand.is_none() && over && self.has_reached(&end);
+        self.tool = ToolState { spin: led_rad_s, is_idle, force_n, ..tip };
+        self.jaws.age(h_s);
+        self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.steps += 1;
+        self.at_rest = false;
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        self.tool.is_idle && self.tool.velocity.length() < SUPPORTING_MAX_M_S && !self.jaws.holds()
+    }
+
+    fn rest(&mut self) {
+        self.at_rest = true;
+        self.tool.velocity = DVec3::ZERO;
+    }
+}
