@@ -18,11 +18,12 @@ pub(super) struct Coupled {
     starts: Vec<usize>,
     /// The blocks of all rows that the meetings were found for.
     blocks: Vec<usize>,
-    /// Meetings by front; those of front k start at `of_fronts[k]`.
+    /// Meetings by front, those with one place next to each other; those of front k start at `of_fronts[k]`.
     by_front: Vec<usize>,
     of_fronts: Vec<usize>,
-    /// The gains that are in the factor.
+    /// The gains that are in the factor, and which of them are not zero.
     gains: Vec<DMat3>,
+    active: Vec<bool>,
     /// Of each term of all rows its gain times its map.
     pushed: Vec<DMat3>,
 }
@@ -39,10 +40,11 @@ struct Meeting {
 impl Coupled {
     /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and, where `whole`, for those of the rows.
     pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, whole: Option<&Rows>) {
-        for meeting in self.meetings.iter().filter(|meeting| self.gains[meeting.row] != DMat3::ZERO) {
+        for meeting in self.meetings.iter().filter(|meeting| self.active[meeting.row]) {
             self.factor.spoil(meeting.place.front);
         }
         self.gains.fill(DMat3::ZERO);
+        self.active.fill(false);
         let known = whole.is_none_or(|rows| self.knows(rows));
         if !(known && self.factor.fits(size, pairs)) {
             pairs.extend(whole.iter().flat_map(|rows| couplings(rows)));
@@ -60,6 +62,7 @@ impl Coupled {
         }
         self.forget();
         self.gains.resize(rows.len(), DMat3::ZERO);
+        self.active.resize(rows.len(), false);
         self.pushed.resize(rows.all_terms().len(), DMat3::ZERO);
         let terms = rows.all_terms();
         for row in 0..rows.len() {
@@ -91,9 +94,10 @@ impl Coupled {
         }
         self.meetings.clear();
         self.gains.clear();
+        self.active.clear();
     }
 
-    /// Lists the meetings by front, those of one front as they are.
+    /// Lists the meetings by front and place, those with one place as they are.
     fn sort(&mut self) {
         let Self { factor, meetings, by_front, of_fronts, .. } = self;
         of_fronts.resize(factor.len() + 2, 0);
@@ -105,6 +109,9 @@ impl Coupled {
             let next = &mut of_fronts[meeting.place.front + 1];
             by_front[*next] = k;
             *next += 1;
+        }
+        for front in of_fronts.windows(2).take(factor.len()) {
+            by_front[front[0]..front[1]].sort_unstable_by_key(|&k| (meetings[k].place, k));
         }
     }
 
@@ -118,20 +125,29 @@ impl Coupled {
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
-        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, pushed, .. } = self;
+        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, active, pushed, .. } = self;
         let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
             meetings[starts[row]..starts[row + 1]].iter().for_each(|meeting| factor.spoil(meeting.place.front));
             rows.range(row).for_each(|term| pushed[term] = *gain * terms[term].map);
             *known = *gain;
+            active[row] = *gain != DMat3::ZERO;
         }
         let done = factor.factor(|front, entries| {
-            for &at in &by_front[of_fronts[front]..of_fronts[front + 1]] {
-                let Meeting { row, left, right, place } = meetings[at];
-                if gains[row] != DMat3::ZERO {
-                    entries.add(place, &(terms[left].map.transpose() * pushed[right]));
+            let here = by_front[of_fronts[front]..of_fronts[front + 1]].iter().map(|&at| meetings[at]);
+            let mut sum: Option<(Place, DMat3)> = None;
+            for Meeting { left, right, place, .. } in here.filter(|meeting| active[meeting.row]) {
+                let product = terms[left].map.transpose() * pushed[right];
+                match &mut sum {
+                    Some((known, sum)) if *known == place => *sum += product,
+                    other => {
+                        if let Some((known, sum)) = other.replace((place, product)) {
+                            entries.add(known, &sum);
+                        }
+                    }
                 }
             }
+            sum.iter().for_each(|(place, sum)| entries.add(*place, sum));
         });
         done.is_ok()
     }
