@@ -131,10 +131,11 @@ fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass<'_>) -> bool {
 /// The impulses that a velocity asks for, and how they change with it: pulls and gains.
 fn evaluate(iterate: &mut Iterate, shifts: &[f64]) {
     for (k, shift) in shifts.iter().enumerate() {
-        let row = iterate.rows.rows[k];
-        let asked = -(iterate.state.velocity[k] + DVec3::X * *shift) / row.compliance;
+        let row = &iterate.rows.rows[k];
+        let compliance = row.compliance;
+        let asked = -(iterate.state.velocity[k] + DVec3::X * *shift) / compliance;
         let image = row.law.project(Form::Cone, asked);
-        iterate.linearise(k, &image, row.compliance);
+        iterate.linearise(k, &image, compliance);
     }
 }
 

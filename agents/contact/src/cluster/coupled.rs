@@ -13,16 +13,20 @@ use glam::DVec3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     factor: Cholesky,
-    /// Where two terms of a row meet, row by row; those of row k start at `starts[k]`.
+    /// Where two terms of a row meet, by front, those with one place next to each other; those of front k start at `of_fronts[k]`.
     meetings: Vec<Meeting>,
+    of_fronts: Vec<usize>,
+    /// The fronts of all meetings, row by row; those of row k start at `starts[k]`.
+    fronts: Vec<usize>,
     starts: Vec<usize>,
     /// The blocks of all rows that the meetings were found for.
     blocks: Vec<usize>,
-    /// Meetings by front; those of front k start at `of_fronts[k]`.
-    by_front: Vec<usize>,
-    of_fronts: Vec<usize>,
-    /// The gains that are in the factor.
+    /// Storage to sort meetings with.
+    order: Vec<usize>,
+    unsorted: Vec<Meeting>,
+    /// The gains that are in the factor, and which of them are not zero.
     gains: Vec<DMat3>,
+    active: Vec<bool>,
     /// Of each term of all rows its gain times its map.
     pushed: Vec<DMat3>,
 }
@@ -39,10 +43,11 @@ struct Meeting {
 impl Coupled {
     /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and, where `whole`, for those of the rows.
     pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, whole: Option<&Rows>) {
-        for meeting in self.meetings.iter().filter(|meeting| self.gains[meeting.row] != DMat3::ZERO) {
-            self.factor.spoil(meeting.place.front);
+        for row in (0..self.active.len()).filter(|&row| self.active[row]) {
+            self.fronts[self.starts[row]..self.starts[row + 1]].iter().for_each(|&front| self.factor.spoil(front));
         }
         self.gains.fill(DMat3::ZERO);
+        self.active.fill(false);
         let known = whole.is_none_or(|rows| self.knows(rows));
         if !(known && self.factor.fits(size, pairs)) {
             pairs.extend(whole.iter().flat_map(|rows| couplings(rows)));
@@ -60,21 +65,23 @@ impl Coupled {
         }
         self.forget();
         self.gains.resize(rows.len(), DMat3::ZERO);
+        self.active.resize(rows.len(), false);
         self.pushed.resize(rows.all_terms().len(), DMat3::ZERO);
         let terms = rows.all_terms();
         for row in 0..rows.len() {
-            self.starts.push(self.meetings.len());
+            self.starts.push(self.fronts.len());
             self.blocks.extend(rows.terms(row).iter().map(|term| term.block));
             for left in rows.range(row) {
                 for right in rows.range(row).start..=left {
                     let place = self.factor.place(Pair { row: terms[left].block, column: terms[right].block });
-                    self.meetings.extend(place.map(|place| Meeting { row, left, right, place }));
+                    self.fronts.extend(place.map(|place| place.front));
+                    self.unsorted.extend(place.map(|place| Meeting { row, left, right, place }));
                 }
             }
             // an end of each row's blocks, so that lists of blocks are equal where all rows' are
             self.blocks.push(usize::MAX);
         }
-        self.starts.push(self.meetings.len());
+        self.starts.push(self.fronts.len());
         self.sort();
     }
 
@@ -86,26 +93,32 @@ impl Coupled {
     }
 
     fn forget(&mut self) {
-        for list in [&mut self.starts, &mut self.blocks, &mut self.by_front, &mut self.of_fronts] {
+        for list in [&mut self.starts, &mut self.blocks, &mut self.fronts, &mut self.order, &mut self.of_fronts] {
             list.clear();
         }
         self.meetings.clear();
+        self.unsorted.clear();
         self.gains.clear();
+        self.active.clear();
     }
 
-    /// Lists the meetings by front, those of one front as they are.
+    /// Lists the meetings by front and place, those with one place as they are.
     fn sort(&mut self) {
-        let Self { factor, meetings, by_front, of_fronts, .. } = self;
+        let Self { factor, meetings, unsorted, order, of_fronts, .. } = self;
         of_fronts.resize(factor.len() + 2, 0);
         // two places ahead, as each start moves on to the next while the list is filled
-        meetings.iter().for_each(|meeting| of_fronts[meeting.place.front + 2] += 1);
+        unsorted.iter().for_each(|meeting| of_fronts[meeting.place.front + 2] += 1);
         (2..of_fronts.len()).for_each(|k| of_fronts[k] += of_fronts[k - 1]);
-        by_front.resize(meetings.len(), 0);
-        for (k, meeting) in meetings.iter().enumerate() {
+        order.resize(unsorted.len(), 0);
+        for (k, meeting) in unsorted.iter().enumerate() {
             let next = &mut of_fronts[meeting.place.front + 1];
-            by_front[*next] = k;
+            order[*next] = k;
             *next += 1;
         }
+        for front in of_fronts.windows(2).take(factor.len()) {
+            order[front[0]..front[1]].sort_unstable_by_key(|&k| (unsorted[k].place, k));
+        }
+        meetings.extend(order.iter().map(|&k| unsorted[k]));
     }
 
     /// Factors the matrix without contacts.
@@ -118,20 +131,29 @@ impl Coupled {
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
-        let Self { factor, meetings, starts, by_front, of_fronts, gains: known, pushed, .. } = self;
+        let Self { factor, meetings, of_fronts, fronts, starts, gains: known, active, pushed, .. } = self;
         let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
-            meetings[starts[row]..starts[row + 1]].iter().for_each(|meeting| factor.spoil(meeting.place.front));
+            fronts[starts[row]..starts[row + 1]].iter().for_each(|&front| factor.spoil(front));
             rows.range(row).for_each(|term| pushed[term] = *gain * terms[term].map);
             *known = *gain;
+            active[row] = *gain != DMat3::ZERO;
         }
         let done = factor.factor(|front, entries| {
-            for &at in &by_front[of_fronts[front]..of_fronts[front + 1]] {
-                let Meeting { row, left, right, place } = meetings[at];
-                if gains[row] != DMat3::ZERO {
-                    entries.add(place, &(terms[left].map.transpose() * pushed[right]));
+            let here = meetings[of_fronts[front]..of_fronts[front + 1]].iter();
+            let mut sum: Option<(Place, DMat3)> = None;
+            for &Meeting { left, right, place, .. } in here.filter(|meeting| active[meeting.row]) {
+                let product = terms[left].map.transpose() * pushed[right];
+                match &mut sum {
+                    Some((known, sum)) if *known == place => *sum += product,
+                    other => {
+                        if let Some((known, sum)) = other.replace((place, product)) {
+                            entries.add(known, &sum);
+                        }
+                    }
                 }
             }
+            sum.iter().for_each(|(place, sum)| entries.add(*place, sum));
         });
         done.is_ok()
     }

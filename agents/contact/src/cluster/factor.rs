@@ -18,7 +18,7 @@ pub(super) struct Pair {
 }
 
 /// Where a block is stored, and whether as its transpose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Place {
     /// The front.
     pub front: usize,

@@ -84,10 +84,10 @@ pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
 fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
     let mut largest = iterate.system.members.largest_velocity(&iterate.state.left);
     for k in 0..iterate.rows.len() {
-        let (row, at) = (iterate.rows.rows[k], iterate.state.point(k));
-        let image = row.natural_map(form, at);
+        let (row, at) = (&iterate.rows.rows[k], iterate.state.point(k));
+        let (image, scale) = (row.natural_map(form, at), row.scale);
         largest = worse(largest, row.miss(at.impulse, image.value));
-        iterate.linearise(k, &image, row.scale);
+        iterate.linearise(k, &image, scale);
     }
     largest
 }
@@ -120,9 +120,8 @@ fn sum_of_squares(iterate: &Iterate, aim: &Aim<'_>, share: f64) -> f64 {
     let terms = rows.rows.iter().enumerate().map(|(k, row)| {
         let impulse = state.lambda[k] + step.lambda[k] * share;
         let velocity = state.velocity[k] + step.velocity[k] * share;
-        let mut row = *row;
-        row.compliance = row.hardened(impulse, aim.yield_m_s);
-        let image = row.natural_map(aim.form, Point { impulse, velocity });
+        let compliance = row.hardened(impulse, aim.yield_m_s);
+        let image = row.natural_map_at(aim.form, Point { impulse, velocity }, compliance);
         row.scale * (impulse - image.value).length_squared()
     });
     terms.sum::<f64>() + momentum.sum::<f64>()

@@ -120,25 +120,30 @@ impl Row {
         }
     }
 
-    /// The velocity that a law sees: what the row gives way by is part of it.
-    pub fn yielding_velocity(&self, at: Point) -> DVec3 {
-        at.velocity + at.impulse * self.compliance
-    }
-
     /// P(z) of eq. 7 at an iterate; where it gives the impulse back, the law holds.
     #[inline]
     pub fn natural_map(&self, form: Form, at: Point) -> Projection {
-        let mut velocity = self.yielding_velocity(at);
+        self.natural_map_at(form, at, self.compliance)
+    }
+
+    /// The same at another compliance.
+    #[inline]
+    pub fn natural_map_at(&self, form: Form, at: Point, compliance: f64) -> Projection {
+        let mut velocity = at.velocity + at.impulse * compliance;
         if form == Form::Cone {
-            velocity.x += self.shift(at);
+            velocity.x += self.shift_of(velocity);
         }
         self.law.project(form, at.impulse - velocity / self.scale)
     }
 
     /// μ |ũ_t|, which makes the law one of complementarity of cones (SF98); zero without a cone.
     pub fn shift(&self, at: Point) -> f64 {
+        self.shift_of(at.velocity + at.impulse * self.compliance)
+    }
+
+    fn shift_of(&self, yielding: DVec3) -> f64 {
         match self.law {
-            Law::Coulomb { friction } => friction * tangential(self.yielding_velocity(at)),
+            Law::Coulomb { friction } => friction * tangential(yielding),
             _ => 0.0,
         }
     }
