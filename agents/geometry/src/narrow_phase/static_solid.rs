@@ -9,7 +9,7 @@
 
 use super::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
-use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
+use super::swept::{AROUND_M, Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
 use super::{NarrowPhaseScratch, SweptShape, finish, touches};
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape};
@@ -129,7 +129,7 @@ impl StaticSolid {
         let share = self.first_share(body, reach_m, scratch, &mut swept);
         let [storage, _] = &mut swept.placed;
         if let Some(then) = share.and_then(|share| body.within(share, storage)) {
-            self.touches(&then, reach_m + 2.0 * NEAR_M, scratch, into);
+            self.touches(&then, reach_m + AROUND_M, scratch, into);
         }
         scratch.swept = swept;
         share
