@@ -106,7 +106,7 @@ impl PartOnTriangle<'_> {
             ..TouchKey::new(TouchKind::MeshTriangle, features)
         };
         if !turned && !is_there {
-            self.add(key([0; 2]), normal, apart.on[0], apart.gap_m, into);
+            self.add(self.touch(key([0; 2]), normal, apart.on[0], apart.gap_m), into);
         }
         for point in &manifold.points {
             let place = part.rotation * point.local_p1.as_dvec3();
@@ -120,7 +120,7 @@ impl PartOnTriangle<'_> {
             if turned && gap_m < DEEPER * apart.gap_m.min(0.0) {
                 continue;
             }
-            self.add(key([point.fid2.0, point.fid1.0]), normal, place, gap_m, into);
+            self.add(self.touch(key([point.fid2.0, point.fid1.0]), normal, place, gap_m), into);
         }
     }
 
@@ -160,17 +160,21 @@ impl PartOnTriangle<'_> {
         Some(mesh.rotation * if turned.dot(*face) > 1.0 - f64::from(f32::EPSILON) { *face } else { turned })
     }
 
-    /// Adds a place on the part, relative to its origin, unless it is too far or a neighbouring triangle has reported it.
-    fn add(&self, key: TouchKey, normal: DVec3, place: DVec3, gap_m: f64, into: &mut Vec<Touch>) {
+    /// The contact at a place on the part, relative to its origin.
+    fn touch(&self, key: TouchKey, normal: DVec3, place: DVec3, gap_m: f64) -> Touch {
         let on_a = self.part.origin + place;
+        Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b: Place::Point(on_a - normal * gap_m) }
+    }
+
+    /// Adds a contact, unless it is too far or a neighbouring triangle has reported it.
+    fn add(&self, touch: Touch, into: &mut Vec<Touch>) {
         let within_m = SAME_SHARE * self.size_m;
         let is_same = |known: &Touch| {
-            let Place::Point(reported) = known.on_a else { return false };
-            reported.distance(on_a) < within_m && known.normal.dot(normal) > FACE
+            let (Place::Point(reported), Place::Point(here)) = (known.on_a, touch.on_a) else { return false };
+            reported.distance(here) < within_m && known.normal.dot(touch.normal) > FACE
         };
-        if gap_m <= self.reach_m && !into[self.from..].iter().any(is_same) {
-            let on_b = Place::Point(on_a - normal * gap_m);
-            into.push(Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b });
+        if touch.gap_m <= self.reach_m && !into[self.from..].iter().any(is_same) {
+            into.push(touch);
         }
     }
 }
