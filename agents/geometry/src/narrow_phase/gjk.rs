@@ -50,7 +50,7 @@ const ROUNDING: f64 = 1e-15;
 const TOUCHING_SHARE: f64 = 1e-12;
 
 /// What a search finds.
-enum Found {
+pub(super) enum Found {
     Apart(Separation),
     /// They are farther than the reach, or not finite.
     Far,
@@ -143,7 +143,8 @@ impl<'a> Difference<'a> {
         if let Found::Apart(separation) = self.search(reach_m) { Some(separation) } else { None }
     }
 
-    fn search(&self, reach_m: f64) -> Found {
+    /// The same, and what there is where they are not apart.
+    pub fn search(&self, reach_m: f64) -> Found {
         let start = self.parts[0].origin() - self.parts[1].origin();
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
         let mut best: Option<Separation> = None;

@@ -6,7 +6,7 @@
 //! two coplanar triangles is not caught by their edge. What comes from behind a triangle does not touch it.
 
 use super::convex_convex::{ConvexScratch, SAME_SHARE, SINGLE_SHARE, clip, parts, pose};
-use super::gjk::{Difference, Part, Rounded, Separation};
+use super::gjk::{Convex, Difference, Found, Part, Rounded, Separation};
 use super::primitives::Block;
 use super::touch_key::{TouchKey, TouchKind};
 use crate::mesh_distance::MeshField;
@@ -18,6 +18,8 @@ use rapier3d::parry::shape::{TriMesh, Triangle};
 
 /// A normal whose cosine with that of a triangle is above this is the same.
 const FACE: f64 = 1.0 - 1e-9;
+/// Neighbours whose normals have a cosine above this with a triangle's are in its plane: a tenth of a degree.
+const FLAT: f64 = 1.0 - 1e-6;
 /// Where the mesh has turned a normal, a place is left out that is deeper by this factor than the way out before: it belongs to another
 /// triangle.
 const DEEPER: f64 = 5.0;
@@ -82,10 +84,15 @@ impl PartOnTriangle<'_> {
         let triangle = Part { number: 0, shape: &shape, origin: part.origin, rotation: mesh.rotation };
         let corners = near.map(|corner| part.origin + mesh.rotation * corner);
         let ConvexScratch { hull, manifold } = scratch;
-        let Some(apart) = Difference::new(part, &Rounded { corners, radii_m: [0.0; 3] }).apart(self.reach_m, hull)
-        else {
-            return;
+        let rounded = Rounded { corners, radii_m: [0.0; 3] };
+        let difference = Difference::new(part, &rounded);
+        let apart = match difference.search(self.reach_m) {
+            Found::Apart(apart) => Some(apart),
+            Found::Far => None,
+            Found::Overlap if self.is_flat() => self.out_of_face(),
+            Found::Overlap => hull.way_out(&difference),
         };
+        let Some(apart) = apart else { return };
         let Some(normal) = self.allowed(apart.normal) else { return };
         let turned = normal != apart.normal;
         let facing = Separation { normal, ..apart };
@@ -99,7 +106,7 @@ impl PartOnTriangle<'_> {
             ..TouchKey::new(TouchKind::MeshTriangle, features)
         };
         if !turned && !is_there {
-            self.add(key([0; 2]), normal, apart.on[0], apart.gap_m, into);
+            self.add(self.touch(key([0; 2]), normal, apart.on[0], apart.gap_m), into);
         }
         for point in &manifold.points {
             let place = part.rotation * point.local_p1.as_dvec3();
@@ -113,8 +120,24 @@ impl PartOnTriangle<'_> {
             if turned && gap_m < DEEPER * apart.gap_m.min(0.0) {
                 continue;
             }
-            self.add(key([point.fid2.0, point.fid1.0]), normal, place, gap_m, into);
+            self.add(self.touch(key([point.fid2.0, point.fid1.0]), normal, place, gap_m), into);
         }
+    }
+
+    /// Whether the triangle and its neighbours are in one plane: then every way out of it is along its normal.
+    fn is_flat(&self) -> bool {
+        let cone = self.mesh.triangles.triangle_normal_constraints(self.number);
+        cone.is_some_and(|cone| cone.edges.iter().all(|edge| f64::from(edge.dot(cone.face)) > FLAT))
+    }
+
+    /// The way out of the triangle along its normal; `None` where the other way is shorter.
+    fn out_of_face(&self) -> Option<Separation> {
+        let Self { part, mesh, near, face, .. } = self;
+        let normal = mesh.rotation * *face;
+        let plane_m = face.dot(near[0]);
+        let [low, high] = [-normal, normal].map(|way| part.support(way, part.origin));
+        let (front_m, back_m) = (normal.dot(low) - plane_m, normal.dot(high) - plane_m);
+        (-front_m <= back_m).then(|| Separation { normal, gap_m: front_m, on: [low, low - normal * front_m] })
     }
 
     /// The normal that the mesh allows for one that leads out of the triangle; `None` behind it.
@@ -137,17 +160,21 @@ impl PartOnTriangle<'_> {
         Some(mesh.rotation * if turned.dot(*face) > 1.0 - f64::from(f32::EPSILON) { *face } else { turned })
     }
 
-    /// Adds a place on the part, relative to its origin, unless it is too far or a neighbouring triangle has reported it.
-    fn add(&self, key: TouchKey, normal: DVec3, place: DVec3, gap_m: f64, into: &mut Vec<Touch>) {
+    /// The contact at a place on the part, relative to its origin.
+    fn touch(&self, key: TouchKey, normal: DVec3, place: DVec3, gap_m: f64) -> Touch {
         let on_a = self.part.origin + place;
+        Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b: Place::Point(on_a - normal * gap_m) }
+    }
+
+    /// Adds a contact, unless it is too far or a neighbouring triangle has reported it.
+    fn add(&self, touch: Touch, into: &mut Vec<Touch>) {
         let within_m = SAME_SHARE * self.size_m;
         let is_same = |known: &Touch| {
-            let Place::Point(reported) = known.on_a else { return false };
-            reported.distance(on_a) < within_m && known.normal.dot(normal) > FACE
+            let (Place::Point(reported), Place::Point(here)) = (known.on_a, touch.on_a) else { return false };
+            reported.distance(here) < within_m && known.normal.dot(touch.normal) > FACE
         };
-        if gap_m <= self.reach_m && !into[self.from..].iter().any(is_same) {
-            let on_b = Place::Point(on_a - normal * gap_m);
-            into.push(Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b });
+        if touch.gap_m <= self.reach_m && !into[self.from..].iter().any(is_same) {
+            into.push(touch);
         }
     }
 }

@@ -9,7 +9,7 @@
 
 use super::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
-use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
+use super::swept::{AROUND_M, Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
 use super::{NarrowPhaseScratch, SweptShape, finish, touches};
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape};
@@ -96,10 +96,10 @@ impl StaticSolid {
     ) {
         let is_rigid = matches!(body.form.kind, ShapeKind::Solid(_) | ShapeKind::Tool(_));
         match &self.mesh {
-            Some(mesh) => {
+            Some(_) => {
                 into.clear();
                 scratch.known.prepare_pieces(body.form);
-                self.touch_mesh(mesh, body, reach_m, scratch, into);
+                self.touch_mesh(body, reach_m, scratch, into);
                 finish(into);
             }
             None if self.is_plane() && is_rigid => {
@@ -129,7 +129,7 @@ impl StaticSolid {
         let share = self.first_share(body, reach_m, scratch, &mut swept);
         let [storage, _] = &mut swept.placed;
         if let Some(then) = share.and_then(|share| body.within(share, storage)) {
-            self.touches(&then, reach_m + 2.0 * NEAR_M, scratch, into);
+            self.touches(&then, reach_m + AROUND_M, scratch, into);
         }
         scratch.swept = swept;
         share
@@ -225,13 +225,12 @@ impl StaticSolid {
     /// Adds the places of a body on a mesh.
     fn touch_mesh(
         &self,
-        mesh: &StaticMesh,
         body: &PlacedShape<'_>,
         reach_m: f64,
         scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) {
-        let ShapeKind::Solid(form) = &self.form.kind else { return };
+        let (ShapeKind::Solid(form), Some(mesh)) = (&self.form.kind, &self.mesh) else { return };
         let (Some(triangles), Some(field)) = (form.shape.as_trimesh(), mesh.field.mesh()) else { return };
         let NarrowPhaseScratch { known, searches, .. } = scratch;
         let (origin, rotation) = (self.position, self.rotation);

@@ -68,8 +68,7 @@ impl FeatureIndex {
 impl SkinIndex {
     /// Sorts the features of a surface that meet the region.
     fn fill(&mut self, surface: &Surface<'_>, region: Aabb) {
-        // twice an edge: a triangle is in eight cells at most
-        let cell_m = (2.0 * surface.form.edge_m).max(f64::MIN_POSITIVE);
+        let cell_m = surface.form.edge_m.max(f64::MIN_POSITIVE);
         let triangles = surface.form.triangles.iter().map(|corners| Aabb::of(&surface.corners(*corners)));
         self.triangles.fill(triangles, region, cell_m);
         let edges = surface.form.edges.iter().map(|ends| Aabb::of(&ends.map(|vertex| surface.at(vertex))));

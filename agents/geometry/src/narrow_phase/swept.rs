@@ -18,6 +18,9 @@ use glam::{DQuat, DVec3};
 
 /// Shapes this much nearer than the reach count as touching, metres: a twentieth of the depth at which contacts rest.
 pub(super) const NEAR_M: f64 = 1e-6;
+/// Contacts at the moment of a touch are those with so much more gap, metres: a span may leave its nearest place to its end, which is a little
+/// farther, and what touches next is at hand.
+pub(super) const AROUND_M: f64 = 1e-4;
 /// Leaps of a pair of elements; two to four bring most together, but one that turns by radians about a far pivot takes hundreds. One that
 /// takes more touches where it is then: early, not late.
 const LEAPS: usize = 1000;
@@ -52,7 +55,7 @@ pub(super) struct Between {
 }
 
 /// The share 0 … 1 of the motion of `a` and `b` at which they first come within `reach_m` (metres, ≥ 0) of each other, and their contacts at
-/// that moment, by rising keys; `None` and no contacts where they do not. 0 where they touch at the start.
+/// that moment, by rising keys, with those that are up to a tenth of a millimetre farther; `None` and no contacts where they do not. 0 where they touch at the start.
 ///
 /// A moment is up to a micrometre of gap early and never late. Nothing is allocated once the numbers of nodes and contacts settle.
 pub fn first_touch(
@@ -68,7 +71,7 @@ pub fn first_touch(
     if let Some(share) = share {
         let [first, second] = &mut swept.placed;
         if let (Some(first), Some(second)) = (a.within(share, first), b.within(share, second)) {
-            touches(&first, &second, reach_m + 2.0 * NEAR_M, scratch, into);
+            touches(&first, &second, reach_m + AROUND_M, scratch, into);
         }
     }
     scratch.swept = swept;

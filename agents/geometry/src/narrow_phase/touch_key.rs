@@ -74,6 +74,18 @@ impl TouchKey {
         ]
     }
 
+    /// The same without the triangle on which it is: a corner, a node or a part's feature that slides over a skin or a static mesh keeps this name
+    /// from triangle to triangle. Over a border two contacts may have one.
+    #[must_use]
+    pub fn anywhere(self) -> Self {
+        let Self { parts: [_, part], features: [_, second], .. } = self;
+        match self.kind {
+            TouchKind::Triangle => Self { features: [0, second], place: 0, ..self },
+            TouchKind::MeshTriangle => Self { parts: [0, part], features: [0, second], place: 0, ..self },
+            _ => self,
+        }
+    }
+
     /// The key in one word, for solvers that keep them so. Unique for up to 2²⁰ features of a skin, 2²² of a convex part and 32 parts;
     /// past those it may be that of another contact.
     #[must_use]

@@ -26,8 +26,8 @@ const FLAT: f64 = 1.0 - 1e-9;
 /// Alternating projections between a triangle and a block: both are convex, so the two points approach each other.
 const PROJECTIONS: usize = 8;
 /// Limit of the cosine of a tool's normal with the skin's. A body that touches a skin from outside pushes it inwards. A tool that would
-/// push it aside or outwards has pierced it, and touches it no more until it is out again. Half way round the edge of a box the cosine with
-/// the nearer face is 0.7, at its corner 0.6.
+/// push it aside or outwards has pierced it, and touches it no more until it is out again. At the edge of a box the cosine is 0.7, at a
+/// corner 0.6.
 const PIERCED: f64 = -0.5;
 
 /// The point of a triangle that is nearest to a block.
@@ -227,18 +227,10 @@ impl SurfaceQuery<'_> {
         })
     }
 
-    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there: through every
-    /// triangle that meets there.
+    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
-        let form = self.surface.form;
-        let meets = |triangle: &&[u32; 3]| {
-            let mut counting = spot.vertices.iter().zip(spot.shares).filter(|(_, share)| *share != 0.0);
-            counting.all(|(vertex, _)| triangle.contains(vertex))
-        };
-        let faces = form.triangles.iter().filter(meets).filter_map(|triangle| {
-            let [a, b, c] = self.surface.corners(*triangle);
-            (b - a).cross(c - a).try_normalize()
-        });
-        form.closed && faces.into_iter().all(|face| face.dot(normal) > PIERCED)
+        let inside = spot.shares[2] > 0.0;
+        let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
+        self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
     }
 }

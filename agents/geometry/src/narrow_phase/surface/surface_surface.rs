@@ -144,10 +144,12 @@ impl<'a> SkinPair<'a> {
         for edge in here.surface.edges_in(here.region) {
             let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
             there.each_edge(around.grown(self.within_m()), |other| {
-                let (s, t) = near_segments(edge.ends, other.ends);
                 // of two edges of one skin the lower number comes first
-                let own =
-                    |own: OwnSkin<'_>| edge.number >= other.number || own.is_crossed(edge.vertices, other.vertices);
+                if self.own.is_some() && edge.number >= other.number {
+                    return;
+                }
+                let (s, t) = near_segments(edge.ends, other.ends);
+                let own = |own: OwnSkin<'_>| own.is_crossed(edge.vertices, other.vertices);
                 if !(inner.contains(&s) && inner.contains(&t)) || self.own.is_some_and(own) {
                     return;
                 }

@@ -121,6 +121,27 @@ proptest! {
 }
 
 #[test]
+fn a_corner_that_slides_over_a_sheet_keeps_its_name_from_triangle_to_triangle() {
+    let (form, positions) = flat_sheet();
+    let cube = cuboid(DVec3::splat(0.02));
+    let down = DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::NEG_Z);
+    let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
+    let mut triangles = Vec::new();
+    let names: Vec<_> = (0..60)
+        .map(|step| {
+            let position = DVec3::new(0.03 + 2e-3 * f64::from(step), 0.06, 0.02 * 3.0_f64.sqrt() + 1.1e-3);
+            let found = all(&here, &at(&cube, position, down), 5e-4);
+            let inside = found.iter().find(|touch| touch.key.kind == TouchKind::Triangle).unwrap();
+            triangles.push(inside.key.features[0]);
+            inside.key.anywhere()
+        })
+        .collect();
+    assert!(names.iter().all(|name| *name == names[0]), "{names:?}");
+    triangles.dedup();
+    assert!(triangles.len() > 3, "{triangles:?}");
+}
+
+#[test]
 fn a_box_s_corner_over_a_triangle_touches_inside_it() {
     let (form, mut positions) = sheet();
     positions.iter_mut().for_each(|x| x.z = 0.0);

@@ -130,7 +130,7 @@ proptest! {
                     continue;
                 }
                 if let Some((_, touches)) = &found {
-                    let near = |touch: &Touch| touch.gap_m < reach_m + 2.0 * EARLY_M;
+                    let near = |touch: &Touch| touch.gap_m < reach_m + 1e-4;
                     prop_assert!(touches.iter().any(near), "{until}: {:?} {:?} {touches:?}", one.kind, two.kind);
                 }
                 let (mut room, mut other) = (Default::default(), Default::default());
