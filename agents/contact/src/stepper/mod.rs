@@ -73,9 +73,11 @@ pub struct ClusterReport {
     pub factors: u32,
     /// Convex passes in all fine steps.
     pub passes: u32,
-    /// Solves of all fine steps, those that went the convex way, and those that came to no end.
+    /// Solves of all fine steps.
     pub solves: u32,
+    /// Those of them that went the convex way.
     pub convex: u32,
+    /// Those of them that came to no end.
     pub cut: u32,
     /// The deepest overlap seen, metres.
     pub depth_m: f64,

@@ -1,6 +1,9 @@
 //! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
 
 mod bodies;
+mod grasp;
 mod scenes;
+mod slope;
 mod stacks;
+mod steps;
 mod table;
