@@ -140,19 +140,18 @@ pub fn faults(name: &str, found: &Findings) -> Vec<&'static str> {
     list
 }
 
+#[cfg(test)]
 fn all_hold(name: &str, [lowest_hz, others_hz]: [f64; 2]) {
     let found = scene(name).at_rates(lowest_hz, others_hz).play(SECONDS);
     let faults = faults(name, &found);
     assert!(faults.is_empty(), "{name} at {lowest_hz} : {others_hz} Hz, {faults:?}: {found:?}");
 }
 
-// a cube that rolls off a held slab turns so far in a step of 1/60 s that it makes a milljoule: at 120 Hz
 #[test]
 fn every_scene_lies_at_60_hz() {
-    for name in NAMES.into_iter().filter(|name| *name != "cube on a tube on a held slab") {
+    for name in NAMES {
         all_hold(name, [60.0, 60.0]);
     }
-    all_hold("cube on a tube on a held slab", [120.0, 120.0]);
 }
 
 #[test]
