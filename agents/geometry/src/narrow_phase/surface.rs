@@ -99,6 +99,11 @@ impl BarycentricPoint {
         terms.sum()
     }
 
+    /// Whether it is a point of a triangle, not of a vertex or an edge.
+    fn is_of_triangle(self) -> bool {
+        self.vertices[1] != self.vertices[2]
+    }
+
     fn place(self) -> Place {
         Place::Surface { vertices: self.vertices, shares: self.shares }
     }
@@ -154,6 +159,17 @@ impl Triangle {
         let shares = shares(position, self.corners)?;
         let deep = shares.into_iter().all(|share| share > LEAN_SHARE);
         deep.then_some(SkinPoint { spot: BarycentricPoint { vertices: self.vertices, shares }, position })
+    }
+}
+
+impl Triangle {
+    /// The foot of a point on its plane, if that is inside it or on its border.
+    fn under(&self, point: DVec3) -> Option<SkinPoint> {
+        let shares = shares(point, self.corners)?;
+        let [a, b, c] = self.corners;
+        let position = a * shares[0] + b * shares[1] + c * shares[2];
+        let within = shares.into_iter().all(|share| share >= -LEAN_SHARE);
+        within.then_some(SkinPoint { spot: BarycentricPoint { vertices: self.vertices, shares }, position })
     }
 }
 
@@ -350,12 +366,30 @@ impl SurfaceQuery<'_> {
                 }
             }
         }
-        for triangle in self.surface.triangles_in(self.region) {
-            for node in 0..strand.count() {
-                let Some(point) = triangle.inside(strand.ball(node).centre) else { continue };
-                let key = TouchKey::new(TouchKind::Triangle, [triangle.number, node as u32]);
-                into.extend(self.strand_contact(key, point, strand, strand.node(node)));
+        for node in 0..strand.count() {
+            self.node_over(strand, node, into);
+        }
+    }
+
+    /// A node of a strand over each triangle, or over the line between two.
+    fn node_over(&self, strand: &Strand<'_>, node: usize, into: &mut Vec<Touch>) {
+        let Ball { centre, radius_m } = strand.ball(node);
+        let within_m = (radius_m + self.reach_m + self.surface.form.radius_m).max(2.0 * radius_m);
+        let key = |triangle: &Triangle| TouchKey::new(TouchKind::Triangle, [triangle.number, node as u32]);
+        let (mut is_over, mut beside) = (false, None::<(f64, TouchKey, SkinPoint)>);
+        for triangle in self.surface.triangles_in(Aabb::about(centre, within_m)) {
+            if let Some(point) = triangle.inside(centre) {
+                is_over = true;
+                into.extend(self.strand_contact(key(&triangle), point, strand, strand.node(node)));
+            } else if let Some(point) = triangle.under(centre) {
+                let distance_m = point.position.distance(centre);
+                if beside.is_none_or(|(least_m, ..)| distance_m < least_m) {
+                    beside = Some((distance_m, key(&triangle), point));
+                }
             }
+        }
+        if let (false, Some((_, key, point))) = (is_over, beside) {
+            into.extend(self.strand_contact(key, point, strand, strand.node(node)));
         }
     }
 
@@ -379,7 +413,7 @@ impl SurfaceQuery<'_> {
         let SkinPoint { spot, position: point } = here;
         let ball = ball_at(strand, there);
         let way = point - ball.centre;
-        let out = if spot.shares[2] > 0.0 && self.surface.form.closed { self.out_of(spot) } else { None };
+        let out = if spot.is_of_triangle() && self.surface.form.closed { self.out_of(spot) } else { None };
         // a core that lies exactly in the skin of a closed body counts as outside it
         let inward = || spot.out(self.normals).and_then(DVec3::try_normalize).map(|out| -out);
         let across = || self.out_of(spot).or_else(inward).unwrap_or(DVec3::Z);

@@ -4,13 +4,15 @@
 //! Theory: docs/theory/soft.md, eq. 1–4; docs/theory/clusters.md, section 7.
 
 use super::body::SoftBody;
-use super::step::EDGE_CHANGE_MAX;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+
+/// No edge may turn or stretch further in a step, radians: a turn by φ stretches it by φ²/2, here 1 %, and makes E φ⁴/8 a volume.
+const TURN_MAX_RAD: f64 = 0.15;
 
 /// Its unknowns in a cluster: those of the moving vertices.
 #[derive(Debug, Clone, Default)]
@@ -114,7 +116,7 @@ impl ClusterMember for SoftBody {
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let rows = self.system.rows();
         let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);
-        self.mesh.edge_change(of, h_s) / EDGE_CHANGE_MAX
+        self.mesh.edge_change(of, h_s) / TURN_MAX_RAD
     }
 
     fn keep(&mut self) {

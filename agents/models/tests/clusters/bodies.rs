@@ -27,6 +27,11 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
     }
 }
 
+/// The same body after a turn of everything about the origin.
+pub fn leaning(spec: SoftSpec, rotation: DQuat) -> SoftSpec {
+    SoftSpec { position: rotation * spec.position, rotation: rotation * spec.rotation, ..spec }
+}
+
 /// A box of matter.
 pub fn solid(middle: DVec3, size_m: DVec3, segments: [u32; 3], young_pa: f64) -> SoftSpec {
     soft(SoftShape::Box { size_m, segments }, middle - size_m * 0.5, young_pa)

@@ -1,11 +1,14 @@
 //! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
 
 mod bodies;
+mod grasp;
 mod joints;
 mod links;
 mod own_model;
 mod rebounds;
 mod scenes;
+mod slope;
 mod stacks;
+mod steps;
 mod table;
 mod tools;

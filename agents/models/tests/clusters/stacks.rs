@@ -10,10 +10,14 @@ use metachron_models::rigid::{RigidBody, RigidSpec};
 const RATES_HZ: [f64; 8] = [30.0, 60.0, 60.0, 100.0, 120.0, 240.0, 240.0, 500.0];
 
 /// Numbers by SplitMix64.
-struct Draw(u64);
+pub struct Draw(u64);
 
 impl Draw {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -39,7 +43,7 @@ pub enum Rates {
 
 /// The stack of this number.
 pub fn stack(seed: u64, rates: Rates) -> Table {
-    let mut draw = Draw(seed);
+    let mut draw = Draw::new(seed);
     let count = 2 + draw.below(3);
     let mut height_m = 0.0;
     let mut bodies = vec![];
@@ -174,4 +178,20 @@ pub fn play(table: &mut Table, seconds: f64) -> Outcome {
     outcome.faults.stays_deep = outcome.end_m > 4e-3;
     outcome.faults.gains = outcome.gain_j > 0.1;
     outcome
+}
+
+#[test]
+fn random_stacks_come_to_rest() {
+    let outcomes: Vec<Outcome> = (1..=24).map(|seed| play(&mut stack(seed, Rates::Equal(60.0)), 1.5)).collect();
+    let bad: Vec<_> = (1..).zip(&outcomes).filter(|(_, outcome)| outcome.faults.any()).collect();
+    assert!(bad.is_empty(), "{bad:?}");
+    let sum = |of: fn(&Outcome) -> u32| f64::from(outcomes.iter().map(of).sum::<u32>());
+    assert!(sum(|o| o.convex) <= 0.04 * sum(|o| o.solves), "{} of {}", sum(|o| o.convex), sum(|o| o.solves));
+}
+
+#[test]
+fn random_stacks_of_mixed_rates_come_to_rest() {
+    let outcomes = (1..=6).map(|seed| (seed, play(&mut stack(seed, Rates::Mixed), 1.0)));
+    let bad: Vec<_> = outcomes.filter(|(_, outcome)| outcome.faults.any()).collect();
+    assert!(bad.is_empty(), "{bad:?}");
 }

@@ -1,6 +1,6 @@
 //! A table on which bodies are put and stepped as one cluster, and what is measured of them.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
@@ -73,17 +73,15 @@ pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
     Placed { agent: Box::new(agent), rate_hz: 60.0, held, links, hands, memory, grips }
 }
 
+/// A plane through the origin whose normal is the z that `rotation` leads to.
+pub fn plane(rotation: DQuat, friction: f64) -> Obstacle {
+    let (name, solid, position) = ("floor".into(), Solid::Plane, DVec3::ZERO);
+    Obstacle { name, solid, position, rotation, friction, restitution: 0.0 }
+}
+
 impl Table {
     pub fn new(bodies: Vec<Placed>) -> Self {
-        let floor = Obstacle {
-            name: "floor".into(),
-            solid: Solid::Plane,
-            position: DVec3::ZERO,
-            rotation: glam::DQuat::IDENTITY,
-            friction: 0.5,
-            restitution: 0.0,
-        };
-        Self::among(bodies, &[floor])
+        Self::among(bodies, &[plane(DQuat::IDENTITY, 0.5)])
     }
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
@@ -136,12 +134,17 @@ impl Table {
 
     /// Makes one macro step; how long it was, seconds.
     pub fn step(&mut self) -> (ClusterReport, f64) {
+        self.step_share(1.0)
+    }
+
+    /// The same of a macro step cut to a share of its length.
+    pub fn step_share(&mut self, share: f64) -> (ClusterReport, f64) {
         let mut wishes = vec![];
         for body in &mut self.bodies {
             wishes.push((body.agent.member().unwrap().role(), 1.0 / body.rate_hz));
         }
         let plan = Plan::of(wishes.iter().copied());
-        let dt = SimSpan::from_secs_f64(plan.macro_s).unwrap();
+        let dt = SimSpan::from_secs_f64(share * plan.macro_s).unwrap();
         let mut all = vec![];
         let neighbours = self.published();
         let apart: Vec<_> = (0..self.bodies.len() as u32).map(|id| (AgentId(id), Law::Off)).collect();
@@ -220,12 +223,17 @@ impl Table {
 
     /// Plays for some seconds.
     pub fn play(&mut self, seconds: f64) -> Findings {
+        self.play_by(seconds, || 1.0)
+    }
+
+    /// Plays for some seconds in macro steps of these shares of their length.
+    pub fn play_by(&mut self, seconds: f64, mut share: impl FnMut() -> f64) -> Findings {
         let mut findings = Findings::default();
         let mut least_j = self.energy_j();
         let (mut borne_n_s, mut last_s, mut last_factors, mut last_steps) = (0.0, 0.0, 0, 0);
         while self.time.as_secs_f64() < seconds {
             let rests = self.time.as_secs_f64() > seconds - 0.5;
-            let (report, dt_s) = self.step();
+            let (report, dt_s) = self.step_share(share());
             let energy_j = self.energy_j();
             findings.gain_j = findings.gain_j.max(energy_j - least_j);
             least_j = least_j.min(energy_j);

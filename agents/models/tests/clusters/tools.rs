@@ -116,6 +116,7 @@ fn jaws_lift_a_box_and_both_are_told_its_weight() {
 struct Pusher {
     form: CollisionShape,
     place: DVec3,
+    kept: DVec3,
     m_s: f64,
 }
 
@@ -123,7 +124,7 @@ impl Pusher {
     fn new(half_m: DVec3, place: DVec3, m_s: f64) -> Self {
         let solid = SolidShape::new(Solid::Box { half_extents_m: half_m }, DVec3::ZERO).unwrap();
         let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.5, restitution: 0.0 };
-        Self { form, place, m_s }
+        Self { form, place, kept: place, m_s }
     }
 }
 
@@ -175,6 +176,14 @@ impl ClusterMember for Pusher {
     fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
         self.place.x += self.m_s * h_s;
         Ok(())
+    }
+
+    fn keep(&mut self) {
+        self.kept = self.place;
+    }
+
+    fn go_back(&mut self) {
+        self.place = self.kept;
     }
 
     fn is_calm(&self) -> bool {

@@ -229,7 +229,7 @@ impl SurfaceQuery<'_> {
 
     /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
-        let inside = spot.shares[2] > 0.0;
+        let inside = spot.is_of_triangle();
         let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
         self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
     }
