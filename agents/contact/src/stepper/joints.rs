@@ -8,16 +8,11 @@
 //! step before, then those of the answer itself, until the joint holds. Positions are
 //! kept as by RATTLE (AND83): to second order, and what turns keeps its energy.
 
-//!
-//! What is light and holds much turns to and fro faster than steps can follow, and would be thrown: a force f at an arm r turns a body
-//! back with the stiffness f·r. Where h² of that is more than the body's inertia, so much inertia is added across the arm, by a row that
-//! resists changes of the spin; it takes no energy, and a turn that steps can follow has none of it.
-
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::springs::{End, Name, Pull, turn_between};
-use super::ties::{RowOwner, Ties, place_of};
+use super::ties::{Ties, place_of};
 use super::{Participant, Progress};
 use crate::cluster::{Hold, JointRow, Side};
 use crate::contact::PUSH_OUT_MAX_M_S;
@@ -31,28 +26,7 @@ use std::f64::consts::{PI, TAU};
 pub(super) struct Joints {
     held: Vec<Held>,
     parts: Vec<Part>,
-    pulls: Vec<ArmPull>,
-    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
-    asked: Vec<f64>,
 }
-
-/// A force at an arm of a body.
-#[derive(Debug, Clone, Copy)]
-struct ArmPull {
-    owner: RowOwner,
-    /// The body, and its spin.
-    member: usize,
-    turns: Side,
-    /// Along the arm, of length 1.
-    axis: DVec3,
-    /// The inertia that it asks for across the arm, kg m².
-    inertia_kg_m2: f64,
-}
-
-/// Of h² times the stiffness of a pull, the share that its body's inertia has to reach: ¼ is where steps begin to throw it.
-const INERTIA_SHARE: f64 = 0.5;
-/// The key of the first row of added inertia of a joint.
-const ADDED: u64 = 8;
 
 /// A joint between participants; no second one is the world.
 #[derive(Debug, Clone, Copy)]
@@ -107,7 +81,6 @@ impl Joints {
     ) {
         self.held.clear();
         self.parts.clear();
-        self.pulls.clear();
         for (a, one) in all.iter().enumerate() {
             for (number, joint) in scene.joints_of(one.id) {
                 let b = joint.b.map(|id| place_of(all, id));
@@ -117,43 +90,6 @@ impl Joints {
             }
         }
         self.aim(all, ties, |member| &progress[member].before[..], h_s);
-        self.add_inertia(all, progress, ties, h_s);
-    }
-
-    /// Notes the force that a joint gave at the arms of its bodies in the last step.
-    fn note_pull(&mut self, all: &[Participant<'_>], ends: &[End; 2], poses: [&Pose; 2], name: Name, h_s: f64) {
-        let force_n = all[name.member].memory.recall(name.partner, 0).force_n;
-        for (at, end) in ends.iter().enumerate() {
-            let Some(member) = end.member else { continue };
-            let arm = end.point.position - poses[at].centre_m;
-            let force_n = if at == 0 { force_n } else { -force_n };
-            let (Some(axis), turns) = (arm.try_normalize(), poses[at].turns) else { continue };
-            // the larger of both stiffnesses against turns: a force that is not along its arm has three
-            let stiffness = 0.5 * (force_n.dot(arm) + force_n.length() * arm.length());
-            let owner = name.row(ADDED + at as u64, None);
-            let inertia_kg_m2 = INERTIA_SHARE * h_s * h_s * stiffness;
-            self.pulls.push(ArmPull { owner, member, turns: turns.of_member(member), axis, inertia_kg_m2 });
-        }
-    }
-
-    /// Adds the inertia that bodies lack.
-    fn add_inertia(&mut self, all: &[Participant<'_>], progress: &[Progress], ties: &mut Ties, h_s: f64) {
-        self.asked.clear();
-        self.asked.resize(all.len(), 0.0);
-        for pull in &self.pulls {
-            self.asked[pull.member] += pull.share(all);
-        }
-        for pull in &self.pulls {
-            let lacking = 1.0 - self.asked[pull.member].recip();
-            if lacking > 0.0 && pull.inertia_kg_m2 > 0.0 {
-                let row = JointRow {
-                    target_m_s: pull.turns.velocity(&progress[pull.member].before),
-                    compliance_per_kg: Some((pull.inertia_kg_m2 * lacking).recip()),
-                    ..JointRow::new(pull.owner.key, [pull.turns, Side::FIXED], Hold::across(pull.axis))
-                };
-                ties.push(all, row, pull.owner, h_s);
-            }
-        }
     }
 
     /// Lays out one joint.
@@ -184,7 +120,8 @@ impl Joints {
         }
         let points = [ends[0].side(), ends[1].side()];
         let turns = [a.turns.of_member(members.0), members.1.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        self.note_pull(all, &ends, [&a, &b], name, h_s);
+        // as in the last step
+        ties.arms.note(all, &ends, all[name.member].memory.recall(name.partner, 0).force_n, name, h_s);
         let now = joint.off(&a, &b);
         self.held.push(Held { joint: *joint, members, now });
         let held = self.held.len() - 1;
@@ -253,18 +190,6 @@ impl Joints {
             worst = worst.max(part.way.missed(miss, row));
         }
         worst
-    }
-}
-
-impl ArmPull {
-    /// The trace of the inertia asked for over that of the body: no direction lacks more.
-    fn share(&self, all: &[Participant<'_>]) -> f64 {
-        let Some(spin) = self.turns.terms().first().map(|term| term.block) else { return 0.0 };
-        let own = all[self.member].member.blocks().iter().find(|block| block.row == spin && block.column == spin);
-        let Some(own) = own else { return 0.0 };
-        let inverse = own.value.inverse();
-        let trace = inverse.x_axis.x + inverse.y_axis.y + inverse.z_axis.z;
-        self.inertia_kg_m2 * (trace - self.axis.dot(inverse * self.axis))
     }
 }
 

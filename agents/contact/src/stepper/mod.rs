@@ -11,6 +11,7 @@
 //! solve     one problem for all, again until joints hold where bodies will be
 //! end       members move; those whose step ends take its velocities
 
+mod arms;
 mod joints;
 mod links;
 mod member;
@@ -221,6 +222,7 @@ impl ClusterStepper {
         ties.gather_springs(all, moment);
         ties.gather_links(all, moment);
         joints.gather(scene, all, progress, ties, moment.h_s);
+        ties.add_inertia(all, progress, moment.h_s);
     }
 
     /// Starts every contact from what the last step gave.

@@ -166,18 +166,20 @@ impl Ties {
             self.push(all, row, name.row(key, b.member), h_s);
         };
         let Pull { stiffness_n_m, damping_n_s_m, rest_m } = *pull;
-        if rest_m == 0.0 {
-            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
-            return;
-        }
         let axis = apart.try_normalize().unwrap_or(DVec3::Z);
         let stretch_m = apart - axis * rest_m;
+        if rest_m == 0.0 {
+            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
+            self.arms.note(all, ends, stretch_m * -stiffness_n_m, name, h_s);
+            return;
+        }
         push(ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m });
         let stretched = 1.0 - rest_m / apart.length();
         if stretched > 0.0 {
             let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
             push(ACROSS, Hold::across(axis), law);
         }
+        self.arms.note(all, ends, stretch_m * -stiffness_n_m, name, h_s);
     }
 }
 

@@ -3,6 +3,7 @@
 //! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
 
 use super::Participant;
+use super::arms::Arms;
 use super::memory::Partner;
 use crate::cluster::JointRow;
 use glam::DVec3;
@@ -35,10 +36,13 @@ pub(super) struct Ties {
     pub rows: Vec<JointRow>,
     /// One for each row.
     pub owners: Vec<RowOwner>,
+    /// The forces at arms that come with them.
+    pub arms: Arms,
 }
 
 impl Ties {
     pub fn clear(&mut self) {
+        self.arms.clear();
         self.rows.clear();
         self.owners.clear();
     }
