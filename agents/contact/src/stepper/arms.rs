@@ -1,7 +1,7 @@
 //! Forces at arms of bodies that move as a whole, and the inertia that such bodies lack for them.
 //!
 //! In: forces of springs and joints with the places where they act. Out: rows that resist changes of a spin. Never here: forces themselves.
-//! Theory: docs/theory/clusters.md, eq. 21.
+//! Theory: docs/theory/clusters.md, eq. 22.
 //!
 //! A force f at an arm r turns a body back with the stiffness f·r, which no row knows. What is light and holds much swings by it faster
 //! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the

@@ -5,8 +5,8 @@
 //!
 //! A row knows velocities: held at zero, they let whatever turns drift off by ω² h² of its arm in each step, and lose what taking
 //! that back takes. So a target contains how far the joint would be off after the step, for velocities near the answer: those of the
-//! step before, then those of the answer itself, until the joint holds. Positions are
-//! kept as by RATTLE (AND83): to second order, and what turns keeps its energy.
+//! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
+//! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
