@@ -7,9 +7,9 @@
 //! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
+use super::Participant;
 use super::springs::{End, Name};
-use super::ties::{RowOwner, Ties};
-use super::{Participant, Progress};
+use super::ties::{FineStep, RowOwner, Ties};
 use crate::cluster::{Hold, JointRow, Side};
 use glam::DVec3;
 
@@ -45,7 +45,8 @@ impl Arms {
     }
 
     /// Notes a force on the first end of a tie, of which the other has the opposite.
-    pub fn note(&mut self, all: &[Participant<'_>], ends: &[End; 2], force_n: DVec3, name: Name, h_s: f64) {
+    pub fn note(&mut self, step: &FineStep<'_, '_>, ends: &[End; 2], force_n: DVec3, name: Name) {
+        let FineStep { all, h_s, .. } = *step;
         for (at, (end, force_n)) in ends.iter().zip([force_n, -force_n]).enumerate() {
             let Some(member) = end.member else { continue };
             let Some(pose) = all[member].member.pose(&[], 0.0) else { continue };
@@ -62,7 +63,8 @@ impl Arms {
 
 impl Ties {
     /// Adds the inertia that bodies lack for the forces noted.
-    pub fn add_inertia(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
+    pub fn add_inertia(&mut self, step: &FineStep<'_, '_>) {
+        let FineStep { all, progress, .. } = *step;
         let Arms { pulls, mut asked } = std::mem::take(&mut self.arms);
         asked.clear();
         asked.resize(all.len(), 0.0);
@@ -77,7 +79,7 @@ impl Ties {
                     compliance_per_kg: Some((pull.inertia_kg_m2 * lacking).recip()),
                     ..JointRow::new(pull.owner.key, [pull.turns, Side::FIXED], Hold::across(pull.axis))
                 };
-                self.push(all, row, pull.owner, h_s);
+                self.push(step, row, pull.owner);
             }
         }
         self.arms = Arms { pulls, asked };

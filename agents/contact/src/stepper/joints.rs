@@ -8,12 +8,12 @@
 //! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
 //! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
+use super::Participant;
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::springs::{End, Name, Pull, turn_between};
-use super::ties::{Ties, place_of};
-use super::{Participant, Progress};
+use super::ties::{FineStep, Ties, place_of};
 use crate::cluster::{Hold, JointRow, Side};
 use crate::contact::PUSH_OUT_MAX_M_S;
 use crate::joint::{Joint, JointKind};
@@ -71,14 +71,8 @@ struct Off {
 
 impl Joints {
     /// Lays out all joints between participants.
-    pub fn gather(
-        &mut self,
-        scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
-        ties: &mut Ties,
-        h_s: f64,
-    ) {
+    pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, ties: &mut Ties) {
+        let FineStep { all, progress, .. } = *step;
         self.held.clear();
         self.parts.clear();
         for (a, one) in all.iter().enumerate() {
@@ -86,22 +80,21 @@ impl Joints {
                 let b = joint.b.map(|id| place_of(all, id));
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
-                self.hold(all, joint, (a, b), number, ties, h_s);
+                self.hold(step, (number, joint), (a, b), ties);
             }
         }
-        self.aim(all, ties, |member| &progress[member].before[..], h_s);
+        self.aim(all, ties, |member| &progress[member].before[..], step.h_s);
     }
 
     /// Lays out one joint.
     fn hold(
         &mut self,
-        all: &[Participant<'_>],
-        joint: &Joint,
+        step: &FineStep<'_, '_>,
+        (number, joint): (u32, &Joint),
         members: (usize, Option<usize>),
-        number: u32,
         ties: &mut Ties,
-        h_s: f64,
     ) {
+        let all = step.all;
         let at = |member: usize| all[member].member.pose(&[], 0.0);
         let (Some(a), Some(b)) = (at(members.0), members.1.map_or(Some(Pose::WORLD), at)) else { return };
         let anchors = [a.place(joint.anchor_a_m), b.place(joint.anchor_b_m)];
@@ -115,13 +108,13 @@ impl Joints {
         let ends = [End { member: Some(members.0), point: point_a }, End { member: members.1, point: point_b }];
         let name = Name { member: members.0, partner: Partner::Joint(number), hold: None };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
-            ties.spring(all, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name, h_s);
+            ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
         }
         let points = [ends[0].side(), ends[1].side()];
         let turns = [a.turns.of_member(members.0), members.1.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         // as in the last step
-        ties.arms.note(all, &ends, all[name.member].memory.recall(name.partner, 0).force_n, name, h_s);
+        ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, 0).force_n, name);
         let now = joint.off(&a, &b);
         self.held.push(Held { joint: *joint, members, now });
         let held = self.held.len() - 1;
@@ -129,7 +122,7 @@ impl Joints {
         let mut key = 0;
         let mut push = |way: Way, sides: [Side; 2], hold: Hold| {
             let row = ties.rows.len();
-            ties.push(all, JointRow::new(key, sides, hold), name.row(key, members.1), h_s);
+            ties.push(step, JointRow::new(key, sides, hold), name.row(key, members.1));
             if ties.rows.len() > row {
                 self.parts.push(Part { held, row, way });
             }

@@ -70,11 +70,11 @@ impl Search {
         self.find_pairs(h_s);
         let near = std::mem::take(&mut self.near);
         for &[a, b] in &near {
-            self.find_between(scene, all, progress, [a, b], h_s);
+            self.find_between(scene, (all, progress), [a, b], h_s);
         }
         self.near = near;
         for member in 0..all.len() {
-            self.find_static(scene, all, progress, member, h_s);
+            self.find_static(scene, (all, progress), member, h_s);
         }
         self.sort();
     }
@@ -106,8 +106,7 @@ impl Search {
     fn find_between(
         &mut self,
         scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
+        (all, progress): (&[Participant<'_>], &[Progress]),
         [a, b]: [usize; 2],
         h_s: f64,
     ) {
@@ -137,8 +136,7 @@ impl Search {
     fn find_static(
         &mut self,
         scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
+        (all, progress): (&[Participant<'_>], &[Progress]),
         member: usize,
         h_s: f64,
     ) {
