@@ -98,8 +98,8 @@ fn row_fault(row: &JointRow) -> Option<&'static str> {
         Hold::Across { axis, limit_n_s } => (axis, limit_n_s >= 0.0),
         Hold::Along { axis, low_n_s, high_n_s } => (axis, low_n_s <= 0.0 && high_n_s >= 0.0),
     };
-    // also where one is not a number
-    if !((axis.length() - 1.0).abs() <= SLACK) {
+    let off = (axis.length() - 1.0).abs();
+    if off > SLACK || off.is_nan() {
         return Some("its axis is not of length 1");
     }
     (!bounded).then_some("zero must lie within the bounds of its impulse")
