@@ -5,20 +5,15 @@
 //!
 //! A row knows velocities: held at zero, they let whatever turns drift off by ω² h² of its arm in each step, and lose what taking
 //! that back takes. So a target contains how far the joint would be off after the step, for velocities near the answer: those of the
-//! step before, then those of the answer itself, until the joint holds. Positions are
-//! kept as by RATTLE (AND83): to second order, and what turns keeps its energy.
+//! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
+//! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
-//!
-//! What is light and holds much turns to and fro faster than steps can follow, and would be thrown: a force f at an arm r turns a body
-//! back with the stiffness f·r. Where h² of that is more than the body's inertia, so much inertia is added across the arm, by a row that
-//! resists changes of the spin; it takes no energy, and a turn that steps can follow has none of it.
-
+use super::Participant;
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::springs::{End, Name, Pull, turn_between};
-use super::ties::{RowOwner, Ties, place_of};
-use super::{Participant, Progress};
+use super::ties::{FineStep, Ties, place_of};
 use crate::cluster::{Hold, JointRow, Side};
 use crate::contact::PUSH_OUT_MAX_M_S;
 use crate::joint::{Joint, JointKind};
@@ -32,28 +27,7 @@ use std::f64::consts::{PI, TAU};
 pub(super) struct Joints {
     held: Vec<Held>,
     parts: Vec<Part>,
-    pulls: Vec<ArmPull>,
-    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
-    asked: Vec<f64>,
 }
-
-/// A force at an arm of a body.
-#[derive(Debug, Clone, Copy)]
-struct ArmPull {
-    owner: RowOwner,
-    /// The body, and its spin.
-    member: usize,
-    turns: Side,
-    /// Along the arm, of length 1.
-    axis: DVec3,
-    /// The inertia that it asks for across the arm, kg m².
-    inertia_kg_m2: f64,
-}
-
-/// Of h² times the stiffness of a pull, the share that its body's inertia has to reach: ¼ is where steps begin to throw it.
-const INERTIA_SHARE: f64 = 0.5;
-/// The key of the first row of added inertia of a joint.
-const ADDED: u32 = 8;
 
 /// A joint between participants; no second one is the world.
 #[derive(Debug, Clone, Copy)]
@@ -98,75 +72,30 @@ struct Off {
 
 impl Joints {
     /// Lays out all joints between participants.
-    pub fn gather(
-        &mut self,
-        scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
-        ties: &mut Ties,
-        h_s: f64,
-    ) {
+    pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, ties: &mut Ties) {
+        let FineStep { all, progress, .. } = *step;
         self.held.clear();
         self.parts.clear();
-        self.pulls.clear();
         for (a, one) in all.iter().enumerate() {
             for (number, joint) in scene.joints_of(one.id) {
                 let b = joint.b.map(|id| place_of(all, id));
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
-                self.hold(all, joint, (a, b), number, ties, h_s);
+                self.hold(step, (number, joint), (a, b), ties);
             }
         }
-        self.aim(all, ties, |member| &progress[member].before[..], h_s);
-        self.add_inertia(all, progress, ties, h_s);
-    }
-
-    /// Notes the force that a joint gave at the arms of its bodies in the last step.
-    fn note_pull(&mut self, all: &[Participant<'_>], ends: &[End; 2], poses: [&Pose; 2], name: Name, h_s: f64) {
-        let force_n = all[name.member].memory.recall(name.partner, TouchKey::default()).force_n;
-        for (at, end) in ends.iter().enumerate() {
-            let Some(member) = end.member else { continue };
-            let arm = end.point.position - poses[at].centre_m;
-            let force_n = if at == 0 { force_n } else { -force_n };
-            let (Some(axis), turns) = (arm.try_normalize(), poses[at].turns) else { continue };
-            // the larger of both stiffnesses against turns: a force that is not along its arm has three
-            let stiffness = 0.5 * (force_n.dot(arm) + force_n.length() * arm.length());
-            let owner = name.row(ADDED + at as u32, None);
-            let inertia_kg_m2 = INERTIA_SHARE * h_s * h_s * stiffness;
-            self.pulls.push(ArmPull { owner, member, turns: turns.of_member(member), axis, inertia_kg_m2 });
-        }
-    }
-
-    /// Adds the inertia that bodies lack.
-    fn add_inertia(&mut self, all: &[Participant<'_>], progress: &[Progress], ties: &mut Ties, h_s: f64) {
-        self.asked.clear();
-        self.asked.resize(all.len(), 0.0);
-        for pull in &self.pulls {
-            self.asked[pull.member] += pull.share(all);
-        }
-        for pull in &self.pulls {
-            let lacking = 1.0 - self.asked[pull.member].recip();
-            if lacking > 0.0 && pull.inertia_kg_m2 > 0.0 {
-                let row = JointRow {
-                    target_m_s: pull.turns.velocity(&progress[pull.member].before),
-                    compliance_per_kg: Some((pull.inertia_kg_m2 * lacking).recip()),
-                    ..JointRow::new(u64::from(pull.owner.key), [pull.turns, Side::FIXED], Hold::across(pull.axis))
-                };
-                ties.push(all, row, pull.owner, h_s);
-            }
-        }
+        self.aim(all, ties, |member| &progress[member].before[..], step.h_s);
     }
 
     /// Lays out one joint.
     fn hold(
         &mut self,
-        all: &[Participant<'_>],
-        joint: &Joint,
+        step: &FineStep<'_, '_>,
+        (number, joint): (u32, &Joint),
         members: (usize, Option<usize>),
-        number: u32,
         ties: &mut Ties,
-        h_s: f64,
     ) {
+        let all = step.all;
         let at = |member: usize| all[member].member.pose(&[], 0.0);
         let (Some(a), Some(b)) = (at(members.0), members.1.map_or(Some(Pose::WORLD), at)) else { return };
         let anchors = [a.place(joint.anchor_a_m), b.place(joint.anchor_b_m)];
@@ -180,12 +109,13 @@ impl Joints {
         let ends = [End { member: Some(members.0), point: point_a }, End { member: members.1, point: point_b }];
         let name = Name { member: members.0, partner: Partner::Joint(number), hold: None };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
-            ties.spring(all, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name, h_s);
+            ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
         }
         let points = [ends[0].side(), ends[1].side()];
         let turns = [a.turns.of_member(members.0), members.1.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        self.note_pull(all, &ends, [&a, &b], name, h_s);
+        // as in the last step
+        ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
         self.held.push(Held { joint: *joint, members, now });
         let held = self.held.len() - 1;
@@ -193,7 +123,7 @@ impl Joints {
         let mut key = 0;
         let mut push = |way: Way, sides: [Side; 2], hold: Hold| {
             let row = ties.rows.len();
-            ties.push(all, JointRow::new(u64::from(key), sides, hold), name.row(key, members.1), h_s);
+            ties.push(step, JointRow::new(u64::from(key), sides, hold), name.row(key, members.1));
             if ties.rows.len() > row {
                 self.parts.push(Part { held, row, way });
             }
@@ -254,18 +184,6 @@ impl Joints {
             worst = worst.max(part.way.missed(miss, row));
         }
         worst
-    }
-}
-
-impl ArmPull {
-    /// The trace of the inertia asked for over that of the body: no direction lacks more.
-    fn share(&self, all: &[Participant<'_>]) -> f64 {
-        let Some(spin) = self.turns.terms().first().map(|term| term.block) else { return 0.0 };
-        let own = all[self.member].member.blocks().iter().find(|block| block.row == spin && block.column == spin);
-        let Some(own) = own else { return 0.0 };
-        let inverse = own.value.inverse();
-        let trace = inverse.x_axis.x + inverse.y_axis.y + inverse.z_axis.z;
-        self.inertia_kg_m2 * (trace - self.axis.dot(inverse * self.axis))
     }
 }
 

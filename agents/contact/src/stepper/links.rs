@@ -6,8 +6,8 @@
 use super::Participant;
 use super::member::MaterialPoint;
 use super::memory::Partner;
-use super::springs::{End, Moment, Name, Pull};
-use super::ties::{Holders, Ties, place_of};
+use super::springs::{End, Name, Pull};
+use super::ties::{FineStep, Holders, Ties, place_of};
 use crate::agent::tool_extrapolation_s;
 use crate::law::{Law, Link};
 use glam::DVec3;
@@ -15,44 +15,39 @@ use metachron_core::{Anchor, Body};
 
 impl Ties {
     /// Lays out all links. Both agents see a link: of two participants the lower number takes it.
-    pub fn gather_links(&mut self, all: &[Participant<'_>], moment: Moment) {
+    pub fn gather_links(&mut self, step: &FineStep<'_, '_>) {
+        let all = step.all;
         for (member, one) in all.iter().enumerate() {
             for (number, link) in (0..).zip(one.context.links) {
                 let other = place_of(all, link.other);
                 let is_mine = other.is_none_or(|other| member < other);
                 if is_mine && matches!(link.law, Law::Ledger) {
-                    self.link(all, (member, other), link, number, moment);
+                    self.link(step, (member, other), link, number);
                 }
             }
         }
     }
 
-    fn link(
-        &mut self,
-        all: &[Participant<'_>],
-        (member, other): (usize, Option<usize>),
-        link: &Link,
-        number: u32,
-        moment: Moment,
-    ) {
+    fn link(&mut self, step: &FineStep<'_, '_>, (member, other): (usize, Option<usize>), link: &Link, number: u32) {
+        let all = step.all;
         let there = match other {
             Some(other) => all[other].member.anchor(link.there),
-            None => seen_point(&all[member], link, moment),
+            None => seen_point(&all[member], link, step.after_s),
         };
         let (Some(here), Some(there)) = (all[member].member.anchor(link.here), there) else { return };
         let Link { stiffness_n_m, damping_n_s_m, rest_m, .. } = *link;
         let hold = Holders { side_0: all[member].id, side_1: Some(link.other) };
         let name = Name { member, partner: Partner::Link(number), hold: Some(hold) };
         let ends = [End { member: Some(member), point: here }, End { member: other, point: there }];
-        self.spring(all, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name, moment.h_s);
+        self.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
     }
 }
 
 /// Where the far end of a link is that is no participant: it moves on as it was last published.
-fn seen_point(one: &Participant<'_>, link: &Link, moment: Moment) -> Option<MaterialPoint> {
+fn seen_point(one: &Participant<'_>, link: &Link, after_s: f64) -> Option<MaterialPoint> {
     let seen = &one.context.neighbours.iter().find(|other| other.id == link.other)?.snapshot;
     let MaterialPoint { position, led_m_s, .. } = published_point(&seen.body, link.there)?;
-    let age_s = tool_extrapolation_s(one.context.time, seen.time) + moment.after_s;
+    let age_s = tool_extrapolation_s(one.context.time, seen.time) + after_s;
     let point = MaterialPoint::led(position + led_m_s * age_s, led_m_s);
     (point.position.is_finite() && led_m_s.is_finite()).then_some(point)
 }

@@ -12,6 +12,7 @@
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
 
+mod arms;
 mod blows;
 mod joints;
 mod links;
@@ -34,9 +35,8 @@ pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
 pub use scene::ClusterScene;
 use search::Search;
-use springs::Moment;
 use std::f64::consts::SQRT_2;
-use ties::{Ties, place_key};
+use ties::{FineStep, Ties, place_key};
 
 /// The most steps that a member makes within a macro step.
 const PARTS_MAX: u32 = 16;
@@ -273,7 +273,7 @@ impl ClusterStepper {
             self.begin(all, h_s, report)?;
             self.search.find(scene, all, &self.progress, h_s);
             rebounds.choose(&mut self.search, &self.progress);
-            self.tie(scene, all, Moment { h_s, after_s: f64::from(fine) * h_s });
+            self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(scene, all, h_s, &rebounds, report)?;
             if self.divide(all, h_s) {
@@ -355,13 +355,15 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Lays out springs, links and joints.
-    fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], moment: Moment) {
+    /// Lays out springs, links and joints of a fine step that begins `after_s` seconds into the macro step.
+    fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64, after_s: f64) {
         let Self { ties, joints, progress, .. } = self;
         ties.clear();
-        ties.gather_springs(all, moment);
-        ties.gather_links(all, moment);
-        joints.gather(scene, all, progress, ties, moment.h_s);
+        let step = FineStep { all, progress, h_s, after_s };
+        ties.gather_springs(&step);
+        ties.gather_links(&step);
+        joints.gather(scene, &step, ties);
+        ties.add_inertia(&step);
     }
 
     /// Starts every contact from what the last step gave.

@@ -3,24 +3,14 @@
 //! In: what members see of springs on them, what drives them. Out: rows. Never here: contacts, links (`links.rs`), joints.
 //! Theory: docs/theory/clusters.md, eq. 14.
 
-use super::Participant;
 use super::member::MaterialPoint;
 use super::memory::Partner;
-use super::ties::{Holders, RowOwner, Ties, place_of};
+use super::ties::{FineStep, Holders, RowOwner, Ties, place_of};
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body};
-
-/// A fine step within its macro step.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Moment {
-    /// How long it is, seconds.
-    pub h_s: f64,
-    /// How long after the start of the macro step it begins, seconds.
-    pub after_s: f64,
-}
 
 /// One end of a spring.
 #[derive(Debug, Clone, Copy)]
@@ -67,26 +57,27 @@ impl End {
 
 impl Ties {
     /// Lays out the springs of users and grasps, and the drives.
-    pub fn gather_springs(&mut self, all: &[Participant<'_>], moment: Moment) {
-        for (member, one) in all.iter().enumerate() {
+    pub fn gather_springs(&mut self, step: &FineStep<'_, '_>) {
+        for (member, one) in step.all.iter().enumerate() {
             let is_led = one.member.is_led();
             for (number, spring) in (0..).zip(one.context.anchor_springs()) {
                 let led_by_user = spring.by.is_none() && is_led;
                 if !led_by_user {
-                    self.hold(all, member, &spring, number, moment);
+                    self.hold(step, member, &spring, number);
                 }
             }
-            self.drive(all, member, moment);
+            self.drive(step, member);
         }
     }
 
     /// A spring of the user or of a grasp on `member`.
-    fn hold(&mut self, all: &[Participant<'_>], member: usize, spring: &AnchorSpring, number: u32, moment: Moment) {
+    fn hold(&mut self, step: &FineStep<'_, '_>, member: usize, spring: &AnchorSpring, number: u32) {
+        let all = step.all;
         let Some(point) = all[member].member.anchor(spring.anchor) else { return };
         let by = spring.by.and_then(|by| place_of(all, by));
         let tip = by.and_then(|by| all[by].member.anchor(Anchor::Local(DVec3::ZERO)));
         let far = tip.unwrap_or_else(|| {
-            let position = spring.target + spring.target_velocity * moment.after_s;
+            let position = spring.target + spring.target_velocity * step.after_s;
             MaterialPoint::led(position, spring.target_velocity)
         });
         let hold = Holders { side_0: all[member].id, side_1: spring.by };
@@ -94,21 +85,15 @@ impl Ties {
         let AnchorSpring { stiffness_n_m, damping_n_s_m, .. } = *spring;
         let pull = Pull { stiffness_n_m, damping_n_s_m, rest_m: 0.0 };
         let ends = [End { member: Some(member), point }, End { member: by.filter(|_| tip.is_some()), point: far }];
-        self.spring(all, &ends, &pull, name, moment.h_s);
+        self.spring(step, &ends, &pull, name);
         if let Some(by) = spring.by {
-            self.hold_turn(all, (member, by), &pull, name, moment);
+            self.hold_turn(step, by, &pull, name);
         }
     }
 
     /// The torsional spring by which jaws keep a body from turning between them.
-    fn hold_turn(
-        &mut self,
-        all: &[Participant<'_>],
-        (member, by): (usize, AgentId),
-        pull: &Pull,
-        name: Name,
-        moment: Moment,
-    ) {
+    fn hold_turn(&mut self, step: &FineStep<'_, '_>, by: AgentId, pull: &Pull, name: Name) {
+        let (all, member) = (step.all, name.member);
         let context = &all[member].context;
         let Some(mine) = all[member].member.pose(&[], 0.0) else { return };
         let Some(seen) = context.neighbours.iter().find(|other| other.id == by).map(|other| &other.snapshot) else {
@@ -120,7 +105,7 @@ impl Ties {
         let (rotation, side, led_rad_s) = match place.and_then(|at| Some((at, all[at].member.pose(&[], 0.0)?))) {
             Some((at, pose)) => (pose.rotation, pose.turns.of_member(at), pose.led_rad_s),
             None => {
-                let age_s = tool_extrapolation_s(context.time, seen.time) + moment.after_s;
+                let age_s = tool_extrapolation_s(context.time, seen.time) + step.after_s;
                 (DQuat::from_scaled_axis(tool.spin * age_s) * tool.rotation, Side::FIXED, tool.spin)
             }
         };
@@ -131,16 +116,16 @@ impl Ties {
             stretch_m: turn_between(mine.rotation, rotation * clasp.rotation),
         };
         let sides = [mine.turns.of_member(member), side];
-        let row = JointRow::new(u64::from(TURN), sides, Hold::ALL).with_spring(law, moment.h_s);
+        let row = JointRow::new(u64::from(TURN), sides, Hold::ALL).with_spring(law, step.h_s);
         let row = JointRow { target_m_s: row.target_m_s + led_rad_s - mine.led_rad_s, ..row };
         let owner = Name { hold: None, ..name }.row(TURN, place);
-        self.push(all, row, owner, moment.h_s);
+        self.push(step, row, owner);
     }
 
     /// The drive of a member.
-    fn drive(&mut self, all: &[Participant<'_>], member: usize, moment: Moment) {
-        let Some(drive) = all[member].member.drive() else { return };
-        let h_s = moment.h_s;
+    fn drive(&mut self, step: &FineStep<'_, '_>, member: usize) {
+        let Some(drive) = step.all[member].member.drive() else { return };
+        let h_s = step.h_s;
         let law = Spring {
             stiffness_n_m: drive.stiffness_n_m,
             damping_n_s_m: drive.damping_n_s_m,
@@ -151,34 +136,36 @@ impl Ties {
             JointRow::new(u64::from(ALONG), sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
         let target_m_s = row.target_m_s + drive.target_m_s - drive.point.led_m_s;
         let name = Name { member, partner: Partner::Drive, hold: None };
-        self.push(all, JointRow { target_m_s, ..row }, name.row(ALONG, None), h_s);
+        self.push(step, JointRow { target_m_s, ..row }, name.row(ALONG, None));
     }
 
     /// A spring between two points: in all directions where it has no length of its own, else along the line between them. Where it is
     /// stretched, a turn of that line is taken back as well, with the stiffness that its tension gives: what is light would tremble.
-    pub fn spring(&mut self, all: &[Participant<'_>], ends: &[End; 2], pull: &Pull, name: Name, h_s: f64) {
+    pub fn spring(&mut self, step: &FineStep<'_, '_>, ends: &[End; 2], pull: &Pull, name: Name) {
         let [a, b] = ends;
         let sides = [a.side(), b.side()];
         let apart = a.point.position - b.point.position;
         let led_m_s = b.point.led_m_s - a.point.led_m_s;
         let mut push = |key: u32, hold: Hold, law: Spring| {
-            let row = JointRow::new(u64::from(key), sides, hold).with_spring(law, h_s);
+            let row = JointRow::new(u64::from(key), sides, hold).with_spring(law, step.h_s);
             let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
-            self.push(all, row, name.row(key, b.member), h_s);
+            self.push(step, row, name.row(key, b.member));
         };
         let Pull { stiffness_n_m, damping_n_s_m, rest_m } = *pull;
-        if rest_m == 0.0 {
-            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
-            return;
-        }
         let axis = apart.try_normalize().unwrap_or(DVec3::Z);
         let stretch_m = apart - axis * rest_m;
+        if rest_m == 0.0 {
+            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
+            self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
+            return;
+        }
         push(ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m });
         let stretched = 1.0 - rest_m / apart.length();
         if stretched > 0.0 {
             let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
             push(ACROSS, Hold::across(axis), law);
         }
+        self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
     }
 }
 

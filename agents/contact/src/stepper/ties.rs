@@ -2,12 +2,24 @@
 //!
 //! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
 
-use super::Participant;
+use super::arms::Arms;
 use super::memory::Partner;
+use super::{Participant, Progress};
 use crate::cluster::JointRow;
 use glam::DVec3;
 use metachron_core::{AgentId, Grip};
 use metachron_geometry::narrow_phase::TouchKey;
+
+/// A fine step as rows are laid out for it.
+#[derive(Clone, Copy)]
+pub(super) struct FineStep<'a, 'b> {
+    pub all: &'a [Participant<'b>],
+    pub progress: &'a [Progress],
+    /// How long it is, seconds.
+    pub h_s: f64,
+    /// How long after the start of the macro step it begins, seconds.
+    pub after_s: f64,
+}
 
 /// Where a row belongs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,21 +48,25 @@ pub(super) struct Ties {
     pub rows: Vec<JointRow>,
     /// One for each row.
     pub owners: Vec<RowOwner>,
+    /// The forces at arms that come with them.
+    pub arms: Arms,
 }
 
 impl Ties {
     pub fn clear(&mut self) {
+        self.arms.clear();
         self.rows.clear();
         self.owners.clear();
     }
 
     /// Adds a row, which starts from what it gave in the last step. Left out is one of which neither side moves.
-    pub fn push(&mut self, all: &[Participant<'_>], row: JointRow, owner: RowOwner, h_s: f64) {
+    pub fn push(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) {
         let sound = row.target_m_s.is_finite() && row.compliance_per_kg.is_none_or(|r| r > 0.0 && r.is_finite());
         if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
             return;
         }
-        let warm_n_s = all[owner.member].memory.recall(owner.partner, place_key(owner.key)).force_n * h_s;
+        let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
+        let warm_n_s = remembered.force_n * step.h_s;
         self.rows.push(JointRow { key: u64::from(owner.key), warm_n_s, ..row });
         self.owners.push(owner);
     }

@@ -222,7 +222,7 @@ impl ClusterMember for Tool {
         self.speed_m_s = speed(&self.tool, &tip, h_s);
         let force_n = (pushed_n_s - driven.impulse_n_s).length() / h_s;
         let unknowns = &mut self.unknowns;
-        unknowns.time = unknowns.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        unknowns.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         if let Some(hand) = &mut unknowns.hand {
             hand.target += hand.target_velocity * h_s;
         }

@@ -3,9 +3,11 @@
 use crate::bodies::{cube, rigid, tube};
 use crate::table::{GRAVITY, Placed, Table, placed, spring};
 use glam::DVec3;
-use metachron_core::{AgentId, Anchor};
+use metachron_contact::{Link, Neighbour};
+use metachron_core::{AgentId, Anchor, Body, RigidState, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
+use std::sync::Arc;
 
 const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
 
@@ -57,6 +59,29 @@ fn two_balls_on_a_spring_swing_and_calm_down_as_the_closed_form() {
 }
 
 #[test]
+fn a_light_rod_between_springs_that_pull_hard_does_not_begin_to_swing() {
+    // 10 g between two heavy hooks, 20 N at either end: it would swing at 350 1/s, of which steps of 1/60 s know nothing
+    let hook = |x: f64| free(ball(DVec3::new(x, 0.0, 1.0), 1e6, DVec3::ZERO));
+    let solid = Solid::Box { half_extents_m: DVec3::new(0.1, 0.005, 0.005) };
+    for rest_m in [0.0, 0.3] {
+        let spec = rigid(solid.clone(), DVec3::new(0.0, 0.0, 1.0), 0.01);
+        let spec = RigidSpec { gravity: DVec3::ZERO, spin: DVec3::Y * 0.1, ..spec };
+        let mut table = Table::new(vec![free(spec), hook(-0.6), hook(0.6)]);
+        for (hook, x) in [(1, -0.1), (2, 0.1)] {
+            let stiffness_n_m = 20.0 / (0.5 - rest_m);
+            table.link([(0, Anchor::Local(DVec3::X * x)), (hook, CENTRE)], spring(stiffness_n_m, 0.0, rest_m));
+        }
+        for step in 0..300 {
+            table.step();
+            let (linear, angular) = table.bodies[0].agent.momentum();
+            // what it began with: 3.3e-6 kg m²/s
+            let own = angular - table.middle(0).0.cross(linear);
+            assert!(own.length() < 6e-6 && linear.length() < 1e-9, "rest {rest_m}, step {step}: {own} {linear}");
+        }
+    }
+}
+
+#[test]
 fn a_spring_keeps_all_momentum_and_both_ends_are_told_its_force() {
     let mut table = pair(0.2, 1.0, 60.0);
     for step in 0..120 {
@@ -75,6 +100,27 @@ fn a_spring_keeps_all_momentum_and_both_ends_are_told_its_force() {
             assert!((here[0].force_n.x - wanted).abs() < 1e-6 * wanted, "{} is not {wanted}", here[0].force_n.x);
         }
     }
+}
+
+#[test]
+fn a_link_to_an_agent_outside_the_cluster_follows_what_it_published() {
+    let mut table = Table::new(vec![free(ball(DVec3::new(0.0, 0.0, 1.0), 0.1, DVec3::ZERO))]);
+    let link = Link { other: AgentId(7), ..spring(50.0, 1.0, 0.1) };
+    table.bodies[0].links.push(link);
+    while table.time.as_secs_f64() < 4.0 {
+        // it publishes every tenth of a second
+        let published_s = (table.time.as_secs_f64() * 10.0).floor() / 10.0;
+        let position = DVec3::new(0.1 + 0.2 * published_s, 0.0, 1.0);
+        let state = RigidState { position, velocity: DVec3::X * 0.2, ..RigidState::default() };
+        let time = SimTime::ZERO + SimSpan::from_secs_f64(published_s.max(1e-9)).unwrap();
+        let snapshot = Snapshot { time, body: Body::Rigid(state), ..Snapshot::default() };
+        table.strangers = vec![Neighbour::observed(AgentId(7), Arc::new(snapshot))];
+        table.step();
+    }
+    let (place, velocity) = table.middle(0);
+    assert!(velocity.distance(DVec3::X * 0.2) < 1e-4, "{velocity}");
+    assert!((place.x - 0.2 * table.time.as_secs_f64()).abs() < 1e-4, "{place}");
+    assert_eq!(table.grips(0)[0].by, Some(AgentId(7)));
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub struct Table {
     pub time: SimTime,
     /// Whether bodies touch each other.
     pub touching: bool,
+    /// Agents outside the cluster that bodies see.
+    pub strangers: Vec<Neighbour>,
     /// How long the last macro step was, seconds.
     last_s: f64,
     scene: ClusterScene,
@@ -87,7 +89,7 @@ impl Table {
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
         let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
-        Self { bodies, time: SimTime::ZERO, touching: true, last_s: 0.0, scene, stepper, snapshot }
+        Self { bodies, time: SimTime::ZERO, touching: true, strangers: vec![], last_s: 0.0, scene, stepper, snapshot }
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
@@ -146,7 +148,8 @@ impl Table {
         let plan = Plan::of(wishes.iter().copied());
         let dt = SimSpan::from_secs_f64(share * plan.macro_s).unwrap();
         let mut all = vec![];
-        let neighbours = self.published();
+        let mut neighbours = self.published();
+        neighbours.extend_from_slice(&self.strangers);
         let apart: Vec<_> = (0..self.bodies.len() as u32).map(|id| (AgentId(id), Law::Off)).collect();
         let laws = if self.touching { &[][..] } else { &apart };
         for ((id, body), (role, wanted_s)) in (0..).zip(&mut self.bodies).zip(wishes) {
@@ -158,7 +161,7 @@ impl Table {
             all.push(Participant { id: AgentId(id), member, context, laws, memory, parts, grips });
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
-        self.time = self.time + report.dt;
+        self.time += report.dt;
         self.last_s = report.dt.as_secs_f64();
         (report, self.last_s)
     }

@@ -5,7 +5,7 @@ use crate::table::{GRAVITY, Table, placed};
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use metachron_models::rigid::{RigidBody, RigidSpec};
@@ -79,6 +79,22 @@ fn a_tip_that_nothing_touches_is_where_its_script_is() {
     }
     assert!(state(&table, 0).tip.distance(keys[1].1) < 1e-9);
     assert!(state(&table, 0).is_idle);
+}
+
+#[test]
+fn a_user_leads_a_tool_to_the_target_and_does_not_pull_at_it() {
+    let mut table = Table::new(vec![placed(tool(&[(0.0, up(0.1), 0.0)], 5.0, vec![]), false)]);
+    let target = DVec3::new(0.05, 0.02, 0.2);
+    let (anchor, target_velocity) = (Anchor::Local(DVec3::ZERO), DVec3::ZERO);
+    // stiffness and damping have no say
+    let hand = AnchorSpring { by: None, anchor, target, target_velocity, stiffness_n_m: 1e6, damping_n_s_m: 0.0 };
+    table.bodies[0].hands.push(hand);
+    while table.time.as_secs_f64() < 0.5 {
+        table.step();
+        assert_eq!(state(&table, 0).force_n, 0.0);
+    }
+    assert!(state(&table, 0).tip.distance(target) < 1e-6);
+    assert!(table.grips(0).is_empty());
 }
 
 #[test]
