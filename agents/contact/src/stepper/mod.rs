@@ -235,8 +235,12 @@ impl ClusterStepper {
         dt_s: f64,
         report: &mut ClusterReport,
     ) -> Result<Option<f64>, StepError> {
-        let springs_back = |one: &Participant<'_>| one.member.skin().is_some_and(|skin| skin.form.restitution > 0.0);
-        let any = scene.statics().iter().any(|solid| solid.form.restitution > 0.0) || all.iter().any(springs_back);
+        let rigid = all.iter().filter(|one| one.member.role() != Role::Deformable);
+        let mut skins = rigid.filter_map(|one| one.member.skin());
+        let floors = scene.statics().iter().any(|solid| solid.form.restitution > 0.0);
+        let any = skins.next().is_some_and(|first| {
+            floors || first.form.restitution > 0.0 || skins.any(|skin| skin.form.restitution > 0.0)
+        });
         if !any || self.progress.iter().any(|state| state.parts > 1) {
             return Ok(None);
         }

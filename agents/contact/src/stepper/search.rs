@@ -9,7 +9,7 @@ use super::{Participant, Progress};
 use crate::cluster::{Contact, Side, Solution};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, touches};
-use metachron_geometry::{Aabb, CollisionShape, ContactSide, Place, Touch};
+use metachron_geometry::{Aabb, CollisionShape, ContactSide, Place, ShapeKind, Touch};
 
 /// A place is taken up if its gap may close below this within the step, metres.
 const LOOK_M: f64 = 4e-4;
@@ -343,6 +343,7 @@ fn opening_m_s(touch: &Touch, facing: &Facing, solved: &Solution) -> f64 {
 }
 
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+    let bends = skins.iter().any(|skin| matches!(skin.kind, ShapeKind::Chain { .. } | ShapeKind::Surface(_)));
     let Facing { sides, led_m_s } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
@@ -352,9 +353,9 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
-        // a pair takes the geometric mean of both frictions, and the larger restitution
+        // a pair takes the geometric mean of both frictions, and the larger restitution; what bends gives back what it has stored
         friction: (skins[0].friction * skins[1].friction).sqrt(),
-        restitution: skins[0].restitution.max(skins[1].restitution),
+        restitution: if bends { 0.0 } else { skins[0].restitution.max(skins[1].restitution) },
         approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal)
             + surface_m_s.dot(touch.normal),
         surface_m_s,
