@@ -26,7 +26,7 @@ use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
 pub use scene::ClusterScene;
-use search::Search;
+use search::{Judge, Round, Search};
 use springs::Springs;
 use std::f64::consts::SQRT_2;
 
@@ -207,7 +207,7 @@ impl ClusterStepper {
             self.search.find(scene, all, &self.progress, h_s);
             self.springs.gather(all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(scene, all, h_s, dt.as_secs_f64(), report)?;
+            self.solve(scene, all, h_s, report)?;
             if self.divide(all, h_s) {
                 return Ok(false);
             }
@@ -295,11 +295,11 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &[Participant<'_>],
         h_s: f64,
-        dt_s: f64,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
+        let rebound_from_m_s = scene.gravity_m_s2 * h_s * f64::from(report.fine_steps);
         for round in 1..=ROUNDS_MAX {
-            self.solve_once(all, h_s, scene.gravity_m_s2 * dt_s, report)?;
+            self.solve_once(all, h_s, rebound_from_m_s, report)?;
             let Self { solver, search, springs, progress, .. } = &mut *self;
             let solution = solver.solution();
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -308,7 +308,8 @@ impl ClusterStepper {
             for (row, impulse) in springs.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            if round == ROUNDS_MAX || !search.add_passed(scene, all, progress, solution, h_s) {
+            let look = Round { scene, all, progress, h_s, judge: Judge::Solved(solution) };
+            if round == ROUNDS_MAX || !search.add_passed(&look, solution) {
                 break;
             }
         }

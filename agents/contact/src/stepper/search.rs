@@ -37,12 +37,19 @@ impl Owner {
 }
 
 /// What a round of the search goes by.
-struct Round<'a, 'p> {
-    scene: &'a ClusterScene,
-    all: &'a [Participant<'p>],
-    progress: &'a [Progress],
-    h_s: f64,
-    judge: Judge<'a>,
+pub(super) struct Round<'a, 'p> {
+    pub scene: &'a ClusterScene,
+    pub all: &'a [Participant<'p>],
+    pub progress: &'a [Progress],
+    pub h_s: f64,
+    pub judge: Judge<'a>,
+}
+
+/// What was searched: two that may touch, their skins, and how far.
+struct Searched<'a> {
+    owner: Owner,
+    skins: [&'a CollisionShape; 2],
+    reach_m: f64,
 }
 
 impl Round<'_, '_> {
@@ -92,7 +99,7 @@ struct Reach {
 
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
-enum Judge<'a> {
+pub(super) enum Judge<'a> {
     /// Those at the start and without contact, each side's alone too.
     Foreseen,
     /// Those of a solution.
@@ -126,26 +133,19 @@ impl Search {
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
     /// whether there are any; contacts are then in a new order.
-    pub fn add_passed(
-        &mut self,
-        scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
-        solved: &Solution,
-        h_s: f64,
-    ) -> bool {
+    pub fn add_passed(&mut self, round: &Round<'_, '_>, solved: &Solution) -> bool {
+        let Round { all, h_s, .. } = *round;
         self.place_boxes(all, |member| all[member].member.speed_bound(solved.velocities(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
         find_pairs(&self.boxes, h_s, &mut pairs);
-        let round = Round { scene, all, progress, h_s, judge: Judge::Solved(solved) };
         self.known = self.contacts.len();
         for &pair in &pairs {
-            self.find_between(&round, pair);
+            self.find_between(round, pair);
         }
         self.again = pairs;
         for member in 0..all.len() {
-            self.find_static(&round, member);
+            self.find_static(round, member);
         }
         let more = self.contacts.len() > self.known;
         self.sort();
@@ -194,7 +194,8 @@ impl Search {
             let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
             [side(a, &touch.on_a, first), side(b, &touch.on_b, second)]
         };
-        self.take(round, Owner { member: a, partner, other: Some(b), key: 0 }, [here.form, there.form], reach_m, sides);
+        let owner = Owner { member: a, partner, other: Some(b), key: 0 };
+        self.take(round, Searched { owner, skins: [here.form, there.form], reach_m }, sides);
     }
 
     /// Places between a member and the static solids.
@@ -215,7 +216,8 @@ impl Search {
                 let side = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
                 [side.of_member(member), Side::FIXED]
             };
-            self.take(round, Owner { member, partner, other: None, key: 0 }, [skin.form, solid.form()], reach_m, sides);
+            let owner = Owner { member, partner, other: None, key: 0 };
+            self.take(round, Searched { owner, skins: [skin.form, solid.form()], reach_m }, sides);
         }
     }
 
@@ -223,9 +225,7 @@ impl Search {
     fn take(
         &mut self,
         round: &Round<'_, '_>,
-        owner: Owner,
-        skins: [&CollisionShape; 2],
-        reach_m: f64,
+        Searched { owner, skins, reach_m }: Searched<'_>,
         sides: impl Fn(&Touch) -> [Side; 2],
     ) {
         let Self { contacts, owners, touches, looks, known, .. } = self;

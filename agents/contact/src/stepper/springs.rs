@@ -37,7 +37,7 @@ impl Springs {
             let mut number = 0..;
             for spring in one.context.anchor_springs() {
                 let number = number.next().unwrap_or(0);
-                self.pull(all, member, &spring, number, (h_s, after_s));
+                self.pull(all, member, (&spring, number), (h_s, after_s));
             }
         }
     }
@@ -47,8 +47,7 @@ impl Springs {
         &mut self,
         all: &[Participant<'_>],
         member: usize,
-        spring: &AnchorSpring,
-        number: u32,
+        (spring, number): (&AnchorSpring, u32),
         (h_s, after_s): (f64, f64),
     ) {
         let Some(point) = all[member].member.anchor(spring.anchor) else { return };

@@ -170,7 +170,7 @@ impl ClusterMember for Tube {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
         self.unknowns.places.clone_from(&self.now.x);
-        self.time = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         self.unknowns.quiet_before = self.observe_rest(h_s);
         self.at_rest = false;
         self.steps += 1;

@@ -40,6 +40,7 @@ pub const NAMES: [&str; 15] = [
     "ten boxes",
 ];
 
+#[expect(clippy::too_many_lines, reason = "a list of scenes")]
 pub fn scene(name: &str) -> Table {
     let ropes = |z: f64| two(|x| rope(at(x, 0.0, z), ALONG_Y, 0.006, 1e6));
     let tubes = |z: f64| two(|x| tube(at(x, 0.0, z), ALONG_Y, 0.01));

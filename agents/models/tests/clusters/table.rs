@@ -112,7 +112,7 @@ impl Table {
             all.push(Participant { id: AgentId(id), member, context, memory, parts, grips });
         }
         let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
-        self.time = self.time + dt;
+        self.time += dt;
         (report, dt.as_secs_f64())
     }
 
