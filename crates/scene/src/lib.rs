@@ -136,7 +136,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         scenery: objects.scenery,
         groups,
         contacts: contacts != Some(ContactsFile::Whether(false)),
-        clusters: contacts != Some(ContactsFile::By(ContactPath::Pairs)),
+        clusters: contacts == Some(ContactsFile::By(ContactPath::Clusters)),
         joints,
         couplings,
         probes,

@@ -337,7 +337,7 @@ impl SceneBuilder {
             scenery: Vec::new(),
             groups: Vec::new(),
             contacts: true,
-            clusters: true,
+            clusters: false,
             joints: Arc::new([]),
             couplings: Vec::new(),
             probes: Vec::new(),

@@ -34,7 +34,7 @@ use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
 pub use scene::ClusterScene;
-use search::Search;
+use search::{Judge, Round, Search};
 use std::f64::consts::SQRT_2;
 use ties::{FineStep, Ties, place_key};
 
@@ -409,7 +409,8 @@ impl ClusterStepper {
             let miss_m = joints.aim(all, ties, |member| solution.velocities(member), h_s);
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             last_miss_m = miss_m;
-            if round == ROUNDS_MAX || !(search.add_passed(scene, all, progress, solution, h_s) || !joined) {
+            let look = Round { scene, all, progress, h_s, judge: Judge::Solved(solution) };
+            if round == ROUNDS_MAX || !(search.add_passed(&look, solution) || !joined) {
                 break;
             }
             rebounds.choose(search, progress);

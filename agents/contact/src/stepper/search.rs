@@ -37,12 +37,19 @@ impl Owner {
 }
 
 /// What a round of the search goes by.
-struct Round<'a, 'p> {
-    scene: &'a ClusterScene,
-    all: &'a [Participant<'p>],
-    progress: &'a [Progress],
-    h_s: f64,
-    judge: Judge<'a>,
+pub(super) struct Round<'a, 'p> {
+    pub scene: &'a ClusterScene,
+    pub all: &'a [Participant<'p>],
+    pub progress: &'a [Progress],
+    pub h_s: f64,
+    pub judge: Judge<'a>,
+}
+
+/// What was searched: two that may touch, their skins, and how far.
+struct Searched<'a> {
+    owner: Owner,
+    skins: [&'a CollisionShape; 2],
+    reach_m: f64,
 }
 
 impl Round<'_, '_> {
@@ -99,7 +106,7 @@ struct Reach {
 
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
-enum Judge<'a> {
+pub(super) enum Judge<'a> {
     /// Those at the start and without contact, each side's alone too.
     Foreseen,
     /// Those of a solution.
@@ -133,26 +140,19 @@ impl Search {
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
     /// whether there are any; contacts are then in a new order.
-    pub fn add_passed(
-        &mut self,
-        scene: &ClusterScene,
-        all: &[Participant<'_>],
-        progress: &[Progress],
-        solved: &Solution,
-        h_s: f64,
-    ) -> bool {
+    pub fn add_passed(&mut self, round: &Round<'_, '_>, solved: &Solution) -> bool {
+        let Round { all, h_s, .. } = *round;
         self.place_boxes(all, |member| all[member].member.speed_bound(solved.velocities(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
         find_pairs(&self.boxes, h_s, &mut pairs);
-        let round = Round { scene, all, progress, h_s, judge: Judge::Solved(solved) };
         self.known = self.contacts.len();
         for &pair in &pairs {
-            self.find_between(&round, pair);
+            self.find_between(round, pair);
         }
         self.again = pairs;
         for member in 0..all.len() {
-            self.find_static(&round, member);
+            self.find_static(round, member);
         }
         let more = self.contacts.len() > self.known;
         self.sort();
@@ -204,13 +204,8 @@ impl Search {
                 led_m_s: [all[a].member.led_m_s(&touch.on_a), all[b].member.led_m_s(&touch.on_b)],
             }
         };
-        self.take(
-            round,
-            Owner { member: a, partner, other: Some(b), key: TouchKey::default() },
-            [here.form, there.form],
-            reach_m,
-            facing,
-        );
+        let owner = Owner { member: a, partner, other: Some(b), key: TouchKey::default() };
+        self.take(round, Searched { owner, skins: [here.form, there.form], reach_m }, facing);
     }
 
     /// Places between a member and the static solids.
@@ -232,13 +227,8 @@ impl Search {
                 let led_m_s = [all[member].member.led_m_s(&touch.on_a), DVec3::ZERO];
                 Facing { sides: [side.of_member(member), Side::FIXED], led_m_s }
             };
-            self.take(
-                round,
-                Owner { member, partner, other: None, key: TouchKey::default() },
-                [skin.form, &solid.form],
-                reach_m,
-                facing,
-            );
+            let owner = Owner { member, partner, other: None, key: TouchKey::default() };
+            self.take(round, Searched { owner, skins: [skin.form, &solid.form], reach_m }, facing);
         }
     }
 
@@ -246,9 +236,7 @@ impl Search {
     fn take(
         &mut self,
         round: &Round<'_, '_>,
-        owner: Owner,
-        skins: [&CollisionShape; 2],
-        reach_m: f64,
+        Searched { owner, skins, reach_m }: Searched<'_>,
         facing: impl Fn(&Touch) -> Facing,
     ) {
         let Self { contacts, owners, touches, looks, known, .. } = self;

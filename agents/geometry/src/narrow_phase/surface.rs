@@ -122,6 +122,12 @@ impl SkinPoint {
     }
 }
 
+/// A normal from a strand's core to a point of a skin, and the distance along it, metres.
+struct Apart {
+    normal: DVec3,
+    distance_m: f64,
+}
+
 /// An edge of a skin, and where its ends are.
 #[derive(Clone, Copy)]
 struct Edge {
@@ -405,7 +411,7 @@ impl SurfaceQuery<'_> {
         let feature = Feature::Vertex(here.spot.vertices[0]);
         let out = feature.out(self.surface, way).filter(|_| feature.faces(self.surface, way, LEAN))?;
         let distance_m = out.dot(ball.centre - here.position);
-        self.strand_touch(key, here, -out, distance_m, (strand, there))
+        self.strand_touch(key, here, (strand, there), Apart { normal: -out, distance_m })
     }
 
     /// The contact between a point of the skin and one of a strand, unless they are too far.
@@ -426,17 +432,16 @@ impl SurfaceQuery<'_> {
             }
             (normal, distance) = (-normal, -distance);
         }
-        self.strand_touch(key, here, normal, distance, (strand, there))
+        self.strand_touch(key, here, (strand, there), Apart { normal, distance_m: distance })
     }
 
-    /// A touch with this normal, and this distance along it from the strand's core to the point, unless they are too far.
+    /// The touch of a point of the skin and one of a strand that are so far apart, unless that is too far.
     fn strand_touch(
         &self,
         key: TouchKey,
         here: SkinPoint,
-        normal: DVec3,
-        distance_m: f64,
         (strand, there): (&Strand<'_>, StrandPoint),
+        Apart { normal, distance_m }: Apart,
     ) -> Option<Touch> {
         let ball = ball_at(strand, there);
         let gap_m = distance_m - ball.radius_m - self.surface.form.radius_m;

@@ -33,7 +33,9 @@ fn tops(table: &mut Table, body: usize, count: usize) -> Vec<f64> {
             tops.push(place.z - RADIUS_M + after.z * after.z / (2.0 * -GRAVITY.z));
         }
         rising = after.z > 0.0;
-        if std::env::var("DBG").is_ok() { println!("{:?} {} {}", table.time, place.z - RADIUS_M, after.z); }
+        if std::env::var("DBG").is_ok() {
+            println!("{:?} {} {}", table.time, place.z - RADIUS_M, after.z);
+        }
         if tops.len() == count {
             break;
         }

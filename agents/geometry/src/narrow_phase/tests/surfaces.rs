@@ -194,3 +194,56 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         assert!((nearest.gap_m - (-depth - 0.02)).abs() < 1e-12, "{depth}: {nearest:?}");
     }
 }
+
+/// A tetrahedron with a ridge along x at z = 0 from −1 m to 1 m, and what touches it.
+fn on_a_ridge(there: &PlacedShape<'_>) -> Vec<Touch> {
+    let positions = [DVec3::NEG_X, DVec3::X, DVec3::new(0.0, 1.0, -1.0), DVec3::new(0.0, -1.0, -1.0)];
+    let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+    let triangles = [[0, 1, 2], [1, 0, 3], [0, 2, 3], [1, 3, 2]];
+    let surface = SurfaceShape {
+        fans: VoronoiRegions::of(&edges, &triangles).into(),
+        vertices: [0, 1, 2, 3].into(),
+        edges: edges.into(),
+        triangles: triangles.into(),
+        radius_m: 0.0,
+        edge_m: 1.0,
+        height_j_kg: 0.0,
+        closed: true,
+        held: false,
+    };
+    let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
+    let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
+    let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
+    touches(&here, there, 0.01, &mut scratch, &mut list);
+    list
+}
+
+#[test]
+fn an_edge_of_a_box_across_a_ridge_is_one_place_with_the_normal_of_both() {
+    let cube = cuboid(DVec3::splat(0.1));
+    let rotation = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_4);
+    for depth_m in [-0.002, 1e-6, 2e-5, 0.002] {
+        let position = DVec3::new(0.3, 0.02, 0.1 * 2.0_f64.sqrt() - depth_m);
+        let list = on_a_ridge(&PlacedShape { form: &cube, view: ShapePose::Solid { position, rotation } });
+        let [touch] = list[..] else { panic!("{list:?}") };
+        assert!((touch.gap_m + depth_m).abs() < 1e-12 && touch.normal.distance(DVec3::NEG_Z) < 1e-12, "{touch:?}");
+        let Place::Surface { vertices, shares } = touch.on_a else { panic!("{touch:?}") };
+        let across = vertices.into_iter().zip(shares).map(|(vertex, share)| [-share, share, 0.0, 0.0][vertex as usize]);
+        assert!((across.sum::<f64>() - 0.3).abs() < 1e-12, "{touch:?}");
+    }
+}
+
+#[test]
+fn a_corner_of_a_box_over_a_face_is_on_its_outer_side() {
+    let cube = cuboid(DVec3::splat(0.1));
+    // a corner down onto the face between the ridge and y = 1: along its normal
+    let out = DVec3::new(0.0, 1.0, 1.0).normalize();
+    let rotation = DQuat::from_rotation_arc(DVec3::ONE.normalize(), -out);
+    let foot = DVec3::new(0.1, 0.3, -0.3);
+    for depth_m in [-0.002, 2e-5, 0.002] {
+        let position = foot + out * (0.1 * 3.0_f64.sqrt() - depth_m);
+        let list = on_a_ridge(&PlacedShape { form: &cube, view: ShapePose::Solid { position, rotation } });
+        let [touch] = list[..] else { panic!("{list:?}") };
+        assert!((touch.gap_m + depth_m).abs() < 1e-12 && touch.normal.distance(-out) < 1e-12, "{touch:?}");
+    }
+}
