@@ -169,6 +169,15 @@ fn links_of_a_thousandth_of_what_they_carry_do_not_begin_to_tremble() {
 }
 
 #[test]
+fn a_chain_that_swings_allocates_nothing() {
+    let mut table = chain(10.0, DVec3::new(1.0, 0.0, -1.0).normalize(), 60.0);
+    for step in 0..40 {
+        table.step();
+        assert!(step < 10 || table.allocations == 0, "{} allocations in step {step}", table.allocations);
+    }
+}
+
+#[test]
 fn a_bracket_holds_a_weight_beside_it() {
     let held = block(DVec3::new(0.1, 0.02, 0.02), DVec3::X * 0.1, 2.0);
     let joint = Joint { anchor_a_m: DVec3::X * -0.1, ..on_world(JointKind::Fixed) };
