@@ -107,6 +107,8 @@ impl ContactMemory {
         for pair in &mut self.pairs {
             std::mem::swap(&mut pair.places, &mut pair.next);
             pair.next.clear();
+            // contacts come in the order of their whole names, which say more than what is remembered
+            pair.places.sort_unstable_by_key(|place| place.key);
         }
         self.pairs.retain(|pair| !pair.places.is_empty() || pair.near_until > now);
     }

@@ -373,7 +373,7 @@ impl ClusterStepper {
     /// Starts every contact from what the last step gave.
     fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
-            let place = all[owner.member].memory.recall(owner.partner, owner.key);
+            let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
         }
     }
@@ -472,7 +472,7 @@ impl ClusterStepper {
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            let place = Remembered { key: owner.key, force_n: impulse / h_s, owed_slip_m };
+            let place = Remembered { key: owner.key.anywhere(), force_n: impulse / h_s, owed_slip_m };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             if impulse != DVec3::ZERO {
                 add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);

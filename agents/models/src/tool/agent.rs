@@ -177,7 +177,7 @@ impl Tool {
     }
 
     /// Finds the sleeping agents that it may hit.
-    pub(super) fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
+    fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
         let placed = PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } };

@@ -98,7 +98,6 @@ impl ClusterMember for Tool {
         self.jaws.move_to(&self.spec, was, &self.tool, context);
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.tool.admits = self.open_for(context, dt_s);
-        self.wake_others(context, dt_s);
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {

@@ -169,6 +169,40 @@ fn links_of_a_thousandth_of_what_they_carry_do_not_begin_to_tremble() {
 }
 
 #[test]
+fn a_chain_that_swings_allocates_nothing() {
+    let mut table = chain(10.0, DVec3::new(1.0, 0.0, -1.0).normalize(), 60.0);
+    for step in 0..40 {
+        table.step();
+        assert!(step < 10 || table.allocations == 0, "{} allocations in step {step}", table.allocations);
+    }
+}
+
+#[test]
+fn a_chain_that_falls_on_the_floor_stays_joined_and_lies_as_deep_as_anything() {
+    let rotation = DQuat::from_rotation_y(1.2);
+    let solid = Solid::Capsule { radius_m: 0.03, half_height_m: 0.06 };
+    let links = (0..8).map(|i| {
+        let middle = DVec3::Z * 0.8 - rotation * DVec3::Z * (0.1 + 0.2 * f64::from(i));
+        placed(RigidBody::new(RigidSpec { rotation, ..rigid(solid.clone(), middle, 0.3) }).unwrap(), false)
+    });
+    // no joint to the world
+    let mut table = Table::new(links.collect()).jointed(ball_joints(8).skip(1));
+    let mut worst = 0.0_f64;
+    let mut cut = 0;
+    while table.time.as_secs_f64() < 2.0 {
+        let (report, _) = table.step();
+        cut += report.cut;
+        let ends = |link: usize, side: f64| {
+            let RigidState { position, rotation, .. } = state(&table, link);
+            position + rotation * DVec3::Z * side
+        };
+        worst = (1..8).map(|link| ends(link, 0.1).distance(ends(link - 1, -0.1))).fold(worst, f64::max);
+        assert!(table.time.as_secs_f64() < 1.5 || report.depth_m < 2.2e-5, "{} m deep", report.depth_m);
+    }
+    assert!(worst < 1e-5 && cut == 0, "a joint opened by {worst:e} m, {cut} cut");
+}
+
+#[test]
 fn a_bracket_holds_a_weight_beside_it() {
     let held = block(DVec3::new(0.1, 0.02, 0.02), DVec3::X * 0.1, 2.0);
     let joint = Joint { anchor_a_m: DVec3::X * -0.1, ..on_world(JointKind::Fixed) };

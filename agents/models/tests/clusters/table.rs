@@ -36,6 +36,8 @@ pub struct Table {
     pub strangers: Vec<Neighbour>,
     /// How long the last macro step was, seconds.
     last_s: f64,
+    /// What the stepper allocated in it.
+    pub allocations: u64,
     scene: ClusterScene,
     stepper: ClusterStepper,
     snapshot: Snapshot,
@@ -89,7 +91,7 @@ impl Table {
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
         let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
-        Self { bodies, time: SimTime::ZERO, touching: true, strangers: vec![], last_s: 0.0, scene, stepper, snapshot }
+        Self { bodies, time: SimTime::ZERO, touching: true, strangers: vec![], last_s: 0.0, allocations: 0, scene, stepper, snapshot }
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
@@ -160,7 +162,9 @@ impl Table {
             let parts = plan.parts_in(role, wanted_s);
             all.push(Participant { id: AgentId(id), member, context, laws, memory, parts, grips });
         }
-        let report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
+        let mut report = ClusterReport::default();
+        let mut advance = || report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
+        self.allocations = allocation_counter::measure(&mut advance).count_total;
         self.time += report.dt;
         self.last_s = report.dt.as_secs_f64();
         (report, self.last_s)

@@ -74,8 +74,8 @@ fn a_tip_that_nothing_touches_is_where_its_script_is() {
     let mut table = Table::new(vec![placed(tool(&keys, 5.0, vec![]), false)]);
     while table.time.as_secs_f64() < 1.1 {
         table.step();
-        let ToolState { force_n, .. } = state(&table, 0);
-        assert_eq!(force_n, 0.0);
+        assert_eq!(state(&table, 0).force_n, 0.0);
+        assert!(table.time.as_secs_f64() < 0.1 || table.allocations == 0);
     }
     assert!(state(&table, 0).tip.distance(keys[1].1) < 1e-9);
     assert!(state(&table, 0).is_idle);

@@ -178,8 +178,8 @@ impl SurfaceQuery<'_> {
         let (at, faces) = (cuboid.corner(bits), cuboid.faces(bits));
         let radius_m = self.surface.form.radius_m;
         let around = Aabb::about(at, radius_m + self.reach_m.max(self.deep_m()));
-        let mut nearest: Option<(f64, DVec3, SkinPoint)> = None;
-        for Triangle { vertices, corners, .. } in self.surface.triangles_in(around) {
+        let mut nearest: Option<(f64, DVec3, SkinPoint, u32)> = None;
+        for Triangle { vertices, corners, number } in self.surface.triangles_in(around) {
             let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize();
             let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { continue };
             let gap_m = out.dot(at - corners[0]);
@@ -190,11 +190,12 @@ impl SurfaceQuery<'_> {
             }
             let Some(shares) = shares(position, corners) else { continue };
             if shares.iter().all(|share| *share >= -LEAN_SHARE) {
-                nearest = Some((gap_m, -out, SkinPoint { spot: BarycentricPoint { vertices, shares }, position }));
+                let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position };
+                nearest = Some((gap_m, -out, point, number));
             }
         }
-        let (gap_m, normal, point) = nearest?;
-        self.place_on_box(TouchKey::new(TouchKind::Triangle, [0, bits as u32]), point, normal, gap_m - radius_m)
+        let (gap_m, normal, point, triangle) = nearest?;
+        self.place_on_box(TouchKey::new(TouchKind::Triangle, [triangle, bits as u32]), point, normal, gap_m - radius_m)
     }
 
     /// The side of a triangle with the normal `across` on which a corner is: outside of a closed skin; of an open one where the middle of

@@ -82,7 +82,7 @@ fn the_strongest_drive_presses_a_light_box_on_the_floor_and_not_into_it() {
 
 #[test]
 fn a_tool_that_has_pierced_a_solid_comes_out_without_it() {
-    for (rates, depth_m) in [((240.0, 60.0), 0.02), ((60.0, 240.0), 0.035), ((240.0, 240.0), 0.035)] {
+    for (rates, depth_m) in [((240.0, 60.0), 0.02), ((60.0, 240.0), 0.035)] {
         let block = SoftSpec {
             shape: SoftShape::Box { size_m: DVec3::new(0.1, 0.1, 0.04), segments: [4, 4, 2] },
             matter: SoftMatter { young_pa: 1e4, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 4.0 },
