@@ -99,7 +99,7 @@ impl Row {
         self.calm = Some(self.bias.x);
         // the blow is at the start of the step: what else changes the velocity within it does so after the blow
         let gained_m_s = free_m_s + approach_m_s;
-        self.bias.x = self.bias.x.min(-parting_m_s - gained_m_s);
+        self.bias.x = -parting_m_s - gained_m_s;
     }
 
     fn of_joint(joint: &JointRow) -> Self {

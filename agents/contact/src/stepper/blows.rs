@@ -16,7 +16,7 @@ const MET_M: f64 = 1e-6;
 const FLIGHT_SHARE: f64 = 1.0;
 
 /// What decides whether a contact rebounds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Rebounds {
     /// The macro step that was asked for, and the fine step that is made, seconds.
     pub macro_s: f64,

@@ -157,6 +157,7 @@ pub struct ClusterStepper {
     totals: Vec<PairTotal>,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
+    rebounds: Rebounds,
 }
 
 impl Default for ClusterStepper {
@@ -179,6 +180,7 @@ impl ClusterStepper {
             members: Vec::new(),
             totals: Vec::new(),
             kept: Vec::new(),
+            rebounds: Rebounds::default(),
         }
     }
 
@@ -272,14 +274,14 @@ impl ClusterStepper {
         self.totals.clear();
         report.fine_steps = parts;
         report.depth_m = 0.0;
-        let rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
+        self.rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
         for fine in 0..parts {
             self.begin(all, h_s, report)?;
             self.search.find(scene, all, &self.progress, h_s);
-            rebounds.choose(&mut self.search, &self.progress);
+            self.rebounds.choose(&mut self.search, &self.progress);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(scene, all, h_s, &rebounds, report)?;
+            self.solve(scene, all, h_s, report)?;
             if self.divide(all, h_s) {
                 return Ok(false);
             }
@@ -385,7 +387,6 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &[Participant<'_>],
         h_s: f64,
-        rebounds: &Rebounds,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         report.contacts = self.search.contacts.len() as u32;
@@ -397,7 +398,7 @@ impl ClusterStepper {
         let mut last_miss_m = f64::INFINITY;
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, report)?;
-            let Self { solver, search, ties, joints, progress, depth_m, .. } = &mut *self;
+            let Self { solver, search, ties, joints, progress, depth_m, rebounds, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -410,7 +411,8 @@ impl ClusterStepper {
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             last_miss_m = miss_m;
             let look = Round { scene, all, progress, h_s, judge: Judge::Solved(solution) };
-            if round == ROUNDS_MAX || !(search.add_passed(&look, solution) || !joined) {
+            let passed = search.add_passed(&look, solution);
+            if round == ROUNDS_MAX || !passed && joined {
                 break;
             }
             rebounds.choose(search, progress);

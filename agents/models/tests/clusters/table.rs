@@ -91,7 +91,17 @@ impl Table {
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
         let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
-        Self { bodies, time: SimTime::ZERO, touching: true, strangers: vec![], last_s: 0.0, allocations: 0, scene, stepper, snapshot }
+        Self {
+            bodies,
+            time: SimTime::ZERO,
+            touching: true,
+            strangers: vec![],
+            last_s: 0.0,
+            allocations: 0,
+            scene,
+            stepper,
+            snapshot,
+        }
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
