@@ -120,6 +120,10 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     let contacts = file.world.as_ref().and_then(|world| world.contacts);
+    let clusters = contacts == Some(ContactsFile::By(ContactPath::Clusters));
+    if clusters {
+        build::without_laws(c, &couplings);
+    }
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
@@ -136,7 +140,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         scenery: objects.scenery,
         groups,
         contacts: contacts != Some(ContactsFile::Whether(false)),
-        clusters: contacts == Some(ContactsFile::By(ContactPath::Clusters)),
+        clusters,
         joints,
         couplings,
         probes,

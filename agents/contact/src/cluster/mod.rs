@@ -1,7 +1,7 @@
 //! Contact clusters: one frictional contact problem over all bodies that touch, solved to its end in every step.
 //!
 //! In: members (a matrix, free velocities), contacts and rows of joints as plain data ([`Problem`]). Out: impulses, velocities and a
-//! report ([`Solution`]). Never here: search for contacts, clocks, models. Theory: `docs/theory/clusters.md`. No agent uses it yet.
+//! report ([`Solution`]). Never here: search for contacts, clocks, models. Theory: `docs/theory/clusters.md`.
 //!
 //! ```
 //! use glam::{DMat3, DVec3};

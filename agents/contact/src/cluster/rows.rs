@@ -15,6 +15,8 @@ const COMPLIANCE_MIN: f64 = 1e-7;
 const COMPLIANCE_MAX: f64 = 1e-3;
 /// A compliance gives way by up to this many times the wanted velocity before it is made harder.
 const HARDEN_PAST: f64 = 2.0;
+/// The share of the yield of what lies by which a blow gives way: rebounds are lower by it.
+const BLOW_SHARE: f64 = 1e-3;
 /// The least scale, 1/kg: a row between parts that cannot move has none, and gets no impulse.
 const SCALE_MIN: f64 = 1e-12;
 
@@ -153,8 +155,14 @@ impl Row {
         self.scale * (impulse - image).abs().max_element()
     }
 
+    /// How far it gives way where one at rest does by `yield_m_s`: a blow is over before anything lies on it.
+    fn own_yield_m_s(&self, yield_m_s: f64) -> f64 {
+        if self.calm.is_some() { BLOW_SHARE * yield_m_s } else { yield_m_s }
+    }
+
     /// The compliance that gives way by `yield_m_s` under an impulse (eq. 5).
     pub fn compliance_under(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
+        let yield_m_s = self.own_yield_m_s(yield_m_s);
         let (least, most) = (COMPLIANCE_MIN * self.scale, COMPLIANCE_MAX * self.scale);
         self.given.unwrap_or_else(|| (yield_m_s / impulse.length()).clamp(least, most))
     }
@@ -162,7 +170,7 @@ impl Row {
     /// The compliance, made harder where it gives way too far under an impulse.
     pub fn hardened(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
         let load = impulse.length();
-        if self.given.is_none() && self.compliance * load > HARDEN_PAST * yield_m_s {
+        if self.given.is_none() && self.compliance * load > HARDEN_PAST * self.own_yield_m_s(yield_m_s) {
             self.compliance_under(impulse, yield_m_s)
         } else {
             self.compliance

@@ -1,7 +1,7 @@
 //! Blows: contacts that rebound, each at its own time.
 //!
 //! In: the places of a macro step. Out: when the first of them that rebounds closes; which contacts rebound now. Never here: how a
-//! rebound is solved ([`crate::cluster`]). Theory: docs/theory/clusters.md, section 7.
+//! rebound is solved ([`crate::cluster`]). Theory: docs/theory/clusters.md, section 9.
 //!
 //! A macro step that a blow falls into ends where the sides meet, so that the blow acts there and not where they were before. In the fine
 //! steps of unlike members a blow acts at the start of its fine step: that is a sixteenth of the longest step off at most.

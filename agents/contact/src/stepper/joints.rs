@@ -70,6 +70,15 @@ struct Off {
     travel: f64,
 }
 
+/// A joint and the participants that it holds.
+struct Jointed<'a> {
+    number: u32,
+    joint: &'a Joint,
+    a: usize,
+    /// `None` is the world.
+    b: Option<usize>,
+}
+
 impl Joints {
     /// Lays out all joints between participants.
     pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, ties: &mut Ties) {
@@ -81,49 +90,44 @@ impl Joints {
                 let b = joint.b.map(|id| place_of(all, id));
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
-                self.hold(step, (number, joint), (a, b), ties);
+                self.hold(step, &Jointed { number, joint, a, b }, ties);
             }
         }
         self.aim(all, ties, |member| &progress[member].before[..], step.h_s);
     }
 
     /// Lays out one joint.
-    fn hold(
-        &mut self,
-        step: &FineStep<'_, '_>,
-        (number, joint): (u32, &Joint),
-        members: (usize, Option<usize>),
-        ties: &mut Ties,
-    ) {
+    fn hold(&mut self, step: &FineStep<'_, '_>, jointed: &Jointed<'_>, ties: &mut Ties) {
+        let Jointed { number, joint, a: first, b: second } = *jointed;
         let all = step.all;
         let at = |member: usize| all[member].member.pose(&[], 0.0);
-        let (Some(a), Some(b)) = (at(members.0), members.1.map_or(Some(Pose::WORLD), at)) else { return };
+        let (Some(a), Some(b)) = (at(first), second.map_or(Some(Pose::WORLD), at)) else { return };
         let anchors = [a.place(joint.anchor_a_m), b.place(joint.anchor_b_m)];
         // on a slide b's anchor meets the matter of a beside it, wherever that is
         let on_a = if matches!(joint.kind, JointKind::Prismatic { .. }) { anchors[1] } else { anchors[0] };
         let (Some(point_a), Some(point_b)) =
-            (material(all, Some(members.0), &a, on_a), material(all, members.1, &b, anchors[1]))
+            (material(all, Some(first), &a, on_a), material(all, second, &b, anchors[1]))
         else {
             return;
         };
-        let ends = [End { member: Some(members.0), point: point_a }, End { member: members.1, point: point_b }];
-        let name = Name { member: members.0, partner: Partner::Joint(number), hold: None };
+        let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
+        let name = Name { member: first, partner: Partner::Joint(number), hold: None };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
             ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
         }
         let points = [ends[0].side(), ends[1].side()];
-        let turns = [a.turns.of_member(members.0), members.1.map_or(Side::FIXED, |at| b.turns.of_member(at))];
+        let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
-        self.held.push(Held { joint: *joint, members, now });
+        self.held.push(Held { joint: *joint, members: (first, second), now });
         let held = self.held.len() - 1;
         let axis = joint.axis(&a, anchors[1] - anchors[0]);
         let mut key = 0;
         let mut push = |way: Way, sides: [Side; 2], hold: Hold| {
             let row = ties.rows.len();
-            ties.push(step, JointRow::new(u64::from(key), sides, hold), name.row(key, members.1));
+            ties.push(step, JointRow::new(u64::from(key), sides, hold), name.row(key, second));
             if ties.rows.len() > row {
                 self.parts.push(Part { held, row, way });
             }

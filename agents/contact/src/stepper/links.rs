@@ -22,13 +22,14 @@ impl Ties {
                 let other = place_of(all, link.other);
                 let is_mine = other.is_none_or(|other| member < other);
                 if is_mine && matches!(link.law, Law::Ledger) {
-                    self.link(step, (member, other), link, number);
+                    self.link(step, [Some(member), other], link, number);
                 }
             }
         }
     }
 
-    fn link(&mut self, step: &FineStep<'_, '_>, (member, other): (usize, Option<usize>), link: &Link, number: u32) {
+    fn link(&mut self, step: &FineStep<'_, '_>, ends: [Option<usize>; 2], link: &Link, number: u32) {
+        let [Some(member), other] = ends else { return };
         let all = step.all;
         let there = match other {
             Some(other) => all[other].member.anchor(link.there),

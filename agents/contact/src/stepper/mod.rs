@@ -1,7 +1,7 @@
 //! The steps of a contact cluster: bodies that touch or are joined advance together, each by steps of its own length.
 //!
 //! In: members at one common time, the static solids, what members remember of each other. Out: members a macro step later.
-//! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 7.
+//! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 9.
 //!
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
@@ -117,7 +117,7 @@ pub struct PairTotal {
     pub depth_m: f64,
 }
 
-/// How far a member is in its own step (eq. 18–20).
+/// How far a member is in its own step (eq. 24–26).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
     /// How many steps it makes in the macro step, where it bends.
@@ -342,7 +342,7 @@ impl ClusterStepper {
         &self.search.near
     }
 
-    /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 18).
+    /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
     fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             if state.part == 0 {
@@ -381,7 +381,7 @@ impl ClusterStepper {
     }
 
     /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
-    /// its impulses (eq. 19).
+    /// its impulses (eq. 25).
     fn solve(
         &mut self,
         scene: &ClusterScene,
@@ -498,7 +498,7 @@ impl ClusterStepper {
         }
     }
 
-    /// Moves all members; the step of some ends (eq. 20).
+    /// Moves all members; the step of some ends (eq. 26).
     fn end(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             let since_s = h_s * f64::from(state.part);
@@ -526,7 +526,7 @@ impl Progress {
         self.touched = false;
     }
 
-    /// Finds v̄(p) and û of the fine step that begins (eq. 18).
+    /// Finds v̄(p) and û of the fine step that begins (eq. 24).
     fn look(&mut self) {
         let Self { share, part, start, gain, given, before, known, seen, .. } = self;
         let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
@@ -541,7 +541,7 @@ impl Progress {
         self.before.clone_from(&self.known);
     }
 
-    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 19).
+    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 25).
     fn take(&mut self, moved: &[DVec3]) {
         let p = f64::from(self.part);
         for (at, moved) in moved.iter().enumerate() {
@@ -564,7 +564,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for members with these roles and wanted steps, seconds (eq. 17a).
+    /// The plan for members with these roles and wanted steps, seconds (eq. 23).
     #[must_use]
     pub fn of(members: impl Iterator<Item = (Role, f64)> + Clone) -> Self {
         let bent = members.clone().filter(|(role, _)| *role == Role::Deformable).map(|(_, wanted_s)| wanted_s);

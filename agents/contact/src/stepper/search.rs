@@ -1,7 +1,7 @@
 //! Where members of a cluster may touch each other and the static solids around them within a fine step.
 //!
 //! In: members with the velocities they have and would have. Out: contacts of the problem, each with its name. Never here: impulses.
-//! Theory: docs/theory/clusters.md, section 7.
+//! Theory: docs/theory/clusters.md, section 9.
 
 use super::memory::Partner;
 use super::scene::ClusterScene;

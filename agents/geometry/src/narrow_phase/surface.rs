@@ -122,6 +122,13 @@ impl SkinPoint {
     }
 }
 
+/// A point of a strand.
+#[derive(Clone, Copy)]
+struct StrandSpot<'s, 'a> {
+    strand: &'s Strand<'a>,
+    point: StrandPoint,
+}
+
 /// A normal from a strand's core to a point of a skin, and the distance along it, metres.
 struct Apart {
     normal: DVec3,
@@ -411,7 +418,7 @@ impl SurfaceQuery<'_> {
         let feature = Feature::Vertex(here.spot.vertices[0]);
         let out = feature.out(self.surface, way).filter(|_| feature.faces(self.surface, way, LEAN))?;
         let distance_m = out.dot(ball.centre - here.position);
-        self.strand_touch(key, here, (strand, there), Apart { normal: -out, distance_m })
+        self.strand_touch(key, here, StrandSpot { strand, point: there }, Apart { normal: -out, distance_m })
     }
 
     /// The contact between a point of the skin and one of a strand, unless they are too far.
@@ -432,7 +439,7 @@ impl SurfaceQuery<'_> {
             }
             (normal, distance) = (-normal, -distance);
         }
-        self.strand_touch(key, here, (strand, there), Apart { normal, distance_m: distance })
+        self.strand_touch(key, here, StrandSpot { strand, point: there }, Apart { normal, distance_m: distance })
     }
 
     /// The touch of a point of the skin and one of a strand that are so far apart, unless that is too far.
@@ -440,9 +447,10 @@ impl SurfaceQuery<'_> {
         &self,
         key: TouchKey,
         here: SkinPoint,
-        (strand, there): (&Strand<'_>, StrandPoint),
+        there: StrandSpot<'_, '_>,
         Apart { normal, distance_m }: Apart,
     ) -> Option<Touch> {
+        let StrandSpot { strand, point: there } = there;
         let ball = ball_at(strand, there);
         let gap_m = distance_m - ball.radius_m - self.surface.form.radius_m;
         let half = 0.5 * gap_m;

@@ -1,6 +1,6 @@
 //! A rigid body in a contact cluster: two blocks, the velocity of its centre of mass and its spin.
 //!
-//! In: steps and velocities. Out: its inertia, its free flight, its skin. Never here: contacts. Theory: docs/theory/clusters.md, section 7.
+//! In: steps and velocities. Out: its inertia, its free flight, its skin. Never here: contacts. Theory: docs/theory/clusters.md, section 9.
 
 use super::RigidBody;
 use super::company::placed;

@@ -1,7 +1,7 @@
 //! A tube in a contact cluster: blocks for nodes and spins in turn, as in its own system.
 //!
 //! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
-//! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 7.
+//! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 9.
 
 use super::banded_ldl::Row;
 use super::rest::RestDetector;

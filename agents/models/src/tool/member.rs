@@ -1,7 +1,7 @@
 //! A tool in a contact cluster: its tip is a mass on a drive that follows the commanded point; its turns and its jaws are led.
 //!
 //! In: what leads it, steps, the velocity of its tip. Out: the tip's mass, its drive, its skin. Never here: contacts, the path.
-//! Theory: docs/theory/coupling.md, eq. 9d and 9f; docs/theory/clusters.md, section 7.
+//! Theory: docs/theory/coupling.md, eq. 9d and 9f; docs/theory/clusters.md, section 9.
 
 use super::Tool;
 use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin};

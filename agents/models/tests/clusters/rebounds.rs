@@ -26,9 +26,11 @@ fn tops(table: &mut Table, body: usize, count: usize) -> Vec<f64> {
     let mut rising = false;
     for _ in 0..40_000 {
         let (_, before) = table.middle(body);
-        table.step();
+        let (_, dt_s) = table.step();
         let (place, after) = table.middle(body);
-        if rising && after.z <= 0.0 && before.z > 0.0 {
+        // what a blow at its start sends up may come down again within the step
+        rising |= after.z > before.z + GRAVITY.z * dt_s + 1e-6;
+        if rising && after.z <= 0.0 {
             // the top lies within the step: from the state at its end
             tops.push(place.z - RADIUS_M + after.z * after.z / (2.0 * -GRAVITY.z));
         }
@@ -56,7 +58,7 @@ fn a_ball_rises_to_its_share_of_the_height_at_any_rate() {
                 let off = top_m / exact_m - 1.0;
                 // never above: contacts give way by some micrometres
                 assert!(
-                    (-1e-2..1e-9).contains(&off),
+                    (-1e-3..1e-9).contains(&off),
                     "e {restitution}, {rate_hz} Hz, bounce {bounce}: {top_m} of {exact_m}"
                 );
             }
@@ -78,7 +80,7 @@ fn balls_of_one_cluster_bounce_each_as_if_alone() {
         for (bounce, top_m) in (1..).zip(tops(&mut table, body, 5)) {
             let exact_m = 0.8_f64.powi(2 * bounce) * height_m;
             let off = top_m / exact_m - 1.0;
-            assert!((-1e-2..1e-9).contains(&off), "ball {body}, bounce {bounce}: {top_m} of {exact_m}");
+            assert!((-1e-3..1e-9).contains(&off), "ball {body}, bounce {bounce}: {top_m} of {exact_m}");
         }
     }
 }
@@ -118,7 +120,7 @@ fn two_bodies_part_by_momentum_and_restitution() {
                 let parting = 1.5 * restitution;
                 let exact = [common - parting * mass_kg / (1.0 + mass_kg), common + parting / (1.0 + mass_kg)];
                 let off = (v - exact[0]).abs().max((w - exact[1]).abs());
-                assert!(off < 1e-2, "e {restitution}, 1 : {mass_kg}, {rate_hz} Hz: {v} {w} of {exact:?}");
+                assert!(off < 1e-3, "e {restitution}, 1 : {mass_kg}, {rate_hz} Hz: {v} {w} of {exact:?}");
             }
         }
     }

@@ -43,6 +43,16 @@ pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects
     found
 }
 
+/// Refuses laws of single pairs where all that touch is solved as one problem.
+pub(crate) fn without_laws(c: &mut Checker<'_, '_>, couplings: &[Coupling]) {
+    let own = |coupling: &&Coupling| !matches!(coupling.law, Law::Ledger | Law::Off);
+    if couplings.iter().any(|coupling| own(&coupling)) {
+        let expected = "expected couplings of the laws `ledger` and `off`, or `contacts = \"pairs\"`";
+        let what = "is `clusters`, which solve no pair by a law of its own";
+        c.wrong(&Place::new("world", "of `[world]`"), "contacts", what, expected);
+    }
+}
+
 fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
     let (a, b) = (end(c, place, "a", &file.a, objects), end(c, place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
