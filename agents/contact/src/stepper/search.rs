@@ -212,6 +212,9 @@ impl Search {
     fn find_static(&mut self, round: &Round<'_, '_>, member: usize) {
         let Round { scene, all, h_s, .. } = *round;
         let Some(skin) = all[member].member.skin() else { return };
+        if all[member].member.is_led() {
+            return; // what leads it is stronger than what never moves
+        }
         let way_m = self.speed(member) * h_s;
         let reach_m = LOOK_M + way_m;
         let bounds = skin.bounds().grown(reach_m);

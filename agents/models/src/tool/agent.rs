@@ -8,7 +8,7 @@
 
 use super::drive::{Drive, PointMotion};
 use super::force_sensor::ContactForces;
-use super::gripper::{Jaws, nearest, open_for};
+use super::gripper::{Jaws, nearest, nearest_graspable, open_for};
 use super::member::Unknowns;
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
@@ -174,6 +174,13 @@ impl Tool {
         let open = self.tool.jaw > GRASP_BELOW;
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
         if open { open_for(&self.spec, self.tool.tip, context, reach_m) } else { None }
+    }
+
+    /// The agent for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
+    pub(super) fn open_for_any(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
+        let open = self.tool.jaw > GRASP_BELOW;
+        let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
+        if open { nearest_graspable(&self.spec, self.tool.tip, context, reach_m) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.

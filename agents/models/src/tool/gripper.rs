@@ -108,6 +108,16 @@ pub(super) fn open_for(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>, r
     nearest_of(spec, tip, context, reach_m, rigid).map(|near| near.target)
 }
 
+/// The agent that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
+pub(super) fn nearest_graspable(
+    spec: &ToolSpec,
+    tip: DVec3,
+    context: &StepContext<'_>,
+    reach_m: f64,
+) -> Option<AgentId> {
+    nearest_of(spec, tip, context, reach_m, |_| true).map(|near| near.target)
+}
+
 /// The nearest point within `reach_m` on graspable agents that are `wanted`.
 fn nearest_of(
     spec: &ToolSpec,
