@@ -139,6 +139,10 @@ pub(crate) struct Progress {
     known: Vec<DVec3>,
     /// û: the velocity at which its place moves in this fine step, without the impulses sought.
     seen: Vec<DVec3>,
+    /// û with the impulses that the last solve found.
+    solved: Vec<DVec3>,
+    /// Its place in the problem; `None` where no row touches it.
+    place: Option<usize>,
     /// Whether anything has acted on it for a while since its step began.
     touched: bool,
     /// Work of its steps within the macro step, in the unit of its model.
@@ -158,6 +162,8 @@ pub struct ClusterStepper {
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     rebounds: Rebounds,
+    /// The participant of each member of the problem.
+    places: Vec<usize>,
 }
 
 impl Default for ClusterStepper {
@@ -181,6 +187,7 @@ impl ClusterStepper {
             totals: Vec::new(),
             kept: Vec::new(),
             rebounds: Rebounds::default(),
+            places: Vec::new(),
         }
     }
 
@@ -407,11 +414,11 @@ impl ClusterStepper {
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            let miss_m = joints.aim(all, ties, |member| solution.velocities(member), h_s);
+            let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             last_miss_m = miss_m;
-            let look = Round { scene, all, progress, h_s, judge: Judge::Solved(solution) };
-            let passed = search.add_passed(&look, solution);
+            let look = Round { scene, all, progress, h_s, judge: Judge::Solved };
+            let passed = search.add_passed(&look);
             if round == ROUNDS_MAX || !passed && joined {
                 break;
             }
@@ -423,18 +430,36 @@ impl ClusterStepper {
 
     fn solve_once(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
         let Self { solver, search, ties, progress, members, .. } = self;
+        // what no row touches moves as it would, and makes no problem larger
+        let mut count = 0..;
+        progress.iter_mut().for_each(|state| state.place = None);
+        let sides = search.contacts.iter().flat_map(|c| &c.sides).chain(ties.rows.iter().flat_map(|row| &row.sides));
+        sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
+        let involved = progress.iter_mut().filter(|state| state.place.is_some());
+        involved.for_each(|state| state.place = count.next());
         let mut list = emptied(std::mem::take(members));
-        list.extend(all.iter().zip(&*progress).map(|(one, state)| Member {
+        let taking = all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
+        list.extend(taking.map(|(one, state)| Member {
             blocks: one.member.blocks(),
             response: one.member.response(),
             free: &state.seen,
             share: f64::from(state.part),
         }));
+        move_sides(search, ties, |member| progress[member].place);
         let problem =
             Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, rebound_from_m_s: 0.0 };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = emptied(list);
+        let places = &mut self.places;
+        places.clear();
+        places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
+        move_sides(search, ties, |place| places.get(place).copied());
         let took = outcome.map_err(|error| refused(&error, h_s))?;
+        for state in &mut *progress {
+            let Progress { solved, seen, place, .. } = state;
+            solved.clear();
+            solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
+        }
         report.factors += took.factors as u32;
         report.passes += took.passes as u32;
         report.solves += 1;
@@ -447,9 +472,7 @@ impl ClusterStepper {
     fn give(&mut self, report: &mut ClusterReport) {
         let Self { solver, search, ties, progress, .. } = self;
         let solution = solver.solution();
-        for (member, state) in progress.iter_mut().enumerate() {
-            state.take(solution.velocities(member));
-        }
+        progress.iter_mut().for_each(Progress::take);
         // a blow is over when the step begins: the flight after it is free
         let lasting = |(contact, impulse): (&Contact, &DVec3)| *impulse != DVec3::ZERO && contact.restitution == 0.0;
         for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
@@ -542,9 +565,9 @@ impl Progress {
     }
 
     /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 25).
-    fn take(&mut self, moved: &[DVec3]) {
+    fn take(&mut self) {
         let p = f64::from(self.part);
-        for (at, moved) in moved.iter().enumerate() {
+        for (at, moved) in self.solved.iter().enumerate() {
             let change = (*moved - self.seen[at]) / p;
             self.given[at] += change;
             self.before[at] = self.known[at] + change;
@@ -619,6 +642,15 @@ fn add_up(totals: &mut Vec<PairTotal>, member: usize, partner: Partner, impulse_
     total.impulse_n_s += impulse_n_s;
     total.depth_m = total.depth_m.max(depth_m);
     total.contacts += 1;
+}
+
+/// Counts the members of all sides anew.
+fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option<usize>) {
+    let contacts = search.contacts.iter_mut().flat_map(|contact| &mut contact.sides);
+    let sides = contacts.chain(ties.rows.iter_mut().flat_map(|row| &mut row.sides));
+    for side in sides.filter(|side| !side.terms().is_empty()) {
+        side.member = to(side.member).unwrap_or(side.member);
+    }
 }
 
 fn refused(error: &ProblemError, dt_s: f64) -> StepError {

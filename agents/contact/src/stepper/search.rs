@@ -6,7 +6,7 @@
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::{Participant, Progress};
-use crate::cluster::{Contact, Side, Solution};
+use crate::cluster::{Contact, Side};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, touches};
 use metachron_geometry::{Aabb, CollisionShape, ContactSide, Place, ShapeKind, Touch};
@@ -42,7 +42,7 @@ pub(super) struct Round<'a, 'p> {
     pub all: &'a [Participant<'p>],
     pub progress: &'a [Progress],
     pub h_s: f64,
-    pub judge: Judge<'a>,
+    pub judge: Judge,
 }
 
 /// What was searched: two that may touch, their skins, and how far.
@@ -106,11 +106,11 @@ struct Reach {
 
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
-pub(super) enum Judge<'a> {
+pub(super) enum Judge {
     /// Those at the start and without contact, each side's alone too.
     Foreseen,
     /// Those of a solution.
-    Solved(&'a Solution),
+    Solved,
 }
 
 impl Search {
@@ -140,9 +140,9 @@ impl Search {
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
     /// whether there are any; contacts are then in a new order.
-    pub fn add_passed(&mut self, round: &Round<'_, '_>, solved: &Solution) -> bool {
+    pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
         let Round { all, h_s, .. } = *round;
-        self.place_boxes(all, |member| all[member].member.speed_bound(solved.velocities(member)));
+        self.place_boxes(all, |member| all[member].member.speed_bound(&round.progress[member].solved));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
         find_pairs(&self.boxes, h_s, &mut pairs);
@@ -251,9 +251,9 @@ impl Search {
             }
             let taken = match round.judge {
                 Judge::Foreseen => closes(touch, &facing, round.progress, round.h_s),
-                Judge::Solved(solved) => {
+                Judge::Solved => {
                     let known = owners[..*known].binary_search_by_key(&owner.name(), Owner::name).is_ok();
-                    !known && touch.gap_m + opening_m_s(touch, &facing, solved) * round.h_s < 0.0
+                    !known && touch.gap_m + opening_m_s(touch, &facing, round.progress) * round.h_s < 0.0
                 }
             };
             if taken {
@@ -324,10 +324,10 @@ fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bo
 }
 
 /// How fast a gap opens with the velocities of a solution, m/s.
-fn opening_m_s(touch: &Touch, facing: &Facing, solved: &Solution) -> f64 {
+fn opening_m_s(touch: &Touch, facing: &Facing, progress: &[Progress]) -> f64 {
     let [a, b] = [0, 1].map(|at| {
         let side = &facing.sides[at];
-        let moved = if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(solved.velocities(side.member)) };
+        let moved = if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(&progress[side.member].solved) };
         (moved + facing.led_m_s[at]).dot(touch.normal)
     });
     a - b
