@@ -193,7 +193,11 @@ impl Search {
             return;
         }
         let reach_m = LOOK_M + way_m;
-        touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
+        if here.bounds().grown(reach_m).meets(there.bounds()) {
+            touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
+        } else {
+            self.touches.clear();
+        }
         let side = |member: usize, place: &Place, contact: ContactSide| {
             all[member].member.side(place, contact).of_member(member)
         };
