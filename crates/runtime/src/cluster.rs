@@ -39,6 +39,7 @@ pub(super) struct ClusterSeat {
     participants: Vec<Participant<'static>>,
     wishes: Vec<Wish>,
     groups: Vec<usize>,
+    ids: Vec<AgentId>,
 }
 
 /// The step that a member wants.
@@ -91,6 +92,7 @@ impl ClusterSeat {
             participants: Vec::new(),
             wishes: Vec::new(),
             groups: Vec::new(),
+            ids: Vec::new(),
         }
     }
 
@@ -285,7 +287,7 @@ impl AgentRunner {
         let Some(mut groups) = self.cluster.as_mut().map(|seat| std::mem::take(&mut seat.groups)) else { return };
         let (id, time) = (self.shared.id, self.pace.time());
         let mut company = std::mem::take(&mut self.company);
-        let mut ids = std::mem::take(&mut company.ids);
+        let mut ids = self.cluster.as_mut().map(|seat| std::mem::take(&mut seat.ids)).unwrap_or_default();
         ids.clear();
         ids.push(id);
         ids.extend(company.seats_at(time).map(|actor| actor.shared.id));
@@ -305,11 +307,10 @@ impl AgentRunner {
         company.seats_at(time).enumerate().for_each(|(place, actor)| join(place + 1, actor));
         company.apart.clear();
         company.apart.extend((1..ids.len()).map(|place| top(&groups, place) as u32));
-        company.ids = ids;
         company.note_apart(time);
         self.company = company;
         if let Some(seat) = &mut self.cluster {
-            seat.groups = groups;
+            (seat.groups, seat.ids) = (groups, ids);
         }
     }
 

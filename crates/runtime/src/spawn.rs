@@ -311,7 +311,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         writer,
         observer: peers.observer(id, &links),
         links: spawn.attached,
-        hands: Vec::with_capacity(1),
+        hands: Vec::new(),
         cluster,
         company: Led::default(),
         metrics: MetricsWriter::new(),

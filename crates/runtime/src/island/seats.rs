@@ -43,8 +43,6 @@ pub(in super::super) struct Company {
     pub(in super::super) apart: Vec<u32>,
     /// Storage, empty between turns.
     pub(super) companions: Vec<IslandMember<'static>>,
-    /// The numbers of all members of a cluster's step: storage.
-    pub(in super::super) ids: Vec<AgentId>,
 }
 
 /// One that is led.
