@@ -12,8 +12,6 @@ use crate::cluster::{Contact, Side};
 
 /// Sides that are closer than this have met, metres: a millionth of what any picture shows.
 const MET_M: f64 = 1e-6;
-/// What parts for less than this share of a macro step does not rebound: it would hop at every step.
-const FLIGHT_SHARE: f64 = 1.0;
 
 /// What decides whether a contact rebounds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -31,7 +29,8 @@ impl Rebounds {
         // what both gain, as they fall, is not what drives them together where one of them lies on something
         let [a, b] = contact.sides.each_ref().map(|side| gain_m_s(side, progress, contact));
         let driven_m_s2 = (b - a).max(b).max(-a) / self.step_s;
-        2.0 * contact.restitution * approach_m_s > FLIGHT_SHARE * driven_m_s2 * self.macro_s
+        // what parts for less than a macro step would hop at every step
+        2.0 * contact.restitution * approach_m_s > driven_m_s2 * self.macro_s
     }
 
     /// When the first contact that will rebound closes, seconds from now; `None` for none within the macro step.

@@ -207,11 +207,11 @@ impl ClusterStepper {
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport { dt, ..ClusterReport::default() };
-        self.foresee(all, dt.as_secs_f64(), &mut report)?;
-        let blow = self.first_blow(scene, all, dt.as_secs_f64(), &mut report)?;
+        self.foresee(all, dt.as_secs_f64())?;
+        let blow = self.first_blow(scene, all, dt.as_secs_f64())?;
         if let Some(cut) = blow.and_then(SimSpan::from_secs_f64) {
             report.dt = cut.clamp(SHORTEST.min(dt), dt);
-            self.foresee(all, report.dt.as_secs_f64(), &mut report)?;
+            self.foresee(all, report.dt.as_secs_f64())?;
         }
         self.keep(all);
         let asked_s = dt.as_secs_f64();
@@ -219,16 +219,16 @@ impl ClusterStepper {
         while !self.advance(scene, all, asked_s, &mut report)? {
             self.go_back(all);
         }
+        report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }
 
     /// Begins the first step of every member, in as many parts as its free motion needs.
-    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             let own_s = dt_s / f64::from(one.parts);
             one.member.look(&one.context, dt_s);
-            one.member.begin(own_s)?;
-            report.work += one.member.work();
+            state.begin(one.member, own_s)?;
             let more = times(one.member.strain(one.member.free(), own_s));
             state.parts = one.parts * more;
             state.begun_s = if more == 1 { own_s } else { 0.0 };
@@ -242,7 +242,6 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         dt_s: f64,
-        report: &mut ClusterReport,
     ) -> Result<Option<f64>, StepError> {
         let rigid = all.iter().filter(|one| one.member.role() != Role::Deformable);
         let mut skins = rigid.filter_map(|one| one.member.skin());
@@ -254,7 +253,7 @@ impl ClusterStepper {
             return Ok(None);
         }
         self.progress.iter_mut().for_each(|state| (state.share, state.part) = (1, 0));
-        self.begin(all, dt_s, report)?;
+        self.begin(all, dt_s)?;
         self.search.find(scene, all, &self.progress, dt_s);
         // the steps begun are still those that are made where nothing rebounds
         self.progress.iter_mut().for_each(|state| state.begun_s = dt_s);
@@ -283,7 +282,7 @@ impl ClusterStepper {
         report.depth_m = 0.0;
         self.rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
         for fine in 0..parts {
-            self.begin(all, h_s, report)?;
+            self.begin(all, h_s)?;
             self.search.find(scene, all, &self.progress, h_s);
             self.rebounds.choose(&mut self.search, &self.progress);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
@@ -350,14 +349,12 @@ impl ClusterStepper {
     }
 
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
-    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
                 if state.begun_s != own_s {
-                    one.member.begin(own_s)?;
-                    state.work += one.member.work();
-                    report.work += one.member.work();
+                    state.begin(one.member, own_s)?;
                 }
                 state.begun_s = 0.0;
                 state.start(one.member.velocities(), one.member.free());
@@ -396,7 +393,7 @@ impl ClusterStepper {
         h_s: f64,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        report.contacts = self.search.contacts.len() as u32;
+        report.contacts = 0;
         if self.search.contacts.is_empty() && self.ties.rows.is_empty() {
             // what touches nothing moves as it would
             self.progress.iter_mut().for_each(Progress::go_on);
@@ -537,6 +534,13 @@ impl ClusterStepper {
 }
 
 impl Progress {
+    /// Lets a member begin a step, and counts its work.
+    fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) -> Result<(), StepError> {
+        member.begin(own_s)?;
+        self.work += member.work();
+        Ok(())
+    }
+
     /// Begins a step from velocities `now` that would be `free` at its end.
     fn start(&mut self, now: &[DVec3], free: &[DVec3]) {
         self.start.clear();

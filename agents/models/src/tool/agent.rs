@@ -8,7 +8,7 @@
 
 use super::drive::{Drive, PointMotion};
 use super::force_sensor::ContactForces;
-use super::gripper::{Jaws, nearest, nearest_graspable, open_for};
+use super::gripper::{Jaws, nearest, nearest_of};
 use super::member::Unknowns;
 use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
@@ -169,18 +169,17 @@ impl Tool {
         ToolState { tip: tip.position, velocity: tip.velocity, ..led }
     }
 
-    /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
-    pub(super) fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
-        let open = self.tool.jaw > GRASP_BELOW;
+    /// The agent, among those that are `wanted`, that open jaws may grasp or have just released: the nearest of those that are near them,
+    /// or may be within two steps of `dt_s` seconds.
+    pub(super) fn open_for(
+        &self,
+        context: &StepContext<'_>,
+        dt_s: f64,
+        wanted: impl Fn(&Neighbour) -> bool,
+    ) -> Option<AgentId> {
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
-        if open { open_for(&self.spec, self.tool.tip, context, reach_m) } else { None }
-    }
-
-    /// The agent for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
-    pub(super) fn open_for_any(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
-        let open = self.tool.jaw > GRASP_BELOW;
-        let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
-        if open { nearest_graspable(&self.spec, self.tool.tip, context, reach_m) } else { None }
+        let nearest = || nearest_of(&self.spec, self.tool.tip, context, reach_m, wanted);
+        if self.tool.jaw > GRASP_BELOW { nearest().map(|near| near.target) } else { None }
     }
 
     /// Finds the sleeping agents that it may hit.
@@ -286,7 +285,8 @@ impl Agent for Tool {
         self.jaws.age(dt_s);
         self.jaws.move_to(&self.spec, was, &self.tool, context);
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.admits = self.open_for(context, dt_s);
+        let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
+        self.tool.admits = self.open_for(context, dt_s, rigid);
         self.wake_others(context, dt_s);
         self.tool.force_n = self.forces.force_n();
         self.steps += 1;

@@ -40,7 +40,7 @@ struct ActiveGrasp {
 /// The nearest graspable point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct GraspCandidate {
-    target: AgentId,
+    pub(super) target: AgentId,
     anchor: Anchor,
     /// From the tip to its skin, metres; a tube's is below zero inside.
     pub gap_m: f64,
@@ -102,24 +102,8 @@ pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>) ->
     nearest_of(spec, tip, context, spec.reach_m, |_| true)
 }
 
-/// The rigid body that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
-pub(super) fn open_for(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>, reach_m: f64) -> Option<AgentId> {
-    let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
-    nearest_of(spec, tip, context, reach_m, rigid).map(|near| near.target)
-}
-
-/// The agent that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
-pub(super) fn nearest_graspable(
-    spec: &ToolSpec,
-    tip: DVec3,
-    context: &StepContext<'_>,
-    reach_m: f64,
-) -> Option<AgentId> {
-    nearest_of(spec, tip, context, reach_m, |_| true).map(|near| near.target)
-}
-
 /// The nearest point within `reach_m` on graspable agents that are `wanted`.
-fn nearest_of(
+pub(super) fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
     context: &StepContext<'_>,

@@ -97,7 +97,7 @@ impl ClusterMember for Tool {
         (self.unknowns.time, self.unknowns.hand, self.unknowns.is_near) = (context.time, hand, is_near);
         self.jaws.move_to(&self.spec, was, &self.tool, context);
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.admits = self.open_for_any(context, dt_s);
+        self.tool.admits = self.open_for(context, dt_s, |_| true);
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
