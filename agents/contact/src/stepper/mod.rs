@@ -18,6 +18,8 @@ mod joints;
 mod links;
 mod member;
 mod memory;
+mod plan;
+mod progress;
 mod scene;
 mod search;
 mod springs;
@@ -33,13 +35,12 @@ pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError};
+pub use plan::Plan;
+use progress::Progress;
 pub use scene::ClusterScene;
 use search::{Judge, Round, Search};
-use std::f64::consts::SQRT_2;
 use ties::{FineStep, Ties, place_key};
 
-/// The most steps that a member makes within a macro step.
-const PARTS_MAX: u32 = 16;
 /// No macro step is cut shorter than this: clocks count nanoseconds.
 const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
 /// The most times as many steps that a member makes whose motion strains it too far.
@@ -115,38 +116,6 @@ pub struct PairTotal {
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-}
-
-/// How far a member is in its own step (eq. 24–26).
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Progress {
-    /// How many steps it makes in the macro step, where it bends.
-    parts: u32,
-    /// The length of the step that it has begun before all others do, seconds; 0 for none.
-    begun_s: f64,
-    /// Fine steps within its own step, and how many of them have begun.
-    share: u32,
-    part: u32,
-    /// Its velocities when its step began.
-    start: Vec<DVec3>,
-    /// What its step would have changed them by without contact.
-    gain: Vec<DVec3>,
-    /// What the impulses since have changed them by.
-    given: Vec<DVec3>,
-    /// v(p − 1): by which its place has moved so far.
-    before: Vec<DVec3>,
-    /// v̄(p): its velocities with what it has been given so far.
-    known: Vec<DVec3>,
-    /// û: the velocity at which its place moves in this fine step, without the impulses sought.
-    seen: Vec<DVec3>,
-    /// û with the impulses that the last solve found.
-    solved: Vec<DVec3>,
-    /// Its place in the problem; `None` where no row touches it.
-    place: Option<usize>,
-    /// Whether anything has acted on it for a while since its step began.
-    touched: bool,
-    /// Work of its steps within the macro step, in the unit of its model.
-    work: f64,
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
@@ -530,98 +499,6 @@ impl ClusterStepper {
             }
         }
         Ok(())
-    }
-}
-
-impl Progress {
-    /// Lets a member begin a step, and counts its work.
-    fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) -> Result<(), StepError> {
-        member.begin(own_s)?;
-        self.work += member.work();
-        Ok(())
-    }
-
-    /// Begins a step from velocities `now` that would be `free` at its end.
-    fn start(&mut self, now: &[DVec3], free: &[DVec3]) {
-        self.start.clear();
-        self.start.extend_from_slice(now);
-        self.gain.clear();
-        self.gain.extend(free.iter().zip(now).map(|(free, now)| *free - *now));
-        self.given.clear();
-        self.given.resize(now.len(), DVec3::ZERO);
-        self.before.clone_from(&self.start);
-        self.touched = false;
-    }
-
-    /// Finds v̄(p) and û of the fine step that begins (eq. 24).
-    fn look(&mut self) {
-        let Self { share, part, start, gain, given, before, known, seen, .. } = self;
-        let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
-        known.clear();
-        known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
-        seen.clear();
-        seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
-    }
-
-    /// Takes the velocities that it has without impulses.
-    fn go_on(&mut self) {
-        self.before.clone_from(&self.known);
-    }
-
-    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 25).
-    fn take(&mut self) {
-        let p = f64::from(self.part);
-        for (at, moved) in self.solved.iter().enumerate() {
-            let change = (*moved - self.seen[at]) / p;
-            self.given[at] += change;
-            self.before[at] = self.known[at] + change;
-        }
-    }
-}
-
-/// How many steps of its own each of some bodies makes within a macro step, and how long that is, seconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
-    /// The macro step, seconds.
-    pub macro_s: f64,
-    /// Steps of what bends and wants the longest ones are this long, seconds.
-    pub longest_s: f64,
-    /// The most steps that a member makes.
-    pub parts: u32,
-}
-
-impl Plan {
-    /// The plan for members with these roles and wanted steps, seconds (eq. 23).
-    #[must_use]
-    pub fn of(members: impl Iterator<Item = (Role, f64)> + Clone) -> Self {
-        let bent = members.clone().filter(|(role, _)| *role == Role::Deformable).map(|(_, wanted_s)| wanted_s);
-        let all = members.clone().map(|(_, wanted_s)| wanted_s);
-        let longest_s = bent.reduce(f64::max).or_else(|| all.reduce(f64::max)).unwrap_or(1.0);
-        let mut plan = Self { macro_s: f64::INFINITY, longest_s, parts: 1 };
-        for (_, wanted_s) in members {
-            let parts = plan.parts_of(wanted_s);
-            plan.parts = plan.parts.max(parts);
-            plan.macro_s = plan.macro_s.min(f64::from(parts) * wanted_s);
-        }
-        plan
-    }
-
-    /// How many steps a member that bends makes.
-    #[must_use]
-    pub fn parts_of(&self, wanted_s: f64) -> u32 {
-        let ratio = self.longest_s / wanted_s;
-        let mut parts = 1;
-        // the nearest power of two, by ratios
-        while parts < PARTS_MAX && ratio > f64::from(parts) * SQRT_2 {
-            parts *= 2;
-        }
-        parts
-    }
-
-    /// How many steps a member of this role makes.
-    #[must_use]
-    pub fn parts_in(&self, role: Role, wanted_s: f64) -> u32 {
-        if role == Role::Deformable { self.parts_of(wanted_s) } else { self.parts }
     }
 }
 

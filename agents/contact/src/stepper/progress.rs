@@ -1,0 +1,86 @@
+//! How far a member of a cluster is in its own step, and what others see of it in a fine step.
+//!
+//! In: its velocities at the start of its step and without contact, impulses. Out: the velocities at which its place moves. Never here:
+//! contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
+
+use super::ClusterMember;
+use glam::DVec3;
+use metachron_core::StepError;
+
+/// How far a member is in its own step (eq. 24–26).
+#[derive(Debug, Clone, Default)]
+pub(super) struct Progress {
+    /// How many steps it makes in the macro step, where it bends.
+    pub parts: u32,
+    /// The length of the step that it has begun before all others do, seconds; 0 for none.
+    pub begun_s: f64,
+    /// Fine steps within its own step, and how many of them have begun.
+    pub share: u32,
+    pub part: u32,
+    /// Its velocities when its step began.
+    pub start: Vec<DVec3>,
+    /// What its step would have changed them by without contact.
+    pub gain: Vec<DVec3>,
+    /// What the impulses since have changed them by.
+    pub given: Vec<DVec3>,
+    /// v(p − 1): by which its place has moved so far.
+    pub before: Vec<DVec3>,
+    /// v̄(p): its velocities with what it has been given so far.
+    pub known: Vec<DVec3>,
+    /// û: the velocity at which its place moves in this fine step, without the impulses sought.
+    pub seen: Vec<DVec3>,
+    /// û with the impulses that the last solve found.
+    pub solved: Vec<DVec3>,
+    /// Its place in the problem; `None` where no row touches it.
+    pub place: Option<usize>,
+    /// Whether anything has acted on it for a while since its step began.
+    pub touched: bool,
+    /// Work of its steps within the macro step, in the unit of its model.
+    pub work: f64,
+}
+
+impl Progress {
+    /// Lets a member begin a step, and counts its work.
+    pub fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) -> Result<(), StepError> {
+        member.begin(own_s)?;
+        self.work += member.work();
+        Ok(())
+    }
+
+    /// Begins a step from velocities `now` that would be `free` at its end.
+    pub fn start(&mut self, now: &[DVec3], free: &[DVec3]) {
+        self.start.clear();
+        self.start.extend_from_slice(now);
+        self.gain.clear();
+        self.gain.extend(free.iter().zip(now).map(|(free, now)| *free - *now));
+        self.given.clear();
+        self.given.resize(now.len(), DVec3::ZERO);
+        self.before.clone_from(&self.start);
+        self.touched = false;
+    }
+
+    /// Finds v̄(p) and û of the fine step that begins (eq. 24).
+    pub fn look(&mut self) {
+        let Self { share, part, start, gain, given, before, known, seen, .. } = self;
+        let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
+        known.clear();
+        known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
+        seen.clear();
+        seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
+    }
+
+    /// Takes the velocities that it has without impulses.
+    pub fn go_on(&mut self) {
+        self.before.clone_from(&self.known);
+    }
+
+    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 25).
+    pub fn take(&mut self) {
+        let p = f64::from(self.part);
+        for (at, moved) in self.solved.iter().enumerate() {
+            let change = (*moved - self.seen[at]) / p;
+            self.given[at] += change;
+            self.before[at] = self.known[at] + change;
+        }
+    }
+}
