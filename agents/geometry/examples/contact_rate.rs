@@ -4,7 +4,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_geometry::narrow_phase::{
-    NarrowPhaseScratch, RestShape, SweptShape, VoronoiRegions, first_touch, self_touches, touches,
+    NarrowPhaseScratch, RestShape, SweptReach, SweptShape, VoronoiRegions, first_touch, self_touches, touches,
 };
 use metachron_geometry::{
     CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape, StaticSolid,
@@ -15,6 +15,7 @@ use std::time::Instant;
 
 const CELL_M: f64 = 0.01;
 const RADIUS_M: f64 = 1e-3;
+const SKIN: SweptReach = SweptReach { reach_m: 0.0, around_m: 1e-4 };
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("search,size,touches,search_us");
@@ -46,14 +47,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             let still = PlacedShape { form: &form, view: ShapePose::Surface(&rest) };
             let (flight, still) =
                 (SweptShape { start: at(0.25), end: at(-0.25) }, SweptShape { start: still, end: still });
-            first_touch(&flight, &still, 0.0, scratch, into);
+            first_touch(&flight, &still, SKIN, scratch, into);
         });
         time("sheets_fly_together", cells * cells, |scratch, into| {
             let raised: Vec<DVec3> = rest.iter().map(|x| *x + DVec3::new(0.003, 0.004, 0.05)).collect();
             let fallen: Vec<DVec3> = raised.iter().map(|x| *x - DVec3::Z * 0.1).collect();
             let at = |points| PlacedShape { form: &form, view: ShapePose::Surface(points) };
             let flight = SweptShape { start: at(&raised), end: at(&fallen) };
-            first_touch(&flight, &SweptShape { start: at(&rest), end: at(&rest) }, 0.0, scratch, into);
+            first_touch(&flight, &SweptShape { start: at(&rest), end: at(&rest) }, SKIN, scratch, into);
         });
         let block = rigid(Solid::Box { half_extents_m: DVec3::splat(0.02) })?;
         let ground = ground(cells)?;

@@ -7,7 +7,7 @@
 //! steps of unlike members a blow acts at the start of its fine step: that is a sixteenth of the longest step off at most.
 
 use super::Progress;
-use super::search::Search;
+use super::search::{Search, velocity};
 use crate::cluster::{Contact, Side};
 
 /// Sides that are closer than this have met, metres: a millionth of what any picture shows.
@@ -71,11 +71,8 @@ impl Rebounds {
 
 /// What a side gains along a contact's normal within the step without contact, m/s.
 fn gain_m_s(side: &Side, progress: &[Progress], contact: &Contact) -> f64 {
-    if side.terms().is_empty() {
-        return 0.0;
-    }
-    let Progress { before, seen, .. } = &progress[side.member];
-    (side.velocity(seen) - side.velocity(before)).dot(contact.normal)
+    let now = velocity(side, |member| &progress[member].before);
+    (velocity(side, |member| &progress[member].seen) - now).dot(contact.normal)
 }
 
 /// When a gap g closes that does so at a speed v, which grows by a: the least t ≥ 0 with g = v t + ½ a t².

@@ -6,7 +6,8 @@ use crate::StepContext;
 use crate::cluster::{Block, Response, Side};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, StepError};
-use metachron_geometry::{ContactSide, Place, PlacedShape};
+use metachron_geometry::narrow_phase::RestShape;
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
 ///
@@ -44,6 +45,21 @@ pub trait ClusterMember: Send {
 
     /// Its skin where it is now; `None` where nothing can touch it.
     fn skin(&self) -> Option<PlacedShape<'_>>;
+
+    /// Its skin once it has gone on from where it is for `t_s` seconds with the velocities `v`; `nodes` is storage for it. `None` for a body
+    /// that does not say: what such a body meets is found by what is near it at the start of a step, however far it goes.
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let _ = nodes;
+        let skin = self.skin()?;
+        let ShapePose::Solid { .. } = skin.view else { return None };
+        let Pose { origin_m, rotation, .. } = self.pose(v, t_s)?;
+        Some(PlacedShape { view: ShapePose::Solid { position: origin_m, rotation }, ..skin })
+    }
+
+    /// Its skin at rest, for a body that touches itself; `None` for one that passes through itself.
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        None
+    }
 
     /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
     fn side(&self, place: &Place, contact: ContactSide) -> Side;

@@ -44,7 +44,7 @@ use ties::{FineStep, Ties, place_key};
 /// No macro step is cut shorter than this: clocks count nanoseconds.
 const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
 /// The most times as many steps that a member makes whose motion strains it too far.
-const DIVIDED_MAX: u32 = 16;
+const DIVIDED_MAX: u32 = 64;
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
@@ -162,7 +162,7 @@ impl ClusterStepper {
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
-    /// A member whose motion would strain it too far makes 2, 4 … 16 times as many steps: its free motion before the solve, and what the
+    /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
     /// solve makes of it after, from the start of the macro step.
     ///
     /// # Errors
@@ -184,7 +184,7 @@ impl ClusterStepper {
         }
         self.keep(all);
         let asked_s = dt.as_secs_f64();
-        // each time at least one member makes twice as many steps, at most 16 times as many as it began with
+        // each time at least one member makes twice as many steps, at most 64 times as many as it began with
         while !self.advance(scene, all, asked_s, &mut report)? {
             self.go_back(all);
         }
@@ -382,9 +382,10 @@ impl ClusterStepper {
             }
             let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
-            last_miss_m = miss_m;
             let look = Round { scene, all, progress, h_s, judge: Judge::Solved };
             let passed = search.add_passed(&look);
+            // with other contacts joints start anew
+            last_miss_m = if passed { f64::INFINITY } else { miss_m };
             if round == ROUNDS_MAX || !passed && joined {
                 break;
             }

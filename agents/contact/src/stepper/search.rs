@@ -1,20 +1,23 @@
-//! Where members of a cluster may touch each other and the static solids around them within a fine step.
+//! Where members of a cluster may touch each other, themselves and the static solids around them within a fine step.
 //!
 //! In: members with the velocities they have and would have. Out: contacts of the problem, each with its name. Never here: impulses.
 //! Theory: docs/theory/clusters.md, section 9.
+
+mod boxes;
+mod sweep;
 
 use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
+use boxes::Boxes;
 use glam::DVec3;
-use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, touches};
-use metachron_geometry::{Aabb, CollisionShape, ContactSide, Place, ShapeKind, Touch};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey, self_touches, touches};
+use metachron_geometry::{CollisionShape, ContactSide, Place, ShapeKind, Touch};
+use sweep::{FAR_M, Meeting, Sweep, Sweeping};
 
 /// A place is taken up if its gap may close below this within the step, metres.
 const LOOK_M: f64 = 4e-4;
-/// Bodies whose boxes come closer than this within two steps belong together, metres.
-const NEAR_M: f64 = 2e-3;
 /// How many steps ahead bodies look for each other.
 const NEAR_STEPS: f64 = 2.0;
 
@@ -45,17 +48,44 @@ pub(super) struct Round<'a, 'p> {
     pub judge: Judge,
 }
 
-/// What was searched: two that may touch, their skins, and how far.
-struct Searched<'a> {
-    owner: Owner,
-    skins: [&'a CollisionShape; 2],
-    reach_m: f64,
+/// What a member is searched against.
+#[derive(Clone, Copy)]
+enum Against<'a> {
+    /// Another member.
+    Member(usize),
+    /// A static solid, with its number.
+    Static { number: u32, solid: &'a StaticSolid },
+    /// The member itself.
+    Own,
 }
 
-impl Round<'_, '_> {
+/// A member and what it is searched against.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    member: usize,
+    against: Against<'a>,
+}
+
+/// Places found of a pair.
+struct Found<'a> {
+    owner: Owner,
+    skins: [&'a CollisionShape; 2],
+    /// When, in a fine step: later than its start for a pair that meets on its way.
+    at: Meeting,
+    /// No place was left out that is nearer than this, metres.
+    clear_m: f64,
+}
+
+impl<'a> Round<'a, '_> {
     /// Whether it is the one before the solve.
     fn foresees(&self) -> bool {
         matches!(self.judge, Judge::Foreseen)
+    }
+
+    /// The velocities at which a member's place moves, as far as this round knows.
+    fn moved(&self, member: usize) -> &'a [DVec3] {
+        let state = &self.progress[member];
+        if self.foresees() { &state.seen } else { &state.solved }
     }
 }
 
@@ -71,11 +101,21 @@ pub(super) struct Search {
     looks: Vec<Look>,
     /// How many contacts were found before the solve.
     known: usize,
+    /// Whether a contact of before the solve has another place since.
+    moved: bool,
     /// Pairs near each other by the velocities of a solution.
     again: Vec<[usize; 2]>,
-    boxes: Vec<Reach>,
+    boxes: Boxes,
+    sweep: Sweep,
     touches: Vec<Touch>,
     scratch: NarrowPhaseScratch,
+    sorted: Vec<Named>,
+}
+
+/// A contact with its owner.
+struct Named {
+    owner: Owner,
+    contact: Contact,
 }
 
 /// The two sides of a touch.
@@ -94,16 +134,6 @@ struct Look {
     clear_m: f64,
 }
 
-/// Where a member may be in a step.
-#[derive(Debug, Clone, Copy)]
-struct Reach {
-    member: usize,
-    /// Its skin now.
-    skin: Aabb,
-    /// The fastest speed of any point of it at the start or without contact, m/s.
-    speed_m_s: f64,
-}
-
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
 pub(super) enum Judge {
@@ -120,21 +150,14 @@ impl Search {
         self.owners.clear();
         self.near.clear();
         self.looks.clear();
-        let speed = |member: usize| {
+        self.boxes.place(all, |member| {
             let (body, state) = (&all[member].member, &progress[member]);
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
-        };
-        self.place_boxes(all, speed);
-        find_pairs(&self.boxes, NEAR_STEPS * h_s, &mut self.near);
-        let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
+        });
+        self.boxes.pairs(NEAR_STEPS * h_s, &mut self.near);
         let near = std::mem::take(&mut self.near);
-        for &pair in &near {
-            self.find_between(&round, pair);
-        }
+        self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
         self.near = near;
-        for member in 0..all.len() {
-            self.find_static(&round, member);
-        }
         self.sort();
     }
 
@@ -142,36 +165,96 @@ impl Search {
     /// whether there are any; contacts are then in a new order.
     pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
         let Round { all, h_s, .. } = *round;
-        self.place_boxes(all, |member| all[member].member.speed_bound(&round.progress[member].solved));
+        self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
-        find_pairs(&self.boxes, h_s, &mut pairs);
-        self.known = self.contacts.len();
-        for &pair in &pairs {
-            self.find_between(round, pair);
-        }
+        self.boxes.pairs(h_s, &mut pairs);
+        (self.known, self.moved) = (self.contacts.len(), false);
+        self.find_all(round, &pairs);
         self.again = pairs;
-        for member in 0..all.len() {
-            self.find_static(round, member);
-        }
-        let more = self.contacts.len() > self.known;
+        let more = self.moved || self.contacts.len() > self.known;
         self.sort();
         more
     }
 
-    /// The boxes around all members that have a skin, along x.
-    fn place_boxes(&mut self, all: &[Participant<'_>], speed_m_s: impl Fn(usize) -> f64) {
-        self.boxes.clear();
-        for (member, one) in all.iter().enumerate() {
-            if let Some(skin) = one.member.skin() {
-                self.boxes.push(Reach { member, skin: skin.bounds(), speed_m_s: speed_m_s(member) });
+    /// Places of some pairs of members, and of all members with static solids and with themselves.
+    fn find_all(&mut self, round: &Round<'_, '_>, pairs: &[[usize; 2]]) {
+        let Round { scene, all, .. } = *round;
+        for &[a, b] in pairs {
+            if all[a].may_touch(&all[b]) && !scene.lets_through([all[a].id, all[b].id]) {
+                self.find_of(round, Pair { member: a, against: Against::Member(b) });
             }
         }
-        self.boxes.sort_unstable_by(|a, b| a.skin.low.x.total_cmp(&b.skin.low.x).then(a.member.cmp(&b.member)));
+        for (member, one) in all.iter().enumerate() {
+            if one.member.rest_shape().is_some() {
+                self.find_of(round, Pair { member, against: Against::Own });
+            }
+            if one.member.is_led() {
+                continue; // what leads it is stronger than what never moves
+            }
+            for (number, solid) in (0..).zip(scene.statics()) {
+                self.find_of(round, Pair { member, against: Against::Static { number, solid } });
+            }
+        }
     }
 
-    fn speed(&self, member: usize) -> f64 {
-        self.boxes.iter().find(|reach| reach.member == member).map_or(0.0, |reach| reach.speed_m_s)
+    /// Places of a pair.
+    fn find_of(&mut self, round: &Round<'_, '_>, pair: Pair<'_>) {
+        let Round { all, h_s, .. } = *round;
+        let Pair { member, against } = pair;
+        let (Some(skin), Some(reach)) = (all[member].member.skin(), self.boxes.of(member)) else { return };
+        let (partner, other, bounds, their_m_s) = match against {
+            Against::Own => (Partner::Own, None, reach.skin, reach.speed_m_s),
+            Against::Static { number, solid } => (Partner::Static(number), None, solid.bounds(), 0.0),
+            Against::Member(other) => {
+                let Some(there) = self.boxes.of(other) else { return };
+                (Partner::Agent(all[other].id), Some(other), there.skin, there.speed_m_s)
+            }
+        };
+        let way_m = (reach.speed_m_s + their_m_s) * h_s;
+        if !round.foresees() && !self.may_have_passed(member, partner, way_m) {
+            return;
+        }
+        let reach_m = LOOK_M + way_m;
+        let owner = Owner { member, partner, other, key: TouchKey::default() };
+        let mut found = Found { owner, skins: [skin.form; 2], at: Meeting::default(), clear_m: reach_m };
+        self.touches.clear();
+        if reach.skin.grown(reach_m).meets(bounds) {
+            found.at = self.touch(round, pair, reach_m);
+        }
+        found.clear_m = if found.at.after_s > 0.0 { 0.0 } else { reach_m };
+        match against {
+            Against::Static { solid, .. } => found.skins[1] = &solid.form,
+            Against::Member(other) => found.skins[1] = all[other].member.skin().map_or(skin.form, |skin| skin.form),
+            Against::Own => {}
+        }
+        self.take(round, pair, found);
+    }
+
+    /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
+    fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reach_m: f64) -> Meeting {
+        let Self { touches: into, scratch, sweep, .. } = self;
+        let body = &*round.all[pair.member].member;
+        let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
+        let Some(skin) = body.skin() else { return now };
+        if reach_m > FAR_M {
+            match sweep.meet(round, pair, scratch, into) {
+                Sweeping::Meets(meeting) if meeting.after_s > 0.0 => return meeting,
+                Sweeping::Passes => return end,
+                Sweeping::Meets(_) | Sweeping::Unknown => {}
+            }
+        }
+        match pair.against {
+            Against::Own => {
+                body.rest_shape().into_iter().for_each(|rest| self_touches(&skin, rest, reach_m, scratch, into));
+            }
+            Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
+            Against::Member(other) => {
+                let there = round.all[other].member.skin();
+                there.into_iter().for_each(|there| touches(&skin, &there, reach_m, scratch, into));
+            }
+        }
+        now
     }
 
     /// Whether a solution may have closed a place of the two that was left out: they come closer by at most `way_m`.
@@ -180,91 +263,40 @@ impl Search {
         found.map_or(true, |at| way_m > self.looks[at].clear_m)
     }
 
-    /// Places between two members.
-    fn find_between(&mut self, round: &Round<'_, '_>, [a, b]: [usize; 2]) {
-        let Round { scene, all, h_s, .. } = *round;
-        let (Some(here), Some(there)) = (all[a].member.skin(), all[b].member.skin()) else { return };
-        if !all[a].may_touch(&all[b]) || scene.lets_through([all[a].id, all[b].id]) {
-            return;
-        }
-        let partner = Partner::Agent(all[b].id);
-        let way_m = (self.speed(a) + self.speed(b)) * h_s;
-        if !round.foresees() && !self.may_have_passed(a, partner, way_m) {
-            return;
-        }
-        let reach_m = LOOK_M + way_m;
-        if here.bounds().grown(reach_m).meets(there.bounds()) {
-            touches(&here, &there, reach_m, &mut self.scratch, &mut self.touches);
-        } else {
-            self.touches.clear();
-        }
-        let side = |member: usize, place: &Place, contact: ContactSide| {
-            all[member].member.side(place, contact).of_member(member)
-        };
-        let facing = |touch: &Touch| {
-            let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
-            Facing {
-                sides: [side(a, &touch.on_a, first), side(b, &touch.on_b, second)],
-                led_m_s: [all[a].member.led_m_s(&touch.on_a), all[b].member.led_m_s(&touch.on_b)],
-            }
-        };
-        let owner = Owner { member: a, partner, other: Some(b), key: TouchKey::default() };
-        self.take(round, Searched { owner, skins: [here.form, there.form], reach_m }, facing);
-    }
-
-    /// Places between a member and the static solids.
-    fn find_static(&mut self, round: &Round<'_, '_>, member: usize) {
-        let Round { scene, all, h_s, .. } = *round;
-        let Some(skin) = all[member].member.skin() else { return };
-        if all[member].member.is_led() {
-            return; // what leads it is stronger than what never moves
-        }
-        let way_m = self.speed(member) * h_s;
-        let reach_m = LOOK_M + way_m;
-        let bounds = skin.bounds().grown(reach_m);
-        for (number, solid) in (0..).zip(scene.statics()) {
-            let partner = Partner::Static(number);
-            let looks = round.foresees() || self.may_have_passed(member, partner, way_m);
-            if !looks || !solid.bounds().meets(bounds) {
-                continue;
-            }
-            solid.touches(&skin, reach_m, &mut self.scratch, &mut self.touches);
-            let facing = |touch: &Touch| {
-                let side = all[member].member.side(&touch.on_a, ContactSide::first(touch.normal));
-                let led_m_s = [all[member].member.led_m_s(&touch.on_a), DVec3::ZERO];
-                Facing { sides: [side.of_member(member), Side::FIXED], led_m_s }
-            };
-            let owner = Owner { member, partner, other: None, key: TouchKey::default() };
-            self.take(round, Searched { owner, skins: [skin.form, &solid.form], reach_m }, facing);
-        }
-    }
-
     /// Takes up those of the touches found that may close.
-    fn take(
-        &mut self,
-        round: &Round<'_, '_>,
-        Searched { owner, skins, reach_m }: Searched<'_>,
-        facing: impl Fn(&Touch) -> Facing,
-    ) {
-        let Self { contacts, owners, touches, looks, known, .. } = self;
-        let mut clear_m = reach_m;
+    fn take(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, found: Found<'_>) {
+        let Self { contacts, owners, touches, looks, known, moved, .. } = self;
+        let Found { owner, skins, at: Meeting { after_s, ways }, mut clear_m } = found;
+        let swept = after_s > 0.0;
         for touch in touches.iter() {
-            let (owner, facing) = (Owner { key: touch.key, ..owner }, facing(touch));
+            let (owner, facing) = (Owner { key: touch.key, ..owner }, pair.facing(round, touch, ways));
             if facing.sides.iter().all(|side| side.terms().is_empty()) {
                 continue;
             }
+            let opening_m_s = facing.opening_m_s(touch.normal, |member| round.moved(member));
+            let gap_m = touch.gap_m - opening_m_s * after_s;
+            let touch = Touch { gap_m, ..*touch };
+            let ends_m = gap_m + opening_m_s * round.h_s;
             let taken = match round.judge {
-                Judge::Foreseen => closes(touch, &facing, round.progress, round.h_s),
-                Judge::Solved => {
-                    let known = owners[..*known].binary_search_by_key(&owner.name(), Owner::name).is_ok();
-                    !known && touch.gap_m + opening_m_s(touch, &facing, round.progress) * round.h_s < 0.0
-                }
+                Judge::Foreseen if swept => ends_m < LOOK_M,
+                Judge::Foreseen => closes(&touch, &facing, round.progress, round.h_s),
+                Judge::Solved => match owners[..*known].binary_search_by_key(&owner.name(), Owner::name) {
+                    Err(_) => ends_m < 0.0,
+                    // on its way it meets another place than the one it was kept from
+                    Ok(at) if swept && ends_m < -LOOK_M => {
+                        let warm_n_s = contacts[at].warm_n_s;
+                        contacts[at] = Contact { warm_n_s, ..contact(&touch, &facing, skins, round.progress) };
+                        *moved = true;
+                        false
+                    }
+                    Ok(_) => false,
+                },
             };
             if taken {
                 owners.push(owner);
-                contacts.push(contact(touch, &facing, skins, round.progress));
+                contacts.push(contact(&touch, &facing, skins, round.progress));
             } else {
-                clear_m = clear_m.min(touch.gap_m);
+                clear_m = clear_m.min(gap_m);
             }
         }
         if round.foresees() {
@@ -282,59 +314,76 @@ impl Search {
 
     /// Contacts in the order of their names: sums are then the same whatever found them first.
     fn sort(&mut self) {
-        self.looks.sort_unstable_by_key(|look| (look.member, look.partner));
-        if self.owners.is_sorted_by_key(Owner::name) {
+        let Self { looks, owners, contacts, sorted, .. } = self;
+        looks.sort_unstable_by_key(|look| (look.member, look.partner));
+        if owners.is_sorted_by_key(Owner::name) {
             return;
         }
-        let mut both: Vec<_> = self.owners.drain(..).zip(self.contacts.drain(..)).collect();
-        both.sort_by_key(|(owner, _)| owner.name());
-        for (owner, contact) in both {
-            self.owners.push(owner);
-            self.contacts.push(contact);
+        sorted.clear();
+        sorted.extend(owners.drain(..).zip(contacts.drain(..)).map(|(owner, contact)| Named { owner, contact }));
+        // names are unique
+        sorted.sort_unstable_by_key(|named| named.owner.name());
+        for Named { owner, contact } in sorted.drain(..) {
+            owners.push(owner);
+            contacts.push(contact);
         }
     }
 }
 
-/// Pairs whose boxes may meet within `after_s` seconds, by a sweep along x; the boxes are sorted by that.
-fn find_pairs(boxes: &[Reach], after_s: f64, near: &mut Vec<[usize; 2]>) {
-    let grown = |reach: &Reach| reach.skin.grown(reach.speed_m_s * after_s + 0.5 * NEAR_M);
-    let widest = boxes.iter().map(|reach| reach.speed_m_s * after_s).fold(0.0, f64::max) + NEAR_M;
-    for (at, reach) in boxes.iter().enumerate() {
-        let mine = grown(reach);
-        for other in &boxes[at + 1..] {
-            if other.skin.low.x - widest > mine.high.x {
-                break;
-            }
-            let theirs = grown(other);
-            if mine.meets(theirs) {
-                near.push([reach.member.min(other.member), reach.member.max(other.member)]);
-            }
+impl Pair<'_> {
+    /// The sides of a touch between bodies that have gone as far as `ways`.
+    fn facing(&self, round: &Round<'_, '_>, touch: &Touch, ways: [DVec3; 2]) -> Facing {
+        let all = round.all;
+        let back = |place: &Place, way: DVec3| match *place {
+            Place::Point(point) => Place::Point(point - way),
+            Place::Chain { .. } | Place::Surface { .. } => *place,
+        };
+        let (on_a, on_b) = (back(&touch.on_a, ways[0]), back(&touch.on_b, ways[1]));
+        let side = |member: usize, place: &Place, contact: ContactSide| {
+            all[member].member.side(place, contact).of_member(member)
+        };
+        let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
+        let other = match self.against {
+            Against::Member(other) => Some(other),
+            Against::Own => Some(self.member),
+            Against::Static { .. } => None,
+        };
+        Facing {
+            sides: [side(self.member, &on_a, first), other.map_or(Side::FIXED, |other| side(other, &on_b, second))],
+            led_m_s: [
+                all[self.member].member.led_m_s(&on_a),
+                other.map_or(DVec3::ZERO, |other| all[other].member.led_m_s(&on_b)),
+            ],
         }
     }
-    near.sort_unstable();
+}
+
+impl Facing {
+    /// How fast a gap opens with the velocities `of` each member, m/s.
+    fn opening_m_s<'a>(&self, normal: DVec3, of: impl Fn(usize) -> &'a [DVec3]) -> f64 {
+        let [a, b] = [0, 1].map(|at| {
+            let side = &self.sides[at];
+            (velocity(side, &of) + self.led_m_s[at]).dot(normal)
+        });
+        a - b
+    }
+}
+
+/// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
+pub(super) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
+    if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }
 }
 
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
 /// lies on something that the ground stops would else not be seen.
 fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bool {
     let led = facing.led_m_s.map(|led| led.dot(touch.normal));
-    let along = |side: &Side, of: fn(&Progress) -> &[DVec3]| -> f64 {
-        if side.terms().is_empty() { 0.0 } else { side.velocity(of(&progress[side.member])).dot(touch.normal) }
-    };
     [(|p: &Progress| &p.before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.seen[..]].into_iter().any(|of| {
-        let (a, b) = (along(&facing.sides[0], of) + led[0], along(&facing.sides[1], of) + led[1]);
+        let [a, b] =
+            facing.sides.each_ref().map(|side| velocity(side, |member| of(&progress[member])).dot(touch.normal));
+        let (a, b) = (a + led[0], b + led[1]);
         [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
     })
-}
-
-/// How fast a gap opens with the velocities of a solution, m/s.
-fn opening_m_s(touch: &Touch, facing: &Facing, progress: &[Progress]) -> f64 {
-    let [a, b] = [0, 1].map(|at| {
-        let side = &facing.sides[at];
-        let moved = if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(&progress[side.member].solved) };
-        (moved + facing.led_m_s[at]).dot(touch.normal)
-    });
-    a - b
 }
 
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
@@ -351,15 +400,9 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         // a pair takes the geometric mean of both frictions, and the larger restitution; what bends gives back what it has stored
         friction: (skins[0].friction * skins[1].friction).sqrt(),
         restitution: if bends { 0.0 } else { skins[0].restitution.max(skins[1].restitution) },
-        approach_m_s: along(&sides[1], progress, touch.normal) - along(&sides[0], progress, touch.normal)
-            + surface_m_s.dot(touch.normal),
+        approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
         surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
     }
-}
-
-/// The velocity of a side along a normal when the fine step begins, m/s.
-fn along(side: &Side, progress: &[Progress], normal: DVec3) -> f64 {
-    if side.terms().is_empty() { 0.0 } else { side.velocity(&progress[side.member].before).dot(normal) }
 }

@@ -38,7 +38,7 @@ use shape_cache::ShapeCache;
 pub use static_solid::{StaticSolid, StaticSolidError};
 use surface::SurfaceScratch;
 use swept::SweptScratch;
-pub use swept::{SweptShape, first_touch};
+pub use swept::{SweptReach, SweptShape, first_touch};
 pub use touch_key::{KEY_STEPS, TouchKey, TouchKind};
 pub use voronoi_regions::VoronoiRegions;
 

@@ -9,8 +9,8 @@
 
 use super::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
-use super::swept::{AROUND_M, Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
-use super::{NarrowPhaseScratch, SweptShape, finish, touches};
+use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
+use super::{NarrowPhaseScratch, SweptReach, SweptShape, finish, touches};
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape};
 use crate::{Touch, is_closed, mesh_triangles};
@@ -115,21 +115,21 @@ impl StaticSolid {
         }
     }
 
-    /// The share 0 … 1 of a body's motion at which it first comes within `reach_m` (metres, ≥ 0) of this, and its contacts at that moment, by
+    /// The share 0 … 1 of a body's motion at which it first comes within reach of this, and its contacts at that moment, by
     /// rising keys; `None` and no contacts where it does not ([`super::first_touch`]). Triangles of a mesh let through what comes from behind.
     pub fn first_touch(
         &self,
         body: &SweptShape<'_>,
-        reach_m: f64,
+        reach: SweptReach,
         scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) -> Option<f64> {
         into.clear();
         let mut swept = std::mem::take(&mut scratch.swept);
-        let share = self.first_share(body, reach_m, scratch, &mut swept);
+        let share = self.first_share(body, reach.reach_m, scratch, &mut swept);
         let [storage, _] = &mut swept.placed;
         if let Some(then) = share.and_then(|share| body.within(share, storage)) {
-            self.touches(&then, reach_m + AROUND_M, scratch, into);
+            self.touches(&then, reach.reach_m + reach.around_m, scratch, into);
         }
         scratch.swept = swept;
         share

@@ -18,9 +18,6 @@ use glam::{DQuat, DVec3};
 
 /// Shapes this much nearer than the reach count as touching, metres: a twentieth of the depth at which contacts rest.
 pub(super) const NEAR_M: f64 = 1e-6;
-/// Contacts at the moment of a touch are those with so much more gap, metres: a span may leave its nearest place to its end, which is a little
-/// farther, and what touches next is at hand.
-pub(super) const AROUND_M: f64 = 1e-4;
 /// Leaps of a pair of elements; two to four bring most together, but one that turns by radians about a far pivot takes hundreds. One that
 /// takes more touches where it is then: early, not late.
 const LEAPS: usize = 1000;
@@ -28,6 +25,16 @@ const LEAPS: usize = 1000;
 const JAW_RAD: f64 = 0.6;
 /// How many pieces of a tool are jaws: the first ones.
 const JAWS: usize = 2;
+
+/// How near two shapes in motion have to come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SweptReach {
+    /// They touch once they are this near, metres, ≥ 0.
+    pub reach_m: f64,
+    /// Contacts at the moment of a touch have up to so much more gap, metres, ≥ 0: a span may leave its nearest place to its end, which is a
+    /// little farther, and what touches next is at hand.
+    pub around_m: f64,
+}
 
 /// A shape in motion.
 #[derive(Debug, Clone, Copy)]
@@ -54,24 +61,24 @@ pub(super) struct Between {
     radii_m: Vec<f64>,
 }
 
-/// The share 0 … 1 of the motion of `a` and `b` at which they first come within `reach_m` (metres, ≥ 0) of each other, and their contacts at
-/// that moment, by rising keys, with those that are up to a tenth of a millimetre farther; `None` and no contacts where they do not. 0 where they touch at the start.
+/// The share 0 … 1 of the motion of `a` and `b` at which they first come within reach of each other, and their contacts at that moment, by
+/// rising keys; `None` and no contacts where they do not. 0 where they touch at the start.
 ///
 /// A moment is up to a micrometre of gap early and never late. Nothing is allocated once the numbers of nodes and contacts settle.
 pub fn first_touch(
     a: &SweptShape<'_>,
     b: &SweptShape<'_>,
-    reach_m: f64,
+    reach: SweptReach,
     scratch: &mut NarrowPhaseScratch,
     into: &mut Vec<Touch>,
 ) -> Option<f64> {
     into.clear();
     let mut swept = std::mem::take(&mut scratch.swept);
-    let share = first_share(a, b, reach_m, &mut scratch.known, &mut swept);
+    let share = first_share(a, b, reach.reach_m, &mut scratch.known, &mut swept);
     if let Some(share) = share {
         let [first, second] = &mut swept.placed;
         if let (Some(first), Some(second)) = (a.within(share, first), b.within(share, second)) {
-            touches(&first, &second, reach_m + AROUND_M, scratch, into);
+            touches(&first, &second, reach.reach_m + reach.around_m, scratch, into);
         }
     }
     scratch.swept = swept;

@@ -5,7 +5,7 @@
 use super::RigidBody;
 use super::company::placed;
 use super::motion::Motion;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_core::{Anchor, StepError};
@@ -102,6 +102,13 @@ impl ClusterMember for RigidBody {
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
         Some(placed(&self.company.form, &self.motion))
+    }
+
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let mut motion = self.motion;
+        motion.position += v[0] * t_s;
+        motion.rotation = DQuat::from_scaled_axis(v[SPIN] * t_s) * motion.rotation;
+        Some(placed(&self.company.form, &motion))
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {

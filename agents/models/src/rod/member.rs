@@ -14,6 +14,7 @@ use metachron_contact::StepContext;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
+use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// Its unknowns in a cluster: one for each slot.
@@ -113,6 +114,17 @@ impl ClusterMember for Tube {
         (!places.is_empty()).then(|| PlacedShape { form, view: ShapePose::Chain { positions: places, radii_m } })
     }
 
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let PlacedShape { form, view: ShapePose::Chain { positions, radii_m } } = self.skin()? else { return None };
+        nodes.clear();
+        nodes.extend(positions.iter().zip(v.iter().step_by(2)).map(|(at, v)| *at + *v * t_s));
+        Some(PlacedShape { form, view: ShapePose::Chain { positions: nodes, radii_m } })
+    }
+
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        self.spec.self_contact.then_some(RestShape::Chain(&self.division.arc_m))
+    }
+
     fn side(&self, place: &Place, contact: ContactSide) -> Side {
         match *place {
             Place::Chain { segment, share, radius_m } => {
@@ -138,7 +150,10 @@ impl ClusterMember for Tube {
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
-        spins * h_s / TURN_MAX_RAD
+        let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
+        let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
+        // what a segment turns or stretches by, as a share of it
+        spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD
     }
 
     fn keep(&mut self) {

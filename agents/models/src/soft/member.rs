@@ -100,6 +100,13 @@ impl ClusterMember for SoftBody {
         Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) })
     }
 
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let moved = |row: Option<u32>| row.map_or(DVec3::ZERO, |row| v[row as usize] * t_s);
+        nodes.clear();
+        nodes.extend(self.positions.iter().zip(self.system.rows()).map(|(at, row)| *at + moved(*row)));
+        Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(nodes) })
+    }
+
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {
         match *place {
             Place::Surface { vertices, shares } => self.shared_side(vertices, shares),

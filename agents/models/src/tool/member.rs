@@ -110,9 +110,10 @@ impl ClusterMember for Tool {
         let led_m_s = (led.tip - self.commanded.position) / h_s;
         let unknowns = &mut self.unknowns;
         unknowns.now = [self.tool.velocity];
-        // a drive at its limit has nothing left to bring the tip's mass along with the commanded point
-        let carried = if self.drive.is_saturated() { self.tool.velocity } else { led_m_s + self.drive.rate() };
-        unknowns.free = [carried];
+        // the drive brings the tip's mass along with the commanded point, as far as its force goes; at its limit nothing is left for that
+        let most_n = if self.drive.is_saturated() { 0.0 } else { self.spec.max_force_n };
+        let change = led_m_s + self.drive.rate() - self.tool.velocity;
+        unknowns.free = [self.tool.velocity + change.clamp_length_max(most_n * h_s / self.drive.mass_kg())];
         unknowns.led_rad_s = spin(self.tool.rotation, led.rotation, h_s);
         unknowns.jaw_per_s = (led.jaw - self.tool.jaw) / h_s;
         (unknowns.led, unknowns.led_m_s) = (led, led_m_s);
@@ -133,6 +134,12 @@ impl ClusterMember for Tool {
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
+        Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
+    }
+
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let Pose { centre_m: tip, rotation, .. } = self.pose(v, t_s)?;
+        let jaw = self.tool.jaw + self.unknowns.jaw_per_s * t_s;
         Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
     }
 

@@ -5,6 +5,7 @@ mod grasp;
 mod joints;
 mod links;
 mod own_model;
+mod passing;
 mod rebounds;
 mod scenes;
 mod slope;

@@ -1,6 +1,6 @@
 //! Tools and led bodies in clusters: what a drive presses with, what jaws hold, what a led body pushes.
 
-use crate::bodies::{block, cube, rigid};
+use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed};
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
@@ -9,6 +9,7 @@ use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::soft::{self, SoftBody, SoftSpec};
 use metachron_models::tool::{Keyframe, Tool, ToolSpec};
 
 /// A tool that points down, by the heights of its tip and the openings of its jaws.
@@ -279,4 +280,23 @@ fn a_spring_to_a_led_body_takes_what_it_holds_along() {
     assert!(velocity.distance(DVec3::X * 0.2) < 1e-4, "{velocity}");
     let wanted = 0.2 * table.time.as_secs_f64();
     assert!((place.x - wanted).abs() < 1e-4, "{} is not {wanted}", place.x);
+}
+
+#[test]
+fn a_tip_that_jumps_does_not_pass_through_what_is_in_its_way() {
+    for rates in [(60.0, 60.0), (60.0, 1000.0), (240.0, 60.0)] {
+        let keys = [(0.0, up(0.03), 0.0), (0.1, up(0.03), 0.0), (0.101, up(-0.02), 0.0)];
+        let held = SoftSpec { held: vec![soft::Side::Left, soft::Side::Right], ..sheet(DVec3::ZERO, 0.2, 8) };
+        let bodies = vec![placed(SoftBody::new(held).unwrap(), true), placed(tool(&keys, 2.0, vec![]), false)];
+        let mut table = Table::among(bodies, &[]).at_rates(rates.0, rates.1);
+        let mut least = f64::INFINITY;
+        while table.time.as_secs_f64() < 1.0 {
+            table.step();
+            let lowest = table.place(0, Anchor::Vertex(40)).z;
+            least = least.min(state(&table, 1).tip.z - lowest);
+        }
+        let force_n = state(&table, 1).force_n;
+        assert!(least > 0.0, "{rates:?}: the tip was {least} m above the middle of the sheet");
+        assert!(force_n > 0.5, "{rates:?}: it presses with {force_n} N");
+    }
 }

@@ -93,7 +93,13 @@ fn all_pairs_agree(scale: f64, origin: DVec3, gap_m: f64) {
                 let a = SweptShape { start: of(one, &a0, from, r), end: of(one, &a1, to, r) };
                 let b = of(two, &b0, origin, s);
                 let mut scratch = NarrowPhaseScratch::default();
-                let share = first_touch(&a, &SweptShape { start: b, end: b }, gap_m, &mut scratch, &mut Vec::new());
+                let share = first_touch(
+                    &a,
+                    &SweptShape { start: b, end: b },
+                    SweptReach { reach_m: gap_m, around_m: 1e-4 },
+                    &mut scratch,
+                    &mut Vec::new(),
+                );
                 let Some(share) = share.filter(|share| *share > 0.0) else { continue };
                 let mut room = Default::default();
                 let a = a.within(share, &mut room).unwrap();

@@ -7,13 +7,18 @@ use crate::{Obstacle, StaticSolid};
 /// As the search: a touch may be told this much early, metres.
 const EARLY_M: f64 = 1.1e-6;
 
+/// Contacts up to a tenth of a millimetre beyond.
+fn around(reach_m: f64) -> SweptReach {
+    SweptReach { reach_m, around_m: 1e-4 }
+}
+
 fn swept<'a>(start: PlacedShape<'a>, end: PlacedShape<'a>) -> SweptShape<'a> {
     SweptShape { start, end }
 }
 
 fn first(a: &SweptShape<'_>, b: &SweptShape<'_>, reach_m: f64) -> Option<(f64, Vec<Touch>)> {
     let mut into = Vec::new();
-    let share = first_touch(a, b, reach_m, &mut NarrowPhaseScratch::default(), &mut into)?;
+    let share = first_touch(a, b, around(reach_m), &mut NarrowPhaseScratch::default(), &mut into)?;
     Some((share, into))
 }
 
@@ -220,7 +225,8 @@ fn static_solids_stop_what_falls_on_them_and_let_through_what_comes_from_behind(
             let mut scratch = NarrowPhaseScratch::default();
             let mut touches = Vec::new();
             let mut fall = |body: &SweptShape<'_>, gap_m: f64| {
-                let share = ground.first_touch(body, 0.0, &mut scratch, &mut touches).expect("it falls through");
+                let share =
+                    ground.first_touch(body, around(0.0), &mut scratch, &mut touches).expect("it falls through");
                 assert!((share - gap_m / 0.5).abs() < 2.0 * EARLY_M / 0.5, "{share} on {solid:?}");
                 assert!(
                     !touches.is_empty() && lowest(&touches).gap_m.abs() < 3.0 * EARLY_M,
@@ -241,10 +247,11 @@ fn static_solids_stop_what_falls_on_them_and_let_through_what_comes_from_behind(
             fall(&swept(skin(&raised), skin(&fallen)), 0.1 - 1e-3);
             let view = |tip| ShapePose::Tool { tip, rotation: turn, jaw: 0.0 };
             let place = |tip| PlacedShape { form: &tool, view: view(tip) };
-            let found = ground.first_touch(&swept(place(up * 0.5), place(up * 0.1)), 0.0, &mut scratch, &mut touches);
+            let found =
+                ground.first_touch(&swept(place(up * 0.5), place(up * 0.1)), around(0.0), &mut scratch, &mut touches);
             assert!(found.is_some() && !touches.is_empty());
             let rise = swept(at(&solids[0].0, up * -0.3, turn), at(&solids[0].0, up * 0.2, turn));
-            let from_behind = ground.first_touch(&rise, 0.0, &mut scratch, &mut touches);
+            let from_behind = ground.first_touch(&rise, around(0.0), &mut scratch, &mut touches);
             assert_eq!(from_behind.is_none(), is_mesh);
         }
     }
@@ -270,7 +277,7 @@ fn nothing_is_allocated_by_a_search_along_a_motion_once_everything_is_known() {
     let mut run = |form| {
         let fall = flight(form, DVec3::new(0.1, 0.1, 0.2), DVec3::new(0.1, 0.1, -0.2));
         allocation_counter::measure(|| {
-            first_touch(&fall, &swept(skin, skin), 0.0, &mut scratch, &mut found);
+            first_touch(&fall, &swept(skin, skin), around(0.0), &mut scratch, &mut found);
         })
         .count_total
     };
