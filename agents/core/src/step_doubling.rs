@@ -63,7 +63,7 @@ impl DoublingSchedule {
 
     /// Ends the row `apart_m` away from the same span in halves, by a rule of this order: halves leave 2⁻ᵖ of the error (eq. 31).
     pub fn record(&mut self, apart_m: f64, order: i32) {
-        let error_m = apart_m / (1.0 - 0.5_f64.powi(order)) * DRIFT_S / self.span_s;
+        let error_m = drift_m(apart_m, order, self.span_s);
         if error_m.is_finite() {
             self.error_m = error_m;
         }
@@ -78,6 +78,13 @@ impl DoublingSchedule {
     pub fn error_m(&self) -> f64 {
         self.error_m
     }
+}
+
+/// Error accumulated in [`DRIFT_S`], metres, by a rule of this order of which steps over `span_s` seconds end `apart_m` metres from the same in
+/// halves (eq. 31).
+#[must_use]
+pub fn drift_m(apart_m: f64, order: i32, span_s: f64) -> f64 {
+    apart_m / (1.0 - 0.5_f64.powi(order)) * DRIFT_S / span_s
 }
 
 /// Index of an object's row among [`ROWS`]: consecutive numbers get different rows.

@@ -8,8 +8,10 @@ use super::broad_phase::PlannedStep;
 use super::observation::Observer;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
+    StepDoubling,
 };
 use metachron_contact::{Law, Link, Neighbour, StepContext};
+use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
     AgentId, Body, ClusterSolves, ClusterState, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport,
 };
@@ -32,6 +34,14 @@ pub(super) struct ClusterSeat {
     sleepers: Vec<AgentId>,
     /// Work of its own steps in the last turn, in the unit of its model.
     work: f64,
+    /// Which of the steps that it leads are repeated in halves, and by what.
+    schedule: DoublingSchedule,
+    doubling: Option<Box<StepDoubling>>,
+    /// The span of the repeated steps of the present row, seconds.
+    row_s: f64,
+    /// How far the repeated steps of the present row left it from the finer ones, metres, and the error of the last row (control.md, eq. 31).
+    apart_m: f64,
+    drift_m: f64,
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
@@ -87,6 +97,11 @@ impl ClusterSeat {
             bonds: Vec::new(),
             sleepers: Vec::new(),
             work: 0.0,
+            schedule: DoublingSchedule::default(),
+            doubling: None,
+            row_s: 0.0,
+            apart_m: 0.0,
+            drift_m: 0.0,
             state: None,
             solves: ClusterSolves::default(),
             participants: Vec::new(),
@@ -103,6 +118,16 @@ impl ClusterSeat {
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
         into.cluster = self.state;
+        into.drift_m += self.drift_m;
+        into.residual_m += self.drift_m;
+    }
+
+    /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
+    fn repeats(&mut self, steps: u64, me: AgentId) -> Option<Box<StepDoubling>> {
+        if self.schedule.begins(steps, me) {
+            self.row_s = 0.0;
+        }
+        self.schedule.is_on().then(|| self.doubling.take().unwrap_or_default())
     }
 
     /// Notes with whom it belongs into one cluster.
@@ -144,19 +169,25 @@ impl AgentRunner {
     /// # Errors
     /// The reason why a member cannot go on: all that belong to the cluster stop with it.
     pub fn step_cluster(&mut self, span: Span) -> Result<StepOutcome, String> {
-        let (id, time) = (self.shared.id, self.pace.time());
+        let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.steps());
         self.company.gather_fellows(id, time);
         let (plan, dt) = self.plan(span)?;
         self.look(time, dt);
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
         let mut list = emptied(std::mem::take(&mut seat.participants));
         let mut stepper = seat.stepper.take().unwrap_or_default();
+        let mut doubling = seat.repeats(steps, id);
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
         let mut company = std::mem::take(&mut self.company);
         let all = std::iter::once(&mut *self).chain(company.seats_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
         list.extend(all.zip(parts).filter_map(|(actor, parts)| actor.participant(time, parts)));
+        // a finer step that diverges says nothing of this one
+        let extra = doubling.as_mut().and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
         let outcome = stepper.step(&scene, &mut list, dt);
+        if let (Some(doubling), Ok(report)) = (&mut doubling, &outcome) {
+            doubling.compare(&list, report.dt);
+        }
         let at_rest = list.iter().all(|one| one.member.is_calm());
         let list = emptied(list);
         self.company = company;
@@ -165,13 +196,16 @@ impl AgentRunner {
         }
         let report = outcome.map_err(|error| error.to_string())?;
         let dt = report.dt;
+        if let Some(doubling) = doubling {
+            self.note_errors(doubling, time, dt);
+        }
         self.note_pairs(&stepper, time, dt);
         self.note_solves(&report, plan, dt);
         self.find_groups(time + dt);
         if let Some(seat) = &mut self.cluster {
             seat.stepper = Some(stepper);
         }
-        let report = StepReport { work: report.work, substeps: report.fine_steps, at_rest };
+        let report = StepReport { work: report.work + extra.unwrap_or(0.0), substeps: report.fine_steps, at_rest };
         Ok(StepOutcome { report, dt })
     }
 
@@ -258,6 +292,34 @@ impl AgentRunner {
         self.company = company;
     }
 
+    /// Hands every member how far a step of `dt` is from the same in halves.
+    fn note_errors(&mut self, doubling: Box<StepDoubling>, time: SimTime, dt: SimSpan) {
+        let Some(seat) = &mut self.cluster else { return };
+        let is_first = seat.row_s == 0.0;
+        seat.row_s += dt.as_secs_f64();
+        let ends = seat.schedule.finish_step(dt.as_secs_f64());
+        let span_s = ends.then_some(seat.row_s);
+        if doubling.apart_m().is_empty() {
+            seat.schedule.cancel();
+        }
+        let mut apart_m = doubling.apart_m().iter();
+        let mut note = |actor: &mut Self| {
+            if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next()) {
+                seat.apart_m = if is_first { *apart_m } else { seat.apart_m + apart_m };
+                if let Some(span_s) = span_s {
+                    seat.drift_m = drift_m(seat.apart_m, 1, span_s);
+                }
+            }
+        };
+        note(self);
+        let mut company = std::mem::take(&mut self.company);
+        company.seats_at(time).for_each(&mut note);
+        self.company = company;
+        if let Some(seat) = &mut self.cluster {
+            seat.doubling = Some(doubling);
+        }
+    }
+
     /// Hands every pair what it gave each other, and every member its work.
     fn note_pairs(&mut self, stepper: &ClusterStepper, time: SimTime, dt: SimSpan) {
         let (dt_s, now) = (dt.as_secs_f64(), time + dt);
@@ -324,7 +386,10 @@ impl AgentRunner {
     /// Stops all that step with it: they rest.
     pub fn rest_members(&mut self) {
         let time = self.pace.time();
-        let rest = |actor: &mut Self| actor.agent.member().into_iter().for_each(|member| member.rest());
+        let rest = |actor: &mut Self| {
+            actor.agent.member().into_iter().for_each(|member| member.rest());
+            actor.cluster.iter_mut().for_each(|seat| seat.drift_m = 0.0);
+        };
         rest(self);
         self.company.seats_at(time).for_each(rest);
     }

@@ -52,8 +52,8 @@ pub trait ClusterMember: Send {
         let _ = nodes;
         let skin = self.skin()?;
         let ShapePose::Solid { .. } = skin.view else { return None };
-        let Pose { origin_m, rotation, .. } = self.pose(v, t_s)?;
-        Some(PlacedShape { view: ShapePose::Solid { position: origin_m, rotation }, ..skin })
+        let Pose { centre_m, rotation, .. } = self.pose(v, t_s)?;
+        Some(PlacedShape { view: ShapePose::Solid { position: centre_m, rotation }, ..skin })
     }
 
     /// Its skin at rest, for a body that touches itself; `None` for one that passes through itself.

@@ -14,6 +14,7 @@
 
 mod arms;
 mod blows;
+mod doubling;
 mod joints;
 mod links;
 mod member;
@@ -29,6 +30,7 @@ use crate::StepContext;
 use crate::cluster::{Contact, Member, Problem, ProblemError, Settings, Solver};
 use crate::law::Law;
 use blows::Rebounds;
+pub use doubling::StepDoubling;
 use glam::DVec3;
 use joints::Joints;
 pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};

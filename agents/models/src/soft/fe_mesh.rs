@@ -220,6 +220,16 @@ impl FeMesh {
         }
     }
 
+    /// The rotations of the cells, from which they are followed on.
+    pub fn turns(&self) -> impl Iterator<Item = DQuat> + '_ {
+        self.hexahedra.iter().map(|cell| cell.turn)
+    }
+
+    /// Sets the rotations of the cells back to `turns`.
+    pub fn set_turns(&mut self, turns: &[DQuat]) {
+        self.hexahedra.iter_mut().zip(turns).for_each(|(cell, turn)| cell.turn = *turn);
+    }
+
     /// Elastic energy, J; uses updated rotations of the cells.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let bars: f64 = self.bars.iter().map(|bar| bar.energy_j(positions)).sum();

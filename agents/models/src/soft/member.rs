@@ -5,7 +5,7 @@
 
 use super::body::SoftBody;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
@@ -29,6 +29,7 @@ pub(super) struct Unknowns {
 struct Kept {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
+    turns: Vec<DQuat>,
     quiet_s: f64,
     at_rest: bool,
     steps: u64,
@@ -130,6 +131,8 @@ impl ClusterMember for SoftBody {
         let kept = &mut self.unknowns.kept;
         kept.positions.clone_from(&self.positions);
         kept.velocities.clone_from(&self.velocities);
+        kept.turns.clear();
+        kept.turns.extend(self.mesh.turns());
         (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
     }
 
@@ -137,6 +140,7 @@ impl ClusterMember for SoftBody {
         let kept = &self.unknowns.kept;
         self.positions.clone_from(&kept.positions);
         self.velocities.clone_from(&kept.velocities);
+        self.mesh.set_turns(&kept.turns);
         (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
     }
 

@@ -1,6 +1,7 @@
 //! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
 
 mod bodies;
+mod errors;
 mod grasp;
 mod joints;
 mod links;

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
-    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan, StepDoubling,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, SimSpan, SimTime, Snapshot};
@@ -38,6 +38,8 @@ pub struct Table {
     last_s: f64,
     /// What the stepper allocated in it.
     pub allocations: u64,
+    /// Repeats every step in halves, where there is one.
+    pub doubling: Option<StepDoubling>,
     scene: ClusterScene,
     stepper: ClusterStepper,
     snapshot: Snapshot,
@@ -98,6 +100,7 @@ impl Table {
             strangers: vec![],
             last_s: 0.0,
             allocations: 0,
+            doubling: None,
             scene,
             stepper,
             snapshot,
@@ -173,8 +176,14 @@ impl Table {
             all.push(Participant { id: AgentId(id), member, context, laws, memory, parts, grips });
         }
         let mut report = ClusterReport::default();
+        if let Some(doubling) = &mut self.doubling {
+            doubling.foresee(&self.scene, &mut all, dt).unwrap();
+        }
         let mut advance = || report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
         self.allocations = allocation_counter::measure(&mut advance).count_total;
+        if let Some(doubling) = &mut self.doubling {
+            doubling.compare(&all, report.dt);
+        }
         self.time += report.dt;
         self.last_s = report.dt.as_secs_f64();
         (report, self.last_s)

@@ -1,0 +1,88 @@
+//! The error that a macro step of a cluster makes, of each member: the step made a second time in halves, without a trace.
+//!
+//! In: members at the start of a macro step. Out: how far each is from where the same step in twice as many parts would leave it. Never here:
+//! which steps are repeated, what is made of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
+
+use super::{ClusterMember, ClusterScene, ClusterStepper, Participant};
+use glam::DVec3;
+use metachron_core::step_doubling::farthest;
+use metachron_core::{SimSpan, StepError};
+use metachron_geometry::{ShapeKind, ShapePose};
+
+/// A macro step in twice as many parts.
+#[derive(Default)]
+pub struct StepDoubling {
+    /// Its own, so that a step leaves the same bits whether it is repeated or not.
+    stepper: ClusterStepper,
+    /// Where the finer step left the members.
+    finer: Vec<Vec<DVec3>>,
+    /// How long that was; `None` where there was none.
+    made: Option<SimSpan>,
+    now: Vec<DVec3>,
+    apart_m: Vec<f64>,
+}
+
+impl StepDoubling {
+    /// Makes the coming macro step of `dt` with every member in twice as many parts, and takes it back. Its work, in the unit of
+    /// [`metachron_core::StepReport::work`].
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where a member has no finite state then: all members are as they were.
+    pub fn foresee(
+        &mut self,
+        scene: &ClusterScene,
+        all: &mut [Participant<'_>],
+        dt: SimSpan,
+    ) -> Result<f64, StepError> {
+        let Self { stepper, finer, made, .. } = self;
+        *made = None;
+        stepper.keep(all);
+        all.iter_mut().for_each(|one| one.parts *= 2);
+        let outcome = stepper.step(scene, all, dt);
+        if outcome.is_ok() {
+            finer.resize_with(all.len(), Vec::new);
+            all.iter().zip(finer).for_each(|(one, places)| probe(&*one.member, places));
+        }
+        all.iter_mut().for_each(|one| one.parts /= 2);
+        stepper.go_back(all);
+        let report = outcome?;
+        *made = Some(report.dt);
+        Ok(report.work)
+    }
+
+    /// Compares the members with where the finer step left them, after the same macro step, which took `dt`. How far each is from there,
+    /// metres; nothing where there was no finer step or one of another length.
+    pub fn compare(&mut self, all: &[Participant<'_>], dt: SimSpan) -> &[f64] {
+        let Self { finer, made, now, apart_m, .. } = self;
+        apart_m.clear();
+        if made.take() == Some(dt) && finer.len() == all.len() {
+            apart_m.extend(all.iter().zip(finer).map(|(one, finer)| {
+                probe(&*one.member, now);
+                farthest(now, finer)
+            }));
+        }
+        apart_m
+    }
+
+    /// What [`Self::compare`] found last.
+    #[must_use]
+    pub fn apart_m(&self) -> &[f64] {
+        &self.apart_m
+    }
+}
+
+/// The points by which the place of a member is told: nodes, vertices, three points as far from its middle as the farthest of its shape.
+fn probe(member: &dyn ClusterMember, into: &mut Vec<DVec3>) {
+    into.clear();
+    let Some(skin) = member.skin() else {
+        return into.extend(member.pose(&[], 0.0).map(|pose| pose.centre_m));
+    };
+    match skin.view {
+        ShapePose::Chain { positions, .. } | ShapePose::Surface(positions) => into.extend_from_slice(positions),
+        ShapePose::Solid { position, rotation } => {
+            let arm_m = if let ShapeKind::Solid(solid) = &skin.form.kind { solid.radius_m } else { 0.0 };
+            into.extend(DVec3::AXES.map(|axis| position + rotation * axis * arm_m));
+        }
+        ShapePose::Tool { tip, .. } => into.push(tip),
+    }
+}
