@@ -308,7 +308,8 @@ fn reference_report(scene: &Scene, oracle: &ReferenceComparison) -> ReferenceRep
         impulse_oracle_n_s: pair.impulse_oracle_n_s,
     };
     let couplings = oracle.pairs.iter().map(error).collect();
-    ReferenceReport { dt_ms: oracle.dt_s * 1e3, sim_s: oracle.sim_s, states: oracle.states, couplings }
+    let ReferenceComparison { dt_s, sim_s, states, sensitivity_m, .. } = *oracle;
+    ReferenceReport { dt_ms: dt_s * 1e3, sim_s, states, sensitivity_m, couplings }
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {

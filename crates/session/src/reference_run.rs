@@ -5,12 +5,16 @@
 //! In the second run every agent makes the same steps, a quarter of the shortest requested by any agent, in virtual time at no cost,
 //! without faults and without control of rates and resolutions. The difference of both runs is the error of different clocks, of longer
 //! steps, of coarser divisions and of late frames together.
+//!
+//! A third run is the second one with every body's start moved by 1 µm, each in another direction: how far the two end apart says how
+//! sensitive the scene is. Errors below that say nothing.
 
 use super::coupling_record::Coupling;
 use super::error::SessionError;
 use super::outcome::Outcome;
 use super::session::Session;
 use super::trace::{Trace, TracedState, points};
+use glam::DVec3;
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_scene::format::MODELS;
 use metachron_world::Scene;
@@ -23,6 +27,10 @@ use std::time::Duration;
 const DIVISION: f64 = 4.0;
 /// Shortest common step, seconds.
 const STEP_MIN_S: f64 = 2e-6;
+/// How far starts are moved in the third run, metres.
+const MOVED_M: f64 = 1e-6;
+/// The angle between the directions of two numbers in a row, radians: the golden one, so that no two bodies move alike.
+const BETWEEN_RAD: f64 = 2.399_963_229_728_653;
 /// Longest common step, seconds: a scene of slow agents still has to be accurate.
 const STEP_MAX_S: f64 = 2e-3;
 
@@ -37,6 +45,8 @@ pub struct ReferenceComparison {
     pub states: u64,
     /// Every pair that was coupled in either run.
     pub pairs: Vec<PairError>,
+    /// The greatest distance of any point from where it is with every start moved by 1 µm, metres.
+    pub sensitivity_m: f64,
     /// Whether the comparison was ended early.
     pub interrupted: bool,
 }
@@ -90,7 +100,9 @@ fn compare_runs(
 ) -> Result<ReferenceComparison, SessionError> {
     let common = common_clock(scene);
     let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
+    let mut moved = Session::open(moved(&common))?;
     let mut session = Session::open(common)?;
+    let mut sensitivity_m = 0.0_f64;
     let empty = Trace::default();
     let trace = outcome.trace.as_ref().unwrap_or(&empty);
     let mut states: Vec<&TracedState> = trace.states.iter().collect();
@@ -99,8 +111,11 @@ fn compare_runs(
     let mut cut = None;
     let mut updated = Duration::ZERO;
     for (at, state) in states.iter().enumerate() {
-        session.wait_until(Duration::from_nanos(state.moment.as_nanos()));
+        let moment = Duration::from_nanos(state.moment.as_nanos());
+        session.wait_until(moment);
+        moved.wait_until(moment);
         compare(&session, state, distances);
+        sensitivity_m = sensitivity_m.max(apart_m([&session, &moved], state.agent));
         // couplings are published for a second after they end: reading every frame misses none
         if session.now() >= updated {
             session.read_states();
@@ -117,7 +132,7 @@ fn compare_runs(
     let pairs = pairs(run.as_ref().unwrap_or(&outcome.couplings), session.couplings(), distances);
     let sim_s = cut.map_or(outcome.sim_s, SimTime::as_secs_f64);
     let states = distances.iter().map(|d| d.points).sum();
-    Ok(ReferenceComparison { dt_s, sim_s, states, pairs, interrupted: cut.is_some() })
+    Ok(ReferenceComparison { dt_s, sim_s, states, pairs, sensitivity_m, interrupted: cut.is_some() })
 }
 
 /// The same scene with one clock for all agents, free steps and no faults.
@@ -140,6 +155,24 @@ fn common_clock(scene: &Scene) -> Scene {
     (machine.cull_object_ns, machine.choose_object_ns) = (Some(0.0), Some(0.0));
     machine.noise = Some(0.0);
     scene
+}
+
+/// The same scene with every body's start moved.
+fn moved(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    for (number, member) in (0..).zip(&mut scene.agents) {
+        let angle = BETWEEN_RAD * f64::from(number);
+        member.spec.shift(DVec3::new(angle.cos(), angle.sin(), 0.0) * MOVED_M);
+    }
+    scene
+}
+
+/// The greatest distance between the points of an agent in two runs, metres.
+fn apart_m(runs: [&Session; 2], agent: AgentId) -> f64 {
+    let [a, b] = runs.map(|run| run.agents().get(agent.0 as usize).map(|agent| agent.latest()));
+    let (Some(a), Some(b)) = (a, b) else { return 0.0 };
+    let apart = points(&a.body).zip(points(&b.body)).map(|((a, _), (b, _))| a.distance(b));
+    apart.fold(0.0, f64::max)
 }
 
 /// Adds the distance of an agent on the common clock from its position in the run at the same time.

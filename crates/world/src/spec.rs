@@ -33,6 +33,16 @@ impl Spec {
         matches!(self, Self::Tube(_) | Self::Soft(_))
     }
 
+    /// Moves the start of a body by `by` metres; a tool stays on its path.
+    pub fn shift(&mut self, by: DVec3) {
+        match self {
+            Self::Tube(tube) => tube.path_m.iter_mut().for_each(|at| *at += by),
+            Self::Rigid(body) => body.position += by,
+            Self::Soft(soft) => soft.position += by,
+            Self::Tool(_) | Self::Synthetic(_) => {}
+        }
+    }
+
     /// Declared mass, kilograms; `None` where it follows from a mesh (soft bodies) or the model has none.
     #[must_use]
     pub fn mass_kg(&self) -> Option<f64> {

@@ -236,6 +236,9 @@ pub struct ReferenceReport {
     pub sim_s: f64,
     /// Points compared.
     pub states: u64,
+    /// The greatest distance of any point on the common clock from where it is with every start moved by 1 µm, metres: smaller errors say
+    /// nothing.
+    pub sensitivity_m: f64,
     /// Every pair that was coupled in either run.
     pub couplings: Vec<CouplingError>,
 }
@@ -387,6 +390,7 @@ mod tests {
         "/moved/0/by_m",
         "/oracle/dt_ms",
         "/oracle/sim_s",
+        "/oracle/sensitivity_m",
         "/oracle/couplings/0/position_rms_m",
         "/agents/0/led_by",
         "/budget/spent_share",

@@ -134,8 +134,9 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
 }
 
 fn reference_table(out: &mut String, oracle: &ReferenceReport) {
-    let ReferenceReport { dt_ms, sim_s, states, .. } = oracle;
+    let ReferenceReport { dt_ms, sim_s, states, sensitivity_m, .. } = oracle;
     let _ = writeln!(out, "\nagainst one common clock of {dt_ms:.4} ms over {sim_s:.2} s, {states} points compared");
+    let _ = writeln!(out, "every start moved by 1 µm: {:.4} mm apart at most", sensitivity_m * 1e3);
     let _ = writeln!(
         out,
         "{:<41} {:>11} {:>11} {:>13} {:>12} {:>12}",
