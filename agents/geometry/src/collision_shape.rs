@@ -6,7 +6,6 @@
 use super::narrow_phase::{TouchKey, VoronoiRegions};
 use crate::{Aabb, ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
-use metachron_core::ContactJacobian;
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
 
@@ -259,28 +258,25 @@ impl SolidShape {
         let radius_m = f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local);
         Ok(Self { solid, shape, com_local, radius_m })
     }
-}
 
-impl Place {
-    /// Adds the velocity of this point, with the sign of its `side`, to the sum in `slots`. The body's slots begin at `base`: the velocity of
-    /// its centre and its spin, a tube's nodes and segments in turn, or a soft body's vertices.
-    pub fn join(&self, slots: &mut ContactJacobian, base: u32, centre: DVec3, side: ContactSide) {
-        let ContactSide { outward, sign } = side;
-        match *self {
-            Self::Point(point) => {
-                slots.add_linear(base, sign);
-                slots.add_angular(base + 1, (point - centre) * sign);
-            }
-            Self::Chain { segment, share, radius_m } => {
-                slots.add_linear(base + 2 * segment, sign * (1.0 - share));
-                slots.add_linear(base + 2 * segment + 2, sign * share);
-                slots.add_angular(base + 2 * segment + 1, outward * (radius_m * sign));
-            }
-            Self::Surface { vertices, shares } => {
-                for (vertex, share) in vertices.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
-                    slots.add_linear(base + vertex, sign * share);
-                }
-            }
+    /// The form of a solid that moves, with its centre of mass at `com_local`: a mesh counts as its convex parts
+    /// (a closed one that is not convex, divided by V-HACD) or as its hull.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for an invalid solid.
+    pub fn moving(solid: &Solid, com_local: DVec3) -> Result<Self, ShapeError> {
+        let shape = solid.to_moving_shape()?;
+        let convex = shape.as_compound().is_none_or(|parts| parts.shapes().len() == 1);
+        let mut radius_m = solid.radius_about_m(com_local);
+        if !convex {
+            // voxels stick out of the mesh a little
+            let ball = shape.compute_local_bounding_sphere();
+            radius_m = radius_m.max(f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local));
         }
+        let solid = match solid {
+            Solid::Mesh { points_m, .. } if convex => Solid::Hull { points_m: points_m.clone() },
+            solid => solid.clone(),
+        };
+        Ok(Self { solid, shape, com_local, radius_m })
     }
 }

@@ -6,6 +6,7 @@
 use super::body::SoftBody;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
+use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
@@ -29,6 +30,7 @@ pub(super) struct Unknowns {
 struct Kept {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
+    acceleration: DVec3,
     quiet_s: f64,
     at_rest: bool,
     steps: u64,
@@ -67,7 +69,6 @@ impl ClusterMember for SoftBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         self.ties.clear();
-        self.given.clear();
         self.predict(h_s).map_err(|what| self.diverged(what, h_s))?;
         let Self { system, free, velocities, positions, unknowns, .. } = self;
         let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
@@ -97,7 +98,7 @@ impl ClusterMember for SoftBody {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) })
+        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(&self.positions) })
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {
@@ -123,6 +124,7 @@ impl ClusterMember for SoftBody {
         let kept = &mut self.unknowns.kept;
         kept.positions.clone_from(&self.positions);
         kept.velocities.clone_from(&self.velocities);
+        kept.acceleration = self.acceleration;
         (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
     }
 
@@ -130,6 +132,7 @@ impl ClusterMember for SoftBody {
         let kept = &self.unknowns.kept;
         self.positions.clone_from(&kept.positions);
         self.velocities.clone_from(&kept.velocities);
+        self.acceleration = kept.acceleration;
         (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
     }
 
@@ -145,6 +148,7 @@ impl ClusterMember for SoftBody {
             self.positions.clone_from(&self.unknowns.start);
             return Err(self.diverged("a vertex left the coordinate range", h_s));
         }
+        let before = self.linear_momentum();
         let Self { system, velocities, unknowns, .. } = self;
         for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
             *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
@@ -153,6 +157,7 @@ impl ClusterMember for SoftBody {
             .iter()
             .zip(&unknowns.now)
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
+        self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;
         self.steps += 1;
@@ -165,6 +170,7 @@ impl ClusterMember for SoftBody {
 
     fn rest(&mut self) {
         self.at_rest = true;
+        self.acceleration = DVec3::ZERO;
         self.velocities.fill(DVec3::ZERO);
     }
 

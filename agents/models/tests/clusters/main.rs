@@ -2,11 +2,13 @@
 
 mod bodies;
 mod grasp;
+mod hands;
 mod joints;
 mod links;
 mod own_model;
 mod rebounds;
 mod scenes;
+mod shapes;
 mod slope;
 mod stacks;
 mod steps;
