@@ -14,3 +14,4 @@ mod stacks;
 mod steps;
 mod table;
 mod tools;
+mod tubes;
