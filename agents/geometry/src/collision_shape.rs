@@ -20,62 +20,13 @@ pub struct CollisionShape {
     pub restitution: f64,
 }
 
-impl CollisionShape {
-    /// How many ends of a tube are held in place; zero for anything else.
-    #[must_use]
-    pub const fn held_ends(&self) -> u8 {
-        if let ShapeKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
-    }
-
-    /// Whether it is a thin soft body that is held somewhere: a hanging or stretched sheet or rope.
-    #[must_use]
-    pub const fn is_hung(&self) -> bool {
-        matches!(&self.kind, ShapeKind::Surface(SurfaceShape { held: true, closed: false, .. }))
-    }
-
-    /// Whether it is deformable and held somewhere.
-    #[must_use]
-    pub const fn is_held(&self) -> bool {
-        match &self.kind {
-            ShapeKind::Chain { held_ends, .. } => *held_ends > 0,
-            ShapeKind::Surface(surface) => surface.held,
-            ShapeKind::Solid(_) | ShapeKind::Tool(_) => false,
-        }
-    }
-
-    /// The height of a deformable at the start, −g·x, J/kg: that of its middle, or of its lowest point where it is held; zero for a rigid
-    /// body or tool. Of two deformables that keep the same rate the higher one owns the pair (docs/decisions/0019).
-    #[must_use]
-    pub const fn height_j_kg(&self) -> f32 {
-        match &self.kind {
-            ShapeKind::Chain { height_j_kg, .. } => *height_j_kg,
-            ShapeKind::Surface(surface) => surface.height_j_kg,
-            ShapeKind::Solid(_) | ShapeKind::Tool(_) => 0.0,
-        }
-    }
-}
-
-/// The height of a deformable at its start, J/kg ([`CollisionShape::height_j_kg`]). One that is `held` counts as high as its lowest point: a body
-/// that it would support starts there.
-pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
-    let heights = || positions.iter().map(|position| -gravity.dot(*position));
-    let height =
-        if held { heights().fold(f64::INFINITY, f64::min) } else { heights().sum::<f64>() / positions.len() as f64 };
-    height as f32
-}
-
 /// The kinds of shapes.
 #[derive(Debug, Clone)]
 pub enum ShapeKind {
     /// A rigid solid.
     Solid(SolidShape),
     /// A tube: cone-capsules between nodes, at its own radius.
-    Chain {
-        /// How many of its ends are held in place, 0 … 2.
-        held_ends: u8,
-        /// See [`CollisionShape::height_j_kg`].
-        height_j_kg: f32,
-    },
+    Chain,
     /// A tool: the placement of its parts depends on the jaw opening.
     Tool(ToolShape),
     /// The skin of a soft body: triangles and edges between vertices that move.
@@ -95,12 +46,8 @@ pub struct SurfaceShape {
     pub radius_m: f64,
     /// Mean length of its edges at rest, metres.
     pub edge_m: f64,
-    /// See [`CollisionShape::height_j_kg`].
-    pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
-    /// Whether it is held somewhere.
-    pub held: bool,
     /// The neighbours of each vertex and edge.
     pub fans: Arc<VoronoiRegions>,
 }

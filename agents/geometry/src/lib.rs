@@ -47,7 +47,7 @@ pub mod topology;
 pub use aabb::Aabb;
 pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
-    CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch, height_j_kg,
+    CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
@@ -67,9 +67,6 @@ pub use topology::is_closed;
 pub use topology::{Branch, branch};
 
 pub use tool::{ToolPart, ToolShape};
-
-/// Ways out of a solid whose cosine is below this have none in common: what starts inside would be torn apart on them.
-pub const PARTED: f64 = 0.5;
 
 #[cfg(test)]
 mod signed_distance_tests;

@@ -20,7 +20,7 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
-use metachron_geometry::{CollisionShape, ShapeKind, height_j_kg};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
@@ -78,10 +78,7 @@ impl Tube {
         let matter = matter_of(&spec);
         let mut now = RodState::at_rest(&division);
         now.strain(&matter, &division);
-        let held_ends = matter.held.map(u8::from).iter().sum();
-        let height_j_kg = height_j_kg(&now.x, spec.gravity, held_ends > 0);
-        let kind = ShapeKind::Chain { held_ends, height_j_kg };
-        let form = CollisionShape { kind, friction: spec.friction, restitution: 0.0 };
+        let form = CollisionShape { kind: ShapeKind::Chain, friction: spec.friction, restitution: 0.0 };
         let mut tube = Self {
             resolution: nearest_resolution(resolution, &skeleton, count),
             acceleration: spec.gravity,

@@ -14,7 +14,7 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{Aabb, CollisionShape, ShapeKind, height_j_kg};
+use metachron_geometry::{Aabb, CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
@@ -51,9 +51,7 @@ impl SoftBody {
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let held = mesh.held.contains(&true);
-        let height_j_kg = height_j_kg(&positions, spec.gravity, held);
-        let surface = mesh.surface(height_j_kg);
+        let surface = mesh.surface();
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         Ok(Self {
             system: mesh.system(),
