@@ -1,8 +1,47 @@
-//! Interaction between agents: contact laws, the ledger between different clocks, and the prediction of a peer's motion.
+//! Interaction between agents: contact clusters, asynchronous pairs, and what an agent is.
 //!
-//! In: contacts, free velocities and how bodies respond to impulses; snapshots of neighbours. Out: impulses, and the ledgers that
-//! record them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
+//! In: bodies as members of clusters (matrices, free velocities, skins), scenes of static solids and joints; for asynchronous pairs
+//! snapshots of neighbours. Out: velocities and impulses, and the ledgers of asynchronous pairs. Never here: any model's own state, threads.
+//! Theory: `docs/theory/clusters.md`, `docs/theory/contact.md`, `docs/theory/coupling.md`.
 //!
+//! ```
+//! use glam::{DMat3, DVec3};
+//! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
+//!
+//! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
+//! let (h_s, mass_kg) = (0.01, 2.0);
+//! let inertia = DVec3::splat(mass_kg * 0.2 * 0.2 / 6.0);
+//! let blocks = [
+//!     Block { row: 0, column: 0, value: DMat3::from_diagonal(DVec3::splat(mass_kg)) },
+//!     Block { row: 1, column: 1, value: DMat3::from_diagonal(inertia) },
+//! ];
+//! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
+//! let members = [Member { blocks: &blocks, free: &free, share: 1.0, response: None }];
+//! let corner = |key, x, y| Contact {
+//!     key,
+//!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
+//!     normal: DVec3::Z,
+//!     tangents: [DVec3::X, DVec3::Y],
+//!     gap_m: 0.0,
+//!     friction: 0.3,
+//!     restitution: 0.0,
+//!     approach_m_s: 0.0,
+//!     surface_m_s: DVec3::ZERO,
+//!     owed_slip_m: DVec3::ZERO,
+//!     warm_n_s: DVec3::ZERO,
+//! };
+//! let contacts = [corner(0, -0.1, -0.1), corner(1, 0.1, -0.1), corner(2, -0.1, 0.1), corner(3, 0.1, 0.1)];
+//! let mut solver = Solver::default();
+//! let (members, rebound_from_m_s) = (&members, 9.81 * h_s);
+//! let solution = solver.solve(&Problem { h_s, members, contacts: &contacts, rows: &[], rebound_from_m_s })?;
+//!
+//! let given: DVec3 = solution.contacts_n_s.iter().sum();
+//! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
+//! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
+//! assert!(!solution.report.cut);
+//! # Ok::<(), metachron_contact::cluster::ProblemError>(())
+//! ```
+
 pub mod agent;
 pub mod audit;
 pub mod cluster;

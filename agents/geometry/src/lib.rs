@@ -1,7 +1,7 @@
 //! Shapes without physics: solids, skeleton curves, meshes and their levels, and the contact points between collision shapes.
 //!
 //! In: solids, curves and meshes in their poses. Out: gaps and contact points, signed distances, closest points, triangles,
-//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 12–14.
+//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 1–12.
 //!
 //! ```
 //! use glam::{DQuat, DVec3};

@@ -1,7 +1,7 @@
 //! External springs at vertices of a soft body: the user's and those of tools. Implicit in the step.
 //!
 //! In: pulls. Out: forces and stiffness in the system, and the impulse of each spring. Never here: vertices that never move.
-//! Theory: docs/theory/soft.md, eq. 3, 4.
+//! Theory: docs/theory/soft.md, eq. 3.
 
 use super::system::System;
 use glam::{DMat3, DVec3};

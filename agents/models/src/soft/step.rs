@@ -40,7 +40,7 @@ impl SoftBody {
         Ok((done, doubled))
     }
 
-    /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–4).
+    /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–3).
     pub(super) fn predict(&mut self, h: f64) -> Result<(), &'static str> {
         self.assemble(h);
         if !self.system.factor() {

@@ -110,7 +110,7 @@ proptest! {
             prop_assert!(!list.is_empty());
             // what is beneath a face pushes along that
             let face = rotation * DVec3::NEG_Z;
-            // of a ball the slack of eq. 15a stays: a thousandth of a diagonal over its radius
+            // of a ball the slack of eq. 8 stays: a thousandth of a diagonal over its radius
             let off = if matches!(solid.kind, ShapeKind::Solid(SolidShape { solid: Solid::Ball { .. }, .. })) { 1.5e-3 * EDGE / 0.02 } else { 1e-9 };
             let straight = |normal: DVec3| normal.distance(DVec3::NEG_Z) < off || normal.distance(face) < off;
             prop_assert!(list.iter().all(|touch| straight(touch.normal)), "{list:?}");
