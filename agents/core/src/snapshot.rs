@@ -14,7 +14,7 @@ pub struct Snapshot {
     pub time: SimTime,
     /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub clock_offset: SimSpan,
-    /// How long its last step was where that was shorter than its scene wants (`Agent::longest_step`), written like its time; `None`
+    /// How long its last step was where that was shorter than its scene wants, written like its time; `None`
     /// elsewhere.
     pub shortened_step: Option<SimSpan>,
     /// Number of steps so far.

@@ -1,4 +1,4 @@
-//! The shape of an agent as its peers need it for contact, and its placement.
+//! The shape of an agent as others need it for contact, and its placement.
 //!
 //! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, fixed for an agent's life and shared, and [`PlacedShape`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
@@ -52,7 +52,7 @@ pub struct SurfaceShape {
     pub fans: Arc<VoronoiRegions>,
 }
 
-/// A solid as peers touch it.
+/// A solid as others touch it.
 #[derive(Clone)]
 pub struct SolidShape {
     /// The solid.

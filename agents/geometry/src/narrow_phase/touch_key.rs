@@ -72,7 +72,6 @@ impl TouchKey {
             _ => self,
         }
     }
-
 }
 
 #[cfg(test)]
@@ -91,5 +90,4 @@ mod tests {
             }
         }
     }
-
 }

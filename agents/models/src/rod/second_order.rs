@@ -1,7 +1,7 @@
 //! Substeps of second order: BDF2 and the energy-momentum rule, used where nothing external makes velocities jump.
 //!
-//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is in contact, pulled
-//! or near peers, and where the iteration does not converge, the substep is one of implicit Euler.
+//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is pulled, and
+//! where the iteration does not converge, the substep is one of implicit Euler.
 //! Never here: implicit Euler itself ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
 
 use super::energy_momentum::fill_mean;

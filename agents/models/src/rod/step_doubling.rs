@@ -49,8 +49,7 @@ impl Doubling {
         self.schedule.begins(steps, me)
     }
 
-    /// Prepares for a step from `now`, after [`Self::begins`]. A step with peers or received impulses is not repeated: impulses are
-    /// given once only.
+    /// Prepares for a step from `now`, after [`Self::begins`].
     pub fn begin(&mut self, begins: bool, now: &RodState, ties: &[Tie], stepper: &Stepper) {
         if self.again.as_ref().is_some_and(|again| !begins && !again.fits(now)) {
             self.schedule.cancel();
