@@ -8,7 +8,6 @@ use crate::{Law, Link};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::CollisionShape;
-use std::any::Any;
 use std::sync::Arc;
 
 /// An object that runs by itself, on its own clock.
@@ -19,22 +18,13 @@ pub trait Agent: Send {
     /// The model's name as scenes write it: `tube`, `rigid`, `sheet`, `solid`, `rope`, `tool`, `synthetic`.
     fn model(&self) -> &'static str;
 
-    /// Advances the state by exactly `dt`.
+    /// Advances the state by exactly `dt`: the step of a body that touches nothing. The runtime steps members ([`Self::member`]) by their
+    /// cluster, where contacts, joints, links and grasps are solved; a step of this kind knows no contact.
     ///
     /// # Errors
     /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
     /// its last snapshot stays valid.
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError>;
-
-    /// Reads its surroundings before its first step, which will be one of `dt`, so that its first publication already predicts
-    /// its motion for the others. No time passes.
-    fn observe(&mut self, _dt: SimSpan, _context: &StepContext<'_>) {}
-
-    /// The length of the next step where `dt` is requested: shorter next to neighbours whose motion within `dt` cannot be predicted,
-    /// never longer. Executors call this before every step.
-    fn longest_step(&self, dt: SimSpan, _context: &StepContext<'_>) -> SimSpan {
-        dt
-    }
 
     /// Shifts the agent's own time by `by_s` seconds: later where positive, earlier where negative. Nothing else changes: stored times and
     /// scripts shift along, and no impulse is in flight to or from the agent.
@@ -66,39 +56,6 @@ pub trait Agent: Send {
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {
         None
     }
-
-    /// The body of this agent that an island of its model can step in its own turn; `None` for a model without islands.
-    fn island_body(&mut self) -> Option<&mut dyn Any> {
-        None
-    }
-
-    /// Advances this agent and `others`, which have handed their stepping over to it, as one island on this agent's clock.
-    ///
-    /// `apart` returns a number for each of `others`: zero where it stays in this island; otherwise it has left, and agents with equal
-    /// numbers still belong together. The report counts the work of all.
-    ///
-    /// # Errors
-    /// [`StepError::Alone`] for a model that steps no other agents; else as [`Agent::step`].
-    fn step_island(
-        &mut self,
-        dt: SimSpan,
-        context: &StepContext<'_>,
-        others: &mut [IslandMember<'_>],
-        apart: &mut Vec<u32>,
-    ) -> Result<StepReport, StepError> {
-        let _ = (dt, context, others, apart);
-        Err(StepError::Alone { model: self.model() })
-    }
-}
-
-/// An agent that is stepped in the island of another.
-pub struct IslandMember<'a> {
-    /// The agent's number.
-    pub id: AgentId,
-    /// The agent.
-    pub agent: &'a mut dyn Agent,
-    /// The surroundings of that agent.
-    pub context: StepContext<'a>,
 }
 
 /// The other agents and springs that an agent sees while it steps.
@@ -127,19 +84,15 @@ pub struct Neighbour {
     pub form: Option<Arc<CollisionShape>>,
     /// How the two act on each other in contact.
     pub law: Law,
-    /// Whether the agent that looks owns the pair ([`crate::owns`]).
-    pub owned: bool,
-    /// Whether the two keep step ([`crate::keep_step`]).
-    pub in_step: bool,
     /// Its usual step length, seconds; zero where that does not matter.
     pub step_s: f64,
 }
 
 impl Neighbour {
-    /// A neighbour that is only looked at: neither in contact nor owned.
+    /// A neighbour that is only looked at: not in contact.
     #[must_use]
     pub const fn observed(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Ledger, owned: false, in_step: false, step_s: 0.0 }
+        Self { id, snapshot, form: None, law: Law::Ledger, step_s: 0.0 }
     }
 }
 

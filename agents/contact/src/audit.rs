@@ -2,18 +2,14 @@
 //!
 //! In: the snapshot that each agent published last, and the masses of tubes. Out: the sums, with every impulse that was given and not
 //! yet taken applied as its receiver will apply it: v + W dJ, x + W (t dJ − dS) at the receiver's own time
-//! (docs/theory/coupling.md, eq. 3). After that rigid bodies fly to the common time; an impulse that presses a body on the ground that
-//! supports it goes into the ground. Never here: how agents step. Plain addition of the energies of two clocks would count the half
+//! (docs/theory/coupling.md, eq. 3). After that rigid bodies fly to the common time. Never here: how agents step. Plain addition of the energies of two clocks would count the half
 //! of an impact that its owner has felt, but not the half that the peer has still to receive.
 //!
-//! Exact for rigid bodies whose acceleration is constant in between. For tubes the state counts as published, with the
-//! change of velocities: the effect of a shift of positions on the elastic energy is left out; it is of second order in the impulse.
+//! Exact for rigid bodies whose acceleration is constant in between. For tubes the state counts as published.
 
 mod acted;
 
-use super::other::turned;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::foot::is_borne;
 use metachron_core::{AgentId, Body, CurveState, Inertia, InverseMass, RigidState, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 
@@ -26,8 +22,6 @@ pub struct Member<'a> {
     pub snapshot: &'a Snapshot,
     /// Mass per length of a tube, kg/m; not read for other agents.
     pub mass_per_length_kg_m: f64,
-    /// Rotary inertia ρI of a tube about a diameter, per length, kg·m; not read for other agents.
-    pub rotary_kg_m: f64,
 }
 
 /// The sums at the common time.
@@ -95,34 +89,21 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
         given += dj;
         carried += way;
     });
-    if let Some(rebound) = member.snapshot.rebound.get() {
-        let by_then = Impulse { linear: carried.linear + given.linear * h, angular: DVec3::ZERO };
-        let [back, way] = rebound.part(rebound.spared_by([given, by_then], at, (*inverse_mass, *inverse_inertia)), at);
-        // both are brought to the common time by the velocity
-        (given, carried) = (given - back, carried - way + back * h);
-    }
-    let stand = member.snapshot.stand;
-    if let Some(stand) = stand.filter(|stand| stand.bears(state.position, given)) {
-        (given, carried) = (stand.leaves(given), stand.leaves(carried));
-    }
-    let tips = member.snapshot.tips.get();
-    if let Some(tips) = tips {
-        (given, carried) = [given, carried].map(|all| tips.hold((*inverse_mass, *inverse_inertia), all)).into();
-    }
     let all = [given.linear, carried.linear].map(|impulse| impulse * *inverse_mass);
-    let since_s = all[1].length() / all[0].length().max(f64::MIN_POSITIVE);
-    let [change, way] = stand.map_or(all, |stand| stand.lifted(all, since_s));
-    state.velocity += change;
-    state.position += way;
+    state.velocity += all[0];
+    state.position += all[1];
     state.spin += *inverse_inertia * given.angular;
     state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
     let a = member.snapshot.acceleration;
     state.position += state.velocity * h + a * (0.5 * h * h);
     state.velocity += a * h;
-    let turning = tips.map_or(DVec3::ZERO, |tips| tips.turning);
-    state.rotation = turned(state.rotation, state.spin * h + turning * (0.5 * h * h));
-    state.spin += turning * h;
+    state.rotation = turned(state.rotation, state.spin * h);
     Some(state)
+}
+
+/// A rotation turned on by a rotation vector in world axes.
+fn turned(rotation: DQuat, by: DVec3) -> DQuat {
+    if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
 }
 
 impl Audit {
@@ -151,79 +132,33 @@ fn rigid(
     sum.angular += state.position.cross(state.velocity) * mass + angular_momentum;
 }
 
+/// Adds a tube as it published itself: what is in flight to it counts as in flight alone.
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
-    let response = member.snapshot.inertia.response();
-    let curve = response.and_then(|response| Some((response, response.curve()?.spins())));
-    let Some((inertia, spins)) = curve else { return without_impulses(sum, member, state) };
-    let mut pushed = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
-    let (mut carried, mut delivered) = (pushed.clone(), DVec3::ZERO);
-    in_flight(member, members, |_, site, dj, moved| {
-        sum.add_in_flight(dj);
-        let Site::Arc(arc_m) = site else { return };
-        let Some((segment, share)) = state.locate(arc_m) else { return };
-        delivered += dj.linear;
-        for (list, impulse) in [(&mut pushed, dj), (&mut carried, moved)] {
-            list[2 * segment] += impulse.linear * (1.0 - share);
-            list[2 * segment + 2] += impulse.linear * share;
-            list[2 * segment + 1] += impulse.angular;
-        }
-    });
-    if inertia.slots() == pushed.len() {
-        let supported = is_borne(inertia.supports(), pushed.iter().step_by(2).sum());
-        inertia.respond(&mut pushed, supported);
-        inertia.respond(&mut carried, supported);
-    }
-    let before = Motion::of(member, state, |k| state.velocities[k], |k| spins.get(k).copied().unwrap_or_default());
-    let shifted = |k: usize| state.positions[k] + carried[2 * k];
-    let velocity = |k: usize| state.velocities[k] + pushed[2 * k];
-    let spin = |k: usize| spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
-    let moved = CurveState { positions: (0..state.positions.len()).map(shifted).collect(), ..state.clone() };
-    // the part that a spring of the tube takes belongs to the body at its far end: the sum over all bodies is that of the given impulses
-    let momentum = before.momentum + delivered;
-    let after = Motion { momentum, ..Motion::of(member, &moved, velocity, spin) };
-    after.add(sum, member.snapshot.energy_j, before.kinetic_j);
+    in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
+    let motion = Motion::of(member, state);
+    sum.energy_j += member.snapshot.energy_j;
+    sum.momentum += motion.momentum;
+    sum.angular += motion.angular;
 }
 
-/// Adds a tube that has not stepped yet, or that no agent could have touched: no impulse is in flight to it.
-fn without_impulses(sum: &mut Audit, member: &Member<'_>, state: &CurveState) {
-    let motion = Motion::of(member, state, |k| state.velocities[k], |_| DVec3::ZERO);
-    motion.add(sum, member.snapshot.energy_j, motion.kinetic_j);
-}
-
-/// Kinetic energy and momenta of a tube with its consistent mass (docs/theory/rod.md, eq. 10).
+/// Momenta of a tube with its consistent mass, as far as its nodes carry them (docs/theory/rod.md, eq. 10).
 #[derive(Debug, Clone, Copy, Default)]
 struct Motion {
-    kinetic_j: f64,
     momentum: DVec3,
     angular: DVec3,
 }
 
 impl Motion {
-    fn of(
-        member: &Member<'_>,
-        state: &CurveState,
-        velocity: impl Fn(usize) -> DVec3,
-        spin: impl Fn(usize) -> DVec3,
-    ) -> Self {
+    fn of(member: &Member<'_>, state: &CurveState) -> Self {
         let mut sum = Self::default();
         for (k, arc) in state.arc_m.windows(2).enumerate() {
-            let l = arc[1] - arc[0];
-            let (m, turned) = (member.mass_per_length_kg_m * l, member.rotary_kg_m * l);
-            let (a, b, w) = (velocity(k), velocity(k + 1), spin(k));
-            let (xa, xb, axis) = (state.positions[k], state.positions[k + 1], state.frames[k] * DVec3::Z);
-            let about = axis.dot(w);
-            sum.kinetic_j += m * (a.dot(a + b) + b.length_squared()) / 6.0;
-            sum.kinetic_j += 0.5 * turned * (w.length_squared() + about * about);
+            let m = member.mass_per_length_kg_m * (arc[1] - arc[0]);
+            let (a, b) = (state.velocities[k], state.velocities[k + 1]);
+            let (xa, xb) = (state.positions[k], state.positions[k + 1]);
             sum.momentum += (a + b) * (0.5 * m);
-            sum.angular += (xa.cross(a * 2.0 + b) + xb.cross(b * 2.0 + a)) * (m / 6.0) + (w + axis * about) * turned;
+            sum.angular += (xa.cross(a * 2.0 + b) + xb.cross(b * 2.0 + a)) * (m / 6.0);
         }
         sum
-    }
-
-    fn add(&self, sum: &mut Audit, published_j: f64, published_kinetic_j: f64) {
-        sum.energy_j += published_j + self.kinetic_j - published_kinetic_j;
-        sum.momentum += self.momentum;
-        sum.angular += self.angular;
     }
 }
 

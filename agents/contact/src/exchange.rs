@@ -4,7 +4,6 @@
 //! what is still on its way, and the part of a snapshot that others read. Never here: contacts, laws, how a body answers.
 //! Theory: docs/theory/coupling.md, eq. 1–4.
 
-use super::beside::carried;
 use super::taken::Taken;
 use crate::{Neighbour, StepContext};
 use glam::DVec3;
@@ -38,6 +37,10 @@ pub struct Exchange {
     wary: bool,
 }
 
+/// Impulses count as given at most this long before the clocks' difference explains it, seconds.
+const AHEAD_S: f64 = 0.02;
+/// An owner that has not published for so many steps, its own or the peer's, gives nothing any more.
+pub(super) const SILENT_STEPS: f64 = 3.0;
 /// The end of a step, seconds: the last part of a slow tube's (docs/theory/coupling.md, section 3).
 const END_S: f64 = 1.0 / 60.0;
 /// A part begins so much earlier or later than its share of the step.
@@ -62,7 +65,7 @@ impl Exchange {
             owned.ledger.turn(taken, around.time);
             owned.step_impulse = DVec3::ZERO;
             owned.parts.clear();
-            (owned.state.contacts, owned.state.penetration_m, owned.state.bears) = (0, 0.0, None);
+            (owned.state.contacts, owned.state.penetration_m) = (0, 0.0);
         }
     }
 
@@ -236,6 +239,17 @@ impl Owned {
         let weaker = wary && before.linear.length_squared() < now.linear.length_squared();
         self.ledger.force = if weaker { before } else { now };
     }
+}
+
+/// How far what an owner gave has carried a body with steps of `step_s` seconds: no farther than impulses carry it that are
+/// as late as they may be between two clocks.
+pub(super) fn carried(owner: &Neighbour, step_s: f64, sum: Impulse, carried: Impulse) -> Impulse {
+    let late_s = AHEAD_S + SILENT_STEPS * owner.step_s.max(step_s);
+    let bounded = |sum: DVec3, way: DVec3| {
+        let most = late_s * sum.length();
+        if way.length_squared() > most * most { way.clamp_length_max(most) } else { way }
+    };
+    Impulse { linear: bounded(sum.linear, carried.linear), angular: bounded(sum.angular, carried.angular) }
 }
 
 /// The copy that `other` keeps of what `me` has given it.

@@ -5,7 +5,7 @@
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 
-/// A joint between two rigid bodies, or between one and the world. Jointed bodies always share an island.
+/// A joint between two rigid bodies, or between one and the world. Jointed bodies are always members of one cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joint {
     /// The first body.

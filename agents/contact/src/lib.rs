@@ -1,58 +1,60 @@
-//! Interaction between agents: contact laws, the ledger between different clocks, and the prediction of a peer's motion.
+//! Interaction between agents: contact clusters, asynchronous pairs, and what an agent is.
 //!
-//! In: contacts, free velocities and how bodies respond to impulses; snapshots of neighbours. Out: impulses, and the ledgers that
-//! record them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
+//! In: bodies as members of clusters (matrices, free velocities, skins), scenes of static solids and joints; for asynchronous pairs
+//! snapshots of neighbours. Out: velocities and impulses, and the ledgers of asynchronous pairs. Never here: any model's own state, threads.
+//! Theory: `docs/theory/clusters.md`, `docs/theory/contact.md`, `docs/theory/coupling.md`.
 //!
 //! ```
-//! use glam::DVec3;
-//! use metachron_contact::{Contact, Problem, Settings, Solver};
-//! use metachron_core::ContactJacobian;
+//! use glam::{DMat3, DVec3};
+//! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
 //!
-//! let mut jacobian = ContactJacobian::default();
-//! jacobian.add_linear(0, 1.0);
-//! let (normal, back_m_s) = (DVec3::Z, DVec3::ZERO);
-//! let contact = Contact { key: 0, jacobian, normal, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, back_m_s, age_s: 0.0 };
-//! let settings = Settings { iterations: 1000, tolerance_m_s: 1e-9 };
-//! let problem = Problem { contacts: &[contact], related_keys: &[], h_s: 0.01, mobilities: &[0.5], settings };
-//! let mut velocities = [DVec3::new(2.0, 0.0, -1.0)]; // of a point of 2 kg
-//! Solver::default().solve(&problem, &mut velocities, &mut |j: &mut [DVec3]| j.iter_mut().for_each(|j| *j /= 2.0));
-//! // Coulomb: stopping 1 m/s along the normal takes 0.5 m/s from the sliding
-//! assert!((velocities[0] - DVec3::new(1.5, 0.0, 0.0)).length() < 1e-6);
+//! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
+//! let (h_s, mass_kg) = (0.01, 2.0);
+//! let inertia = DVec3::splat(mass_kg * 0.2 * 0.2 / 6.0);
+//! let blocks = [
+//!     Block { row: 0, column: 0, value: DMat3::from_diagonal(DVec3::splat(mass_kg)) },
+//!     Block { row: 1, column: 1, value: DMat3::from_diagonal(inertia) },
+//! ];
+//! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
+//! let members = [Member { blocks: &blocks, free: &free, share: 1.0, response: None }];
+//! let corner = |key, x, y| Contact {
+//!     key,
+//!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
+//!     normal: DVec3::Z,
+//!     tangents: [DVec3::X, DVec3::Y],
+//!     gap_m: 0.0,
+//!     friction: 0.3,
+//!     restitution: 0.0,
+//!     approach_m_s: 0.0,
+//!     surface_m_s: DVec3::ZERO,
+//!     owed_slip_m: DVec3::ZERO,
+//!     warm_n_s: DVec3::ZERO,
+//! };
+//! let contacts = [corner(0, -0.1, -0.1), corner(1, 0.1, -0.1), corner(2, -0.1, 0.1), corner(3, 0.1, 0.1)];
+//! let mut solver = Solver::default();
+//! let (members, rebound_from_m_s) = (&members, 9.81 * h_s);
+//! let solution = solver.solve(&Problem { h_s, members, contacts: &contacts, rows: &[], rebound_from_m_s })?;
+//!
+//! let given: DVec3 = solution.contacts_n_s.iter().sum();
+//! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
+//! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
+//! assert!(!solution.report.cut);
+//! # Ok::<(), metachron_contact::cluster::ProblemError>(())
 //! ```
 
 pub mod agent;
 pub mod audit;
-pub mod beside;
 pub mod cluster;
-pub mod contact;
-pub mod crowd;
-pub mod delassus;
 pub mod exchange;
 pub mod joint;
-pub mod knock;
-pub mod lasting;
 pub mod law;
 pub mod laws;
-pub mod mates;
-pub mod other;
-pub mod presses;
-pub mod solver;
+pub mod push_out;
 pub mod stepper;
 pub mod taken;
 pub mod tank;
 
-pub use agent::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
-pub use contact::{Contact, PUSH_OUT_SHARE};
+pub use agent::{Agent, AnchorSpring, Neighbour, StepContext};
 pub use exchange::{Exchange, acknowledged};
-pub use knock::Knock;
-pub use lasting::smooth;
-pub use law::{Law, Link, OwnershipTraits, keep_step, owns};
-pub use mates::Feet;
-pub use mates::{Far, Mate, Mates, Owner, Pulled, Search};
-pub use other::{Astray, Other, WAKE_M_S};
-pub use presses::Presses;
-pub use solver::inverse_mass;
-pub use solver::{Problem, Response, Settings, Solver, SolverReport};
-
-#[cfg(test)]
-mod tests;
+pub use law::{Law, Link};
+pub use push_out::PUSH_OUT_SHARE;

@@ -3,7 +3,7 @@
 //! In: that owner's ledger, whenever it is read. Out: a copy of it, and the force that it amounts to, which goes on between
 //! readings. Never here: how a body answers. Theory: docs/theory/coupling.md, eq. 2 and 4c.
 
-use super::beside::{SILENT_STEPS, carried};
+use super::exchange::{SILENT_STEPS, carried};
 use crate::Neighbour;
 use metachron_core::{AgentId, SimTime};
 use metachron_core::{Ahead, Impulse, Ledger, Site};

@@ -21,15 +21,14 @@
 
 pub mod body;
 mod cluster_state;
-pub mod foot;
+mod disjoint_sets;
 pub mod id;
-pub mod impulse_response;
-pub mod jacobian;
 pub mod ledger;
 pub mod pair;
-pub mod rebound;
+mod recycle;
 pub mod resolution;
 pub mod reusable_option;
+mod rotation;
 pub mod skyline_cholesky;
 pub mod snapshot;
 pub mod spatial;
@@ -43,16 +42,15 @@ pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
 };
 pub use cluster_state::{ClusterSolves, ClusterState};
-pub use foot::{Carried, Foot, Lies, Stance};
+pub use disjoint_sets::DisjointSets;
 pub use id::AgentId;
-pub use impulse_response::{CurveResponse, ImpulseResponse};
-pub use jacobian::ContactJacobian;
 pub use ledger::{Ahead, Entry, Impulse, Ledger, Page, Scheduled, Site};
 pub use pair::{PairKind, PairState};
-pub use rebound::Rebound;
+pub use recycle::recycled;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use reusable_option::ReusableOption;
-pub use snapshot::{HASH_START, Inertia, LiesOn, Snapshot, Stand, Tips, Upheld};
+pub use rotation::shortest_turn;
+pub use snapshot::{HASH_START, Inertia, Snapshot};
 pub use spatial::{InverseMass, Mat6, Twist};
 pub use sprung::Sprung;
 pub use step::{DT_MAX_S, StepError, StepReport, check_span};

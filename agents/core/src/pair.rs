@@ -1,7 +1,7 @@
 //! What a coupling between two agents does now, as its owner publishes it.
 
 use super::wave::Wave;
-use crate::{AgentId, Upheld};
+use crate::AgentId;
 
 /// How an agent's couplings act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -73,8 +73,6 @@ pub struct PairState {
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What is left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
-    /// How the other side lies on the owner, where something fixed holds the owner up there.
-    pub bears: Option<Upheld>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
     pub parasitic_kg: f64,
     /// What this end of a line sends; with wave variables both sides publish the pair.
@@ -95,7 +93,6 @@ impl PairState {
             in_flight_n_s: 0.0,
             inverse_mass_per_kg: None,
             tank_j: None,
-            bears: None,
             parasitic_kg: 0.0,
             wave: None,
         }

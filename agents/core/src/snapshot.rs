@@ -3,19 +3,9 @@
 //! In: an agent writes itself into a [`Snapshot`] that is reused (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
-mod lies;
-mod stand;
-mod tips;
-
-pub use lies::{LiesOn, Upheld};
-pub use stand::Stand;
-pub use stand::{Footprint, STANDING_M_S};
-pub use tips::Tips;
-
-use crate::{AgentId, Body, Bounds, ClusterState, Grip, ImpulseResponse, Resolution, ReusableOption, SimSpan, SimTime};
-use crate::{Ledger, Mat6, PairState, Rebound, Sprung};
+use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, ReusableOption, SimSpan, SimTime};
+use crate::{Ledger, PairState, Sprung};
 use glam::{DMat3, DQuat, DVec3};
-use std::any::Any;
 
 /// The state an agent last published, stamped with its own time.
 #[derive(Debug, Clone, Default)]
@@ -24,7 +14,7 @@ pub struct Snapshot {
     pub time: SimTime,
     /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub clock_offset: SimSpan,
-    /// How long its last step was where that was shorter than its scene wants (`Agent::longest_step`), written like its time; `None`
+    /// How long its last step was where that was shorter than its scene wants, written like its time; `None`
     /// elsewhere.
     pub shortened_step: Option<SimSpan>,
     /// Number of steps so far.
@@ -45,31 +35,12 @@ pub struct Snapshot {
     pub grips: Vec<Grip>,
     /// Whether the agent is at rest: others treat it as immovable until they wake it.
     pub at_rest: bool,
-    /// Whether a fixed solid supports it: a deformable touched one within the last second, a rigid body stands on one, or tipped within the
-    /// last second.
-    pub grounded: bool,
-    /// Whether it steps in one island with others.
-    pub shares: bool,
     /// Its smooth acceleration, m/s², without couplings and impacts. Others predict its motion by it.
     pub acceleration: DVec3,
     /// Its response to impulses.
     pub inertia: Inertia,
-    /// Its support by a fixed solid; `None` where there is none, or not on a single level.
-    pub stand: Option<Stand>,
-    /// Its tipping about an edge or a corner that a fixed solid supports; none where it does not tip.
-    pub tips: ReusableOption<Tips>,
-    /// Seconds of free flight until a fixed solid may be in its way, ≥ 0; `None` where there is none soon, and where it is not
-    /// reported: the body is supported, or held by others.
-    pub lands_s: Option<f64>,
     /// Forces and stiffness of the springs from driven points on it; none without such springs, or where no other agent needs them.
     pub sprung: ReusableOption<Sprung>,
-    /// Impulses of fixed solids in its last step: it was not in contact before, and late impulses of others may have averted them.
-    pub rebound: ReusableOption<Rebound>,
-    /// The agent on which it rests, where a fixed solid supports that one.
-    pub lies: ReusableOption<LiesOn>,
-    /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by
-    /// impulses (N·s, N·m·s); none where it shares none, or where a fixed solid holds that island.
-    pub within: ReusableOption<Mat6>,
     /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// Impulses given to others, in couplings that it owns.
@@ -87,7 +58,7 @@ pub struct Snapshot {
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
 #[derive(Debug, Clone, Default)]
 pub enum Inertia {
-    /// Immovable.
+    /// Immovable, or what impulses do is not published.
     #[default]
     Immovable,
     /// A rigid body about its centre of mass.
@@ -97,32 +68,6 @@ pub enum Inertia {
         /// 1/(kg·m²), world axes.
         inverse_inertia: DMat3,
     },
-    /// A deformable: the factor of its own step.
-    Deformable(Box<dyn ImpulseResponse>),
-}
-
-impl Inertia {
-    /// The response of a deformable; `None` of any other body.
-    #[must_use]
-    pub fn response(&self) -> Option<&dyn ImpulseResponse> {
-        match self {
-            Self::Deformable(response) => Some(response.as_ref()),
-            _ => None,
-        }
-    }
-
-    /// A model's own response to write into, keeping its storage when it is one of that type already.
-    pub fn response_mut<R: ImpulseResponse + Default>(&mut self) -> &mut R {
-        if !matches!(self, Self::Deformable(response) if (response.as_ref() as &dyn Any).is::<R>()) {
-            *self = Self::Deformable(Box::<R>::default());
-        }
-        match self {
-            Self::Deformable(response) => {
-                (response.as_mut() as &mut dyn Any).downcast_mut().expect("of this type since above")
-            }
-            _ => unreachable!("made a deformable above"),
-        }
-    }
 }
 
 impl Snapshot {
@@ -131,14 +76,9 @@ impl Snapshot {
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
-        (self.at_rest, self.shares, self.acceleration, self.bounds) = (false, false, DVec3::ZERO, None);
-        (self.stand, self.grounded) = (None, false);
-        self.tips.set(None);
+        (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
         self.drift_m = 0.0;
         self.sprung.set(None);
-        self.rebound.set(None);
-        self.lies.set(None);
-        self.within.set(None);
         self.pairs.clear();
         self.cluster = None;
         self.bonds.clear();
@@ -162,10 +102,6 @@ impl Snapshot {
         self.body.is_finite()
             && self.acceleration.is_finite()
             && self.sprung.get().is_none_or(Sprung::is_finite)
-            && self.rebound.get().is_none_or(Rebound::is_finite)
-            && self.lies.get().is_none_or(LiesOn::is_finite)
-            && self.within.get().is_none_or(Mat6::is_finite)
-            && self.tips.get().is_none_or(Tips::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

@@ -50,14 +50,6 @@ impl Mat6 {
         }
     }
 
-    /// Adds g m gᵀ: the scalar `m` along the direction `g`.
-    pub fn add_outer(&mut self, g: Twist, m: f64) {
-        let g = flat(g);
-        for (row, a) in self.0.iter_mut().zip(g) {
-            row.iter_mut().zip(g).for_each(|(x, b)| *x += m * a * b);
-        }
-    }
-
     /// Adds stiffness against rotation across the arm `r`; about every axis where the arm has zero length.
     pub fn add_turning(&mut self, r: DVec3, stiffness: f64) {
         let axis = r.normalize_or_zero();

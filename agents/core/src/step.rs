@@ -53,12 +53,6 @@ pub enum StepError {
         /// The longest substep at which the integrator is stable, in seconds.
         limit_s: f64,
     },
-    /// The model cannot step other agents in an island of its own. State: untouched.
-    #[error("agents of model {model} cannot step other agents in an island")]
-    Alone {
-        /// The model's name.
-        model: &'static str,
-    },
 }
 
 /// The longest step any model takes, in seconds: past it a real-time agent no longer follows its scene.

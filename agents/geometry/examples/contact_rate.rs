@@ -82,7 +82,7 @@ fn time(what: &str, size: u32, mut search: impl FnMut(&mut NarrowPhaseScratch, &
 
 /// The search of a tube that is wound up in turns that touch.
 fn coil(segments: u32) -> impl FnMut(&mut NarrowPhaseScratch, &mut Vec<Touch>) {
-    let kind = ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 };
+    let kind = ShapeKind::Chain;
     let form = CollisionShape { kind, friction: 0.5, restitution: 0.0 };
     let node = |i: u32| {
         let angle = 0.25 * f64::from(i);
@@ -138,9 +138,7 @@ fn sheet(cells: u32) -> (CollisionShape, Vec<DVec3>) {
         triangles: triangles.into(),
         radius_m: RADIUS_M,
         edge_m: 1.14 * CELL_M,
-        height_j_kg: 0.0,
         closed: false,
-        held: false,
     };
     (CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }, points)
 }

@@ -1,7 +1,7 @@
 //! Strands: balls along a polyline, joined by spans, and the facing points of two of them.
 //!
 //! In: nodes with radii. Out: feet of nodes, facing points, gaps. Never here: the choice of pairs, motion.
-//! Theory: `docs/theory/contact.md`, eq. 18.
+//! Theory: `docs/theory/contact.md`, eq. 4.
 
 use super::signed_distance::{Ball, Touch};
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! The shape of an agent as its peers need it for contact, and its placement.
+//! The shape of an agent as others need it for contact, and its placement.
 //!
 //! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, fixed for an agent's life and shared, and [`PlacedShape`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
@@ -6,7 +6,6 @@
 use super::narrow_phase::{TouchKey, VoronoiRegions};
 use crate::{Aabb, ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
-use metachron_core::ContactJacobian;
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
 
@@ -21,62 +20,13 @@ pub struct CollisionShape {
     pub restitution: f64,
 }
 
-impl CollisionShape {
-    /// How many ends of a tube are held in place; zero for anything else.
-    #[must_use]
-    pub const fn held_ends(&self) -> u8 {
-        if let ShapeKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
-    }
-
-    /// Whether it is a thin soft body that is held somewhere: a hanging or stretched sheet or rope.
-    #[must_use]
-    pub const fn is_hung(&self) -> bool {
-        matches!(&self.kind, ShapeKind::Surface(SurfaceShape { held: true, closed: false, .. }))
-    }
-
-    /// Whether it is deformable and held somewhere.
-    #[must_use]
-    pub const fn is_held(&self) -> bool {
-        match &self.kind {
-            ShapeKind::Chain { held_ends, .. } => *held_ends > 0,
-            ShapeKind::Surface(surface) => surface.held,
-            ShapeKind::Solid(_) | ShapeKind::Tool(_) => false,
-        }
-    }
-
-    /// The height of a deformable at the start, −g·x, J/kg: that of its middle, or of its lowest point where it is held; zero for a rigid
-    /// body or tool. Of two deformables that keep the same rate the higher one owns the pair (docs/decisions/0019).
-    #[must_use]
-    pub const fn height_j_kg(&self) -> f32 {
-        match &self.kind {
-            ShapeKind::Chain { height_j_kg, .. } => *height_j_kg,
-            ShapeKind::Surface(surface) => surface.height_j_kg,
-            ShapeKind::Solid(_) | ShapeKind::Tool(_) => 0.0,
-        }
-    }
-}
-
-/// The height of a deformable at its start, J/kg ([`CollisionShape::height_j_kg`]). One that is `held` counts as high as its lowest point: a body
-/// that it would support starts there.
-pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
-    let heights = || positions.iter().map(|position| -gravity.dot(*position));
-    let height =
-        if held { heights().fold(f64::INFINITY, f64::min) } else { heights().sum::<f64>() / positions.len() as f64 };
-    height as f32
-}
-
 /// The kinds of shapes.
 #[derive(Debug, Clone)]
 pub enum ShapeKind {
     /// A rigid solid.
     Solid(SolidShape),
     /// A tube: cone-capsules between nodes, at its own radius.
-    Chain {
-        /// How many of its ends are held in place, 0 … 2.
-        held_ends: u8,
-        /// See [`CollisionShape::height_j_kg`].
-        height_j_kg: f32,
-    },
+    Chain,
     /// A tool: the placement of its parts depends on the jaw opening.
     Tool(ToolShape),
     /// The skin of a soft body: triangles and edges between vertices that move.
@@ -96,17 +46,13 @@ pub struct SurfaceShape {
     pub radius_m: f64,
     /// Mean length of its edges at rest, metres.
     pub edge_m: f64,
-    /// See [`CollisionShape::height_j_kg`].
-    pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
-    /// Whether it is held somewhere.
-    pub held: bool,
     /// The neighbours of each vertex and edge.
     pub fans: Arc<VoronoiRegions>,
 }
 
-/// A solid as peers touch it.
+/// A solid as others touch it.
 #[derive(Clone)]
 pub struct SolidShape {
     /// The solid.
@@ -259,28 +205,25 @@ impl SolidShape {
         let radius_m = f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local);
         Ok(Self { solid, shape, com_local, radius_m })
     }
-}
 
-impl Place {
-    /// Adds the velocity of this point, with the sign of its `side`, to the sum in `slots`. The body's slots begin at `base`: the velocity of
-    /// its centre and its spin, a tube's nodes and segments in turn, or a soft body's vertices.
-    pub fn join(&self, slots: &mut ContactJacobian, base: u32, centre: DVec3, side: ContactSide) {
-        let ContactSide { outward, sign } = side;
-        match *self {
-            Self::Point(point) => {
-                slots.add_linear(base, sign);
-                slots.add_angular(base + 1, (point - centre) * sign);
-            }
-            Self::Chain { segment, share, radius_m } => {
-                slots.add_linear(base + 2 * segment, sign * (1.0 - share));
-                slots.add_linear(base + 2 * segment + 2, sign * share);
-                slots.add_angular(base + 2 * segment + 1, outward * (radius_m * sign));
-            }
-            Self::Surface { vertices, shares } => {
-                for (vertex, share) in vertices.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
-                    slots.add_linear(base + vertex, sign * share);
-                }
-            }
+    /// The form of a solid that moves, with its centre of mass at `com_local`: a mesh counts as its convex parts
+    /// (a closed one that is not convex, divided by V-HACD) or as its hull.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for an invalid solid.
+    pub fn moving(solid: &Solid, com_local: DVec3) -> Result<Self, ShapeError> {
+        let shape = solid.to_moving_shape()?;
+        let convex = shape.as_compound().is_none_or(|parts| parts.shapes().len() == 1);
+        let mut radius_m = solid.radius_about_m(com_local);
+        if !convex {
+            // voxels stick out of the mesh a little
+            let ball = shape.compute_local_bounding_sphere();
+            radius_m = radius_m.max(f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local));
         }
+        let solid = match solid {
+            Solid::Mesh { points_m, .. } if convex => Solid::Hull { points_m: points_m.clone() },
+            solid => solid.clone(),
+        };
+        Ok(Self { solid, shape, com_local, radius_m })
     }
 }

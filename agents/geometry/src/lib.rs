@@ -1,7 +1,7 @@
 //! Shapes without physics: solids, skeleton curves, meshes and their levels, and the contact points between collision shapes.
 //!
 //! In: solids, curves and meshes in their poses. Out: gaps and contact points, signed distances, closest points, triangles,
-//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 12–14.
+//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 1–12.
 //!
 //! ```
 //! use glam::{DQuat, DVec3};
@@ -47,7 +47,7 @@ pub mod topology;
 pub use aabb::Aabb;
 pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
-    CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch, height_j_kg,
+    CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
@@ -67,9 +67,6 @@ pub use topology::is_closed;
 pub use topology::{Branch, branch};
 
 pub use tool::{ToolPart, ToolShape};
-
-/// Ways out of a solid whose cosine is below this have none in common: what starts inside would be torn apart on them.
-pub const PARTED: f64 = 0.5;
 
 #[cfg(test)]
 mod signed_distance_tests;

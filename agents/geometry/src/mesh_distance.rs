@@ -1,6 +1,6 @@
 //! Distances from a triangle mesh: the walls that a ball touches, and the convex edges that a span touches.
 //!
-//! A surface point counts in addition to a nearer one only if it is in front of the nearer one's tangent plane (eq. 13): a flat floor of
+//! A surface point counts in addition to a nearer one only if it is in front of the nearer one's tangent plane (eq. 2): a flat floor of
 //! many triangles gives one contact, a corner gives one per wall, and the far side of a thin plate none.
 //! The normals decide on which side a point is; a mesh is also detected from behind, as deep as the search reaches.
 
@@ -97,7 +97,7 @@ impl MeshField {
         });
     }
 
-    /// Every wall within `reach_m` of `centre`, nearest first (eq. 13).
+    /// Every wall within `reach_m` of `centre`, nearest first (eq. 2).
     pub fn touches(&self, centre: DVec3, reach_m: f64, found: &mut Touches) {
         let mut planes = [(DVec3::ZERO, DVec3::ZERO); crate::signed_distance::TOUCHES_MAX];
         let mut count = 0;

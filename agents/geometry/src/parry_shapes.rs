@@ -63,6 +63,25 @@ pub struct Triangles {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Triangles {
+    /// The volume that a closed surface encloses, m³; negative where its triangles face inwards.
+    #[must_use]
+    pub fn volume_m3(&self) -> f64 {
+        // about a point near the surface: far from the origin the differences would lose digits
+        let near = self.points[self.triangles[0][0] as usize];
+        let corners = self.triangles.iter().map(|t| t.map(|i| self.points[i as usize] - near));
+        corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+    }
+
+    /// Whether it is closed with outward triangles: only then it has an inside with mass.
+    #[must_use]
+    pub fn encloses(&self) -> bool {
+        is_closed(self) && self.volume_m3() > 0.0
+    }
+}
+
+/// A mesh whose hull has at most this many times its volume counts as convex.
+const HULL_EXCESS: f64 = 1.02;
 /// Below this fraction of its longest edge's square a triangle's area counts as zero (single precision resolves 1e-7).
 const AREA_SHARE_MIN: f64 = 1e-9;
 /// Below this fraction of its size cubed a hull's volume counts as zero.
@@ -104,6 +123,23 @@ impl Solid {
                     .map_err(|_| ShapeError::EmptyMesh { triangles: triangles.len() })?
             }
         })
+    }
+
+    /// The shape of a moving solid: that of [`Self::to_shared_shape`], but a mesh as its convex parts.
+    ///
+    /// A closed mesh that is not convex is divided (V-HACD, 64³ voxels, concavity 0.01): corners in hollows are rounded by about a
+    /// sixty-fourth of its size. Any other mesh counts as its hull.
+    ///
+    /// # Errors
+    /// As [`Self::to_shared_shape`].
+    pub(crate) fn to_moving_shape(&self) -> Result<SharedShape, ShapeError> {
+        let Self::Mesh { points_m, triangles } = self else { return self.to_shared_shape() };
+        let mesh = mesh_triangles(points_m, triangles)?;
+        if mesh.encloses() && hull_triangles(points_m)?.volume_m3() > HULL_EXCESS * mesh.volume_m3() {
+            let points: Vec<_> = mesh.points.iter().map(|p| p.as_vec3()).collect();
+            return Ok(SharedShape::convex_decomposition(&points, &mesh.triangles));
+        }
+        Self::Hull { points_m: points_m.clone() }.to_shared_shape()
     }
 
     /// Checks that every length of the solid is finite and above zero, and every point finite.

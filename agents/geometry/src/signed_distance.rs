@@ -1,7 +1,7 @@
 //! Signed distance and normal of a static solid: the geometry of contact with obstacles.
 //!
 //! In: an [`Obstacle`], balls and spans between balls. Out: the points where they touch it, or nearly do.
-//! Never here: velocities, forces. Theory: `docs/theory/contact.md`, eq. 12–14.
+//! Never here: velocities, forces. Theory: `docs/theory/contact.md`, eq. 1–3.
 
 use super::mesh_distance::MeshField;
 use super::parry_shapes::{hull_triangles, mesh_triangles};
@@ -19,7 +19,7 @@ pub struct Touch {
 
 impl Touch {
     /// Whether the surface point touched by the inner `ball` of a span is behind the tangent plane of this one, which the span's `end`
-    /// already touches (eq. 13).
+    /// already touches (eq. 2).
     pub fn hides(self, end: Ball, ball: Ball, touch: Self) -> bool {
         let wall = end.centre - self.normal * self.distance_m;
         let place = ball.centre - touch.normal * touch.distance_m;
@@ -186,32 +186,9 @@ impl Field {
         found
     }
 
-    /// Removes from the displacement `way`, by which a ball of `radius_m` arrived at `centre`, the part that moved it into this solid, or
-    /// deeper.
-    pub fn hold_back(&self, centre: &mut DVec3, way: DVec3, radius_m: f64) {
-        let came_to = *centre;
-        for touch in self.touches(came_to, radius_m).iter() {
-            let gap_m = touch.distance_m - radius_m;
-            let before_m = gap_m - way.dot(touch.normal);
-            // a correction at one contact point counts for others with the same normal
-            let now_m = gap_m + (*centre - came_to).dot(touch.normal);
-            *centre += touch.normal * (before_m.min(0.0) - now_m).max(0.0);
-        }
-    }
-
     /// Whether the inside of a span can come nearer than both of its ends: never with an infinite plane.
     pub fn needs_span_tests(&self) -> bool {
         !matches!(self.kind, Kind::Plane)
-    }
-
-    /// Whether `ball` displaced by `way` stays farther than `slack_m` from this solid. Always false for a mesh.
-    pub fn is_missed(&self, ball: Ball, way: DVec3, slack_m: f64) -> bool {
-        if matches!(self.kind, Kind::Mesh(_)) {
-            return false;
-        }
-        let end = Ball { centre: ball.centre + way, ..ball };
-        let clear = |at: Ball| self.nearest(at.centre).distance_m - at.radius_m > slack_m;
-        clear(end) && self.lowest([ball, end], slack_m).is_none()
     }
 
     /// The contact point where the inside of a span comes nearer than its ends, and its fraction of the span; `None` where the contact
@@ -275,7 +252,7 @@ impl Field {
         Some(Touch { distance_m: least.distance_m - slack_m, ..least })
     }
 
-    /// The lowest point of the convex function gap(s) inside a span, at the intersection of tangents (eq. 14).
+    /// The lowest point of the convex function gap(s) inside a span, at the intersection of tangents (eq. 3).
     fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<Lowest> {
         let along = ends[1].centre - ends[0].centre;
         let at = |s: f64| {
@@ -309,7 +286,7 @@ impl Field {
         best
     }
 
-    /// The nearest surface point of a convex primitive, from outside or inside (eq. 12).
+    /// The nearest surface point of a convex primitive, from outside or inside (eq. 1).
     fn nearest(&self, point: DVec3) -> Touch {
         let local = self.rotation.conjugate() * (point - self.position);
         let (distance_m, normal) = match self.kind {

@@ -203,25 +203,3 @@ fn a_span_over_a_ridge_touches_the_ridge() {
     assert!((touch.distance_m - 0.05).abs() < 1e-12); // a few roundings
     assert!(ridge.touches_span([ball(-0.1), ball(0.3)], 0.02).is_none()); // its gap is 0.03 m
 }
-
-#[test]
-fn a_way_into_a_solid_ends_at_its_surface_and_one_out_of_it_is_whole() {
-    let solid = Solid::Box { half_extents_m: DVec3::ONE };
-    let still = Obstacle {
-        name: String::new(),
-        solid,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.0,
-        restitution: 0.0,
-    };
-    let field = Field::new(&still).unwrap();
-    // a ball of 0.1 m over the upper face: where it begins, where it gets to, and where it may stay
-    for (from, to, stays) in
-        [(1.15, 1.05, 1.1), (1.1, 0.9, 1.1), (1.08, 1.05, 1.08), (1.05, 1.07, 1.07), (1.3, 1.2, 1.2)]
-    {
-        let mut centre = DVec3::new(0.2, 0.3, to);
-        field.hold_back(&mut centre, DVec3::Z * (to - from), 0.1);
-        assert!(centre.distance(DVec3::new(0.2, 0.3, stays)) < 1e-12, "from {from} to {to}: {centre}");
-    }
-}

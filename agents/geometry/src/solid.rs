@@ -46,6 +46,22 @@ pub enum Solid {
     },
 }
 
+impl Solid {
+    /// The distance of the farthest point from `centre_m`, metres; of primitives, from their own centre. Zero for a plane.
+    pub(crate) fn radius_about_m(&self, centre_m: DVec3) -> f64 {
+        match self {
+            Self::Ball { radius_m } => *radius_m,
+            Self::Box { half_extents_m } => half_extents_m.length(),
+            Self::Capsule { radius_m, half_height_m } => radius_m + half_height_m,
+            Self::Cylinder { radius_m, half_height_m } => libm::hypot(*radius_m, *half_height_m),
+            Self::Plane => 0.0,
+            Self::Hull { points_m } | Self::Mesh { points_m, .. } => {
+                points_m.iter().map(|p| p.distance(centre_m)).fold(0.0, f64::max)
+            }
+        }
+    }
+}
+
 /// A static solid: every agent may touch it, no agent owns it.
 #[derive(Debug, Clone)]
 pub struct Obstacle {

@@ -20,8 +20,6 @@
 //! ```
 
 pub mod conformance;
-#[cfg(test)]
-mod harness;
 mod limits;
 pub mod rigid;
 pub mod rod;

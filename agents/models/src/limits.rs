@@ -2,9 +2,6 @@
 //!
 //! Never here: limits of one model alone.
 
-/// The longest part of a step in contact, with agents near or under a spring, seconds.
-pub(crate) const PART_MAX_S: f64 = 1.0 / 240.0;
-
 /// A node or vertex is quiet below this speed, m/s: a tenth of a millimetre per second is invisible on any screen.
 pub(crate) const QUIET_SPEED_M_S: f64 = 1e-4;
 /// A node or vertex is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.

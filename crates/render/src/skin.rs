@@ -243,9 +243,7 @@ mod tests {
             fans: Arc::default(),
             radius_m: 0.01,
             edge_m: 1.0,
-            height_j_kg: 0.0,
             closed: false,
-            held: false,
         };
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
         (form, SoftState { velocities: vec![DVec3::ZERO; 4], positions })
@@ -281,9 +279,7 @@ mod tests {
             fans: Arc::default(),
             radius_m: 0.0,
             edge_m: 1.0,
-            height_j_kg: 0.0,
             closed: true,
-            held: false,
         };
         let bit = |k: u32, b: u32| f64::from(k >> b & 1);
         let top = |x: f64, z: f64| z * (1.0 + x * turn_rad.tan());

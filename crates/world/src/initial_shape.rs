@@ -111,7 +111,7 @@ pub(super) fn shape(member: &Member) -> Option<StartShape> {
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
             // held ends have no effect on overlap
-            (ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
+            (ShapeKind::Chain, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {
             let body = SoftBody::new(spec.clone()).ok()?;

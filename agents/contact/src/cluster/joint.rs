@@ -4,7 +4,7 @@
 //! Theory: `docs/theory/clusters.md`, section 2.
 
 use super::side::Side;
-use crate::contact::push_out_m_s;
+use crate::push_out::push_out_m_s;
 use glam::{DMat3, DVec3};
 
 /// The directions in which a row holds, and the impulses by which it may.

@@ -5,7 +5,7 @@
 
 use super::joint::JointRow;
 use super::side::Side;
-use crate::contact::push_out_m_s;
+use crate::push_out::push_out_m_s;
 use glam::{DMat3, DVec3};
 use std::fmt;
 

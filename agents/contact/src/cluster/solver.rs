@@ -13,7 +13,7 @@ use super::problem::{Member, Problem};
 use super::rebound;
 use super::system::StepForm;
 use super::validate::validate;
-use crate::contact::PUSH_OUT_SHARE;
+use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
 
 /// What a solve aims at.

@@ -7,11 +7,13 @@
 //! has f = Z v + c. Z = k T, so the line has a mass k T² of its own. Each end publishes the time integral of the wave it sent:
 //! lost readings lose nothing, double readings repeat nothing, and averages over a step only dissipate.
 
-use crate::beside::MEETS_S;
 use glam::{DMat3, DVec3};
 use metachron_core::Wave;
 use metachron_core::{SimSpan, SimTime};
 use std::collections::VecDeque;
+
+/// A clock that goes back by more than this is another one; less is a publication that came late, seconds.
+const MEETS_S: f64 = 0.1;
 
 /// One end of a link during a step.
 #[derive(Debug, Clone, Copy)]

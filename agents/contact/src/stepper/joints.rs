@@ -12,13 +12,13 @@ use super::Participant;
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
 use super::scene::ClusterScene;
-use super::springs::{End, Name, Pull, turn_between};
+use super::springs::{End, Name, Pull};
 use super::ties::{FineStep, Ties, place_of};
 use crate::cluster::{Hold, JointRow, Side};
-use crate::contact::PUSH_OUT_MAX_M_S;
 use crate::joint::{Joint, JointKind};
+use crate::push_out::PUSH_OUT_MAX_M_S;
 use glam::{DQuat, DVec3};
-use metachron_core::Anchor;
+use metachron_core::{Anchor, shortest_turn};
 use metachron_geometry::narrow_phase::TouchKey;
 use std::f64::consts::{PI, TAU};
 
@@ -247,7 +247,7 @@ impl Joint {
         let apart = a.place(self.anchor_a_m) - b.place(self.anchor_b_m);
         let at_zero = (a.rotation * self.rest.normalize()).normalize();
         match self.kind {
-            JointKind::Fixed => Off { point: apart, turn: turn_between(at_zero, b.rotation), travel: 0.0 },
+            JointKind::Fixed => Off { point: apart, turn: shortest_turn(b.rotation, at_zero), travel: 0.0 },
             JointKind::Revolute { axis, .. } => {
                 let axis = axis.normalize_or_zero();
                 let back = self.rest.normalize().conjugate();
@@ -268,7 +268,7 @@ impl Joint {
             JointKind::Prismatic { .. } => {
                 let axis = self.axis(a, DVec3::ZERO);
                 let travel = -apart.dot(axis);
-                Off { point: apart + axis * travel, turn: turn_between(at_zero, b.rotation), travel }
+                Off { point: apart + axis * travel, turn: shortest_turn(b.rotation, at_zero), travel }
             }
             JointKind::Spring { .. } | JointKind::Rope { .. } => Off { travel: apart.length(), ..Off::default() },
         }

@@ -36,7 +36,7 @@ use joints::Joints;
 pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
-use metachron_core::{AgentId, Grip, SimSpan, StepError};
+use metachron_core::{AgentId, Grip, SimSpan, StepError, check_span, recycled};
 pub use plan::Plan;
 use progress::Progress;
 pub use scene::ClusterScene;
@@ -168,13 +168,15 @@ impl ClusterStepper {
     /// solve makes of it after, from the start of the macro step.
     ///
     /// # Errors
-    /// [`StepError::Diverged`] where the state of a member stops being finite: those that had not ended their step are as they were.
+    /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: those
+    /// that had not ended their step are as they were.
     pub fn step(
         &mut self,
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         dt: SimSpan,
     ) -> Result<ClusterReport, StepError> {
+        check_span(dt)?;
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport { dt, ..ClusterReport::default() };
@@ -406,7 +408,7 @@ impl ClusterStepper {
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
-        let mut list = emptied(std::mem::take(members));
+        let mut list = recycled(std::mem::take(members));
         let taking = all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
         list.extend(taking.map(|(one, state)| Member {
             blocks: one.member.blocks(),
@@ -418,7 +420,7 @@ impl ClusterStepper {
         let problem =
             Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, rebound_from_m_s: 0.0 };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
-        *members = emptied(list);
+        *members = recycled(list);
         let places = &mut self.places;
         places.clear();
         places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
@@ -539,11 +541,4 @@ fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option
 
 fn refused(error: &ProblemError, dt_s: f64) -> StepError {
     StepError::Diverged { model: "cluster", dt_s, what: error.to_string() }
-}
-
-/// The storage of `members` for other ones.
-fn emptied<'b>(mut members: Vec<Member<'_>>) -> Vec<Member<'b>> {
-    members.clear();
-    // nothing is left to be mapped; the standard library collects in place, so that the storage stays
-    members.into_iter().map(|_| unreachable!("cleared above")).collect()
 }

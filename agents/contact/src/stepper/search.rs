@@ -387,7 +387,7 @@ fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bo
 }
 
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
-    let bends = skins.iter().any(|skin| matches!(skin.kind, ShapeKind::Chain { .. } | ShapeKind::Surface(_)));
+    let bends = skins.iter().any(|skin| matches!(skin.kind, ShapeKind::Chain | ShapeKind::Surface(_)));
     let Facing { sides, led_m_s } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();

@@ -10,7 +10,7 @@ use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use glam::{DQuat, DVec3};
-use metachron_core::{AgentId, Anchor, Body};
+use metachron_core::{AgentId, Anchor, Body, shortest_turn};
 
 /// One end of a spring.
 #[derive(Debug, Clone, Copy)]
@@ -113,7 +113,7 @@ impl Ties {
         let law = Spring {
             stiffness_n_m: pull.stiffness_n_m * square,
             damping_n_s_m: pull.damping_n_s_m * square,
-            stretch_m: turn_between(mine.rotation, rotation * clasp.rotation),
+            stretch_m: shortest_turn(rotation * clasp.rotation, mine.rotation),
         };
         let sides = [mine.turns.of_member(member), side];
         let row = JointRow::new(u64::from(TURN), sides, Hold::ALL).with_spring(law, step.h_s);
@@ -167,10 +167,4 @@ impl Ties {
         }
         self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
     }
-}
-
-/// The shortest rotation that leads from one attitude to another's, as a rotation vector in world axes: that of `a` against `b`.
-pub(super) fn turn_between(a: DQuat, b: DQuat) -> DVec3 {
-    let turned = a * b.conjugate();
-    if turned.w < 0.0 { (-turned).to_scaled_axis() } else { turned.to_scaled_axis() }
 }

@@ -1,7 +1,7 @@
 //! Contacts of strands with strands: tubes, capsules and balls, in double precision.
 //!
 //! In: two strands. Out: the places where their spans face each other. A grid finds candidate pairs of spans in linear time.
-//! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
+//! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 4.
 
 use super::primitives::{Strand, StrandPoint};
 use super::touch_key::{TouchKey, TouchKind};
@@ -142,7 +142,7 @@ struct ReportedContact {
 }
 
 impl SpanPair<'_> {
-    /// Adds the places of the pair (eq. 18): nodes over the other's span, and the crossing where it is nearer.
+    /// Adds the places of the pair (eq. 4): nodes over the other's span, and the crossing where it is nearer.
     fn visit(&self, into: &mut Vec<Touch>) {
         let ([a, b], [i, j]) = (self.strands, self.spans);
         let (ends_a, ends_b) = (a.ends(i), b.ends(j));

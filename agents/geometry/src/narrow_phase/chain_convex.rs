@@ -1,7 +1,7 @@
 //! Contacts of strands with blocks: nodes and spans in the block's distance field, in double precision.
 //!
 //! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the ends of the stretch where a span lies flat.
-//! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
+//! Never here: parry. Theory: `docs/theory/contact.md`, eq. 1–3.
 
 use super::primitives::{Block, Strand, StrandPoint};
 use super::touch_key::{TouchKey, TouchKind};

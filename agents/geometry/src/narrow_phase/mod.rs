@@ -1,7 +1,7 @@
 //! Narrow phase: the contacts between the shapes of any two forms.
 //!
 //! In: two placed forms. Out: contacts with normals, gaps and places, each with a key that persists; the nearest gap.
-//! Never here: velocities, forces, contact ownership. Theory: `docs/theory/contact.md`, eq. 12–18.
+//! Never here: velocities, forces. Theory: `docs/theory/contact.md`.
 //!
 //! Each form is decomposed into strands (balls joined by spans: a ball, a capsule, a tube), the surfaces of soft bodies, and
 //! blocks (all the rest).
@@ -39,7 +39,7 @@ pub use static_solid::{StaticSolid, StaticSolidError};
 use surface::SurfaceScratch;
 use swept::SweptScratch;
 pub use swept::{SweptReach, SweptShape, first_touch};
-pub use touch_key::{KEY_STEPS, TouchKey, TouchKind};
+pub use touch_key::{TouchKey, TouchKind};
 pub use voronoi_regions::VoronoiRegions;
 
 /// Reusable storage for contact searches: one for each agent.

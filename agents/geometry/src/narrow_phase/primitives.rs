@@ -78,9 +78,7 @@ impl<'a> Pieces<'a> {
     pub fn of(placed: &PlacedShape<'a>, known: &'a ShapeCache) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
-            (ShapeKind::Chain { .. }, ShapePose::Chain { positions, radii_m }) => {
-                pieces.0[0] = tube(positions, radii_m)
-            }
+            (ShapeKind::Chain, ShapePose::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
             (ShapeKind::Solid(form), ShapePose::Solid { position, rotation }) => {
                 let SolidShape { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;

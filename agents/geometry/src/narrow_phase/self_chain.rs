@@ -1,7 +1,7 @@
 //! Contacts of a tube with itself: pairs of its segments in a grid, and the places where two segments face each other.
 //!
 //! In: nodes, radii and the arc lengths of the nodes at rest. Out: near pairs of segments, facing points, contacts.
-//! Never here: motion, lists that last. Theory: `docs/theory/contact.md`, eq. 15, 16 and 18.
+//! Never here: motion, lists that last. Theory: `docs/theory/contact.md`, eq. 4–6.
 
 use super::touch_key::{TouchKey, TouchKind};
 use crate::capsule_chain::{facing, foot};
@@ -59,14 +59,14 @@ struct Capsule {
     middle: DVec3,
     /// Radius of its bounding ball.
     ball_m: f64,
-    /// Rest arc length of its middle, and half the arc length within which no pairs are formed (eq. 15).
+    /// Rest arc length of its middle, and half the arc length within which no pairs are formed (eq. 5).
     arc_m: f64,
     neighbourhood_m: f64,
 }
 
 impl SegmentPairs {
     /// The pairs of segments whose surfaces may be within `reach_m` of each other, by rising numbers, the lower one first; none that are
-    /// neighbours along the tube (eq. 15, 16).
+    /// neighbours along the tube (eq. 5, 6).
     pub fn near(&mut self, chain: &RestedChain<'_>, reach_m: f64) -> impl Iterator<Item = [u32; 2]> {
         let Self { grid, capsules, pairs } = self;
         capsules.clear();
@@ -112,7 +112,7 @@ impl Capsule {
         }
     }
 
-    /// Whether two segments are so close along the tube that they overlap by its own thickness (eq. 15): a tube bent to the
+    /// Whether two segments are so close along the tube that they overlap by its own thickness (eq. 5): a tube bent to the
     /// radius of its own skin, its sharpest bend, meets itself after π r.
     fn is_neighbour(&self, other: &Self) -> bool {
         (self.arc_m - other.arc_m).abs() < self.neighbourhood_m + other.neighbourhood_m
@@ -141,7 +141,7 @@ impl RestedChain<'_> {
         i.abs_diff(j) <= 1 || capsule(i).is_neighbour(&capsule(j))
     }
 
-    /// Visits the places of a near pair whose gap is at most `margin_m` (eq. 18).
+    /// Visits the places of a near pair whose gap is at most `margin_m` (eq. 4).
     ///
     /// The nearest points alone are not enough: between parallel strands they jump from end to end at the slightest tilt,
     /// and the tube rocks for ever. Nodes and their projections stay in place.
@@ -174,7 +174,7 @@ impl RestedChain<'_> {
         }
     }
 
-    /// Where two segments are nearest (eq. 18).
+    /// Where two segments are nearest (eq. 4).
     #[must_use]
     pub fn nearest(&self, segments: [u32; 2]) -> FacingPoints {
         let [a, b] = segments.map(|k| [self.positions[k as usize], self.positions[k as usize + 1]]);

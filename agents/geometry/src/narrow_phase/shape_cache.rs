@@ -95,7 +95,7 @@ impl ShapeCache {
 /// Whether a form consists of points and spans that are looked up in the fields of others.
 fn is_strand(kind: &ShapeKind) -> bool {
     let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
-    matches!(kind, ShapeKind::Chain { .. } | ShapeKind::Surface(_))
+    matches!(kind, ShapeKind::Chain | ShapeKind::Surface(_))
         || matches!(kind, ShapeKind::Solid(SolidShape { solid, .. }) if round(solid))
 }
 

@@ -1,7 +1,7 @@
 //! Contacts of soft bodies' skins with any other piece: their vertices, edges and triangles.
 //!
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
-//! Theory: docs/theory/soft.md, eq. 15, 16.
+//! Theory: docs/theory/contact.md, eq. 7–11.
 //!
 //! A place is reported by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): what lies ahead on a flat skin is
 //! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in

@@ -47,7 +47,7 @@ fn hull(half: DVec3) -> CollisionShape {
 }
 
 fn chain() -> CollisionShape {
-    CollisionShape { kind: ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.0, restitution: 0.0 }
+    CollisionShape { kind: ShapeKind::Chain, friction: 0.0, restitution: 0.0 }
 }
 
 fn tool() -> CollisionShape {

@@ -40,19 +40,6 @@ pub enum TouchKind {
     SecondVertex,
 }
 
-/// The differences of packed keys ([`TouchKey::packed`]) of a contact between chains to those of the neighbouring segments: of the second
-/// chain, and of the first.
-pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
-
-/// Bits of a convex part's feature in a packed key, and of the part.
-const PACKED_FEATURE_BITS: u32 = 24;
-/// See [`PACKED_FEATURE_BITS`].
-const PACKED_PART_BITS: u32 = 5;
-/// Bits of the features of a mesh's triangle in a packed key.
-const PACKED_MESH_BITS: u32 = 12;
-/// Bits of the second feature of a skin in a packed key.
-const PACKED_SKIN_BITS: u32 = 20;
-
 impl TouchKey {
     /// The key of a contact of this kind between two features.
     #[must_use]
@@ -85,43 +72,7 @@ impl TouchKey {
             _ => self,
         }
     }
-
-    /// The key in one word, for solvers that keep them so. Unique for up to 2²⁰ features of a skin, 2²² of a convex part and 32 parts;
-    /// past those it may be that of another contact.
-    #[must_use]
-    pub fn packed(self) -> u64 {
-        let Self { pieces, kind, parts, features, place } = self;
-        let ([first, second], place) = (features.map(u64::from), u64::from(place));
-        let key = match kind {
-            TouchKind::Convex => {
-                let [a, b] = parts.map(|part| u64::from(part) & ((1 << PACKED_PART_BITS) - 1));
-                // parry stores the kind of a feature in the two highest bits
-                let [one, two] = features.map(|id| {
-                    let number = u64::from(id) & ((1 << (PACKED_FEATURE_BITS - 2)) - 1);
-                    u64::from(id >> 30) << (PACKED_FEATURE_BITS - 2) | number
-                });
-                let features = one << PACKED_FEATURE_BITS | two;
-                (((a << PACKED_PART_BITS | b) << (2 * PACKED_FEATURE_BITS)) | features) + place
-            }
-            TouchKind::MeshTriangle => {
-                let [triangle, part] = parts.map(u64::from);
-                let parts = triangle << 32 | part << (2 * PACKED_MESH_BITS);
-                (parts ^ (first << PACKED_MESH_BITS | second)).wrapping_add(place)
-            }
-            TouchKind::Spans => (first * KEY_STEPS[1]) | (second * KEY_STEPS[0]) | place,
-            TouchKind::SpanOnSolid => (first * KEY_STEPS[1]) | place,
-            TouchKind::Vertex => first + place,
-            TouchKind::Edge => (1 << (2 * PACKED_SKIN_BITS)) | first << PACKED_SKIN_BITS | (second + place),
-            TouchKind::Triangle => (2 << (2 * PACKED_SKIN_BITS)) | first << PACKED_SKIN_BITS | (second + place),
-            TouchKind::SecondVertex => (3 << (2 * PACKED_SKIN_BITS)) | (first + place),
-        };
-        let [a, b] = pieces.map(u64::from);
-        key | (a * super::shape_cache::PARTS as u64 + b) << PACKED_PAIR_SHIFT
-    }
 }
-
-/// Packed keys inside a pair of pieces stay below this bit.
-const PACKED_PAIR_SHIFT: u32 = 58;
 
 #[cfg(test)]
 mod tests {
@@ -138,14 +89,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn packed_keys_rise_with_the_keys_and_step_by_segments() {
-        let key = |first, second| TouchKey::new(TouchKind::Spans, [first, second]);
-        assert!(key(3, 900).packed() < key(4, 2).packed());
-        let beside = key(70, 80).beside().map(TouchKey::packed);
-        let here = key(70, 80).packed();
-        assert_eq!(beside, [here + KEY_STEPS[0], here - KEY_STEPS[0], here + KEY_STEPS[1], here - KEY_STEPS[1]]);
     }
 }

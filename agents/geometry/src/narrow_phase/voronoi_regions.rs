@@ -1,7 +1,7 @@
 //! Neighbourhoods of each vertex and edge of a skin, and which directions out of it belong to them.
 //!
 //! In: edges and triangles. Out: whether the vector from a spot to the touching point leads out of the skin, and not along it.
-//! Never here: where the vertices are. Theory: docs/theory/soft.md, eq. 15a (the Voronoi regions of (ERI05, ch. 5)).
+//! Never here: where the vertices are. Theory: docs/theory/contact.md, eq. 8 (the Voronoi regions of (ERI05, ch. 5)).
 
 use super::primitives::Surface;
 use glam::DVec3;

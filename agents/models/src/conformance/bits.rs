@@ -2,12 +2,23 @@
 //!
 //! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
-use super::{Run, Suite, too_long};
+use super::{Run, Stepping, Suite, too_long};
 use metachron_core::{SimSpan, StepError};
+
+/// Tests a promise in every way in which the agent can be stepped.
+fn stepped(suite: &Suite<'_>, kept: fn(&Suite<'_>, Stepping) -> Result<(), String>) -> Result<(), String> {
+    suite.steppings().iter().try_for_each(|&by| {
+        kept(suite, by).map_err(|what| if by == Stepping::Cluster { format!("in a cluster: {what}") } else { what })
+    })
+}
 
 /// A refused step changes no bit, neither of the state nor of the steps after it.
 pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
-    let (mut refusing, mut reference) = (suite.start(), suite.start());
+    stepped(suite, refused_span_by)
+}
+
+fn refused_span_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
+    let (mut refusing, mut reference) = (suite.start_stepped(by), suite.start_stepped(by));
     for i in 0..suite.steps.min(50) {
         let before = refusing.hash();
         for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
@@ -35,7 +46,11 @@ pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
 
 /// Two agents with the same inputs give the same bits.
 pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
-    let (mut one, mut other) = (suite.start(), suite.start());
+    stepped(suite, same_bits_by)
+}
+
+fn same_bits_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
+    let (mut one, mut other) = (suite.start_stepped(by), suite.start_stepped(by));
     for i in 0..suite.steps {
         let pulled = (suite.steps / 3..suite.steps / 2).contains(&i);
         let hands = suite.pull.filter(|_| pulled);
@@ -54,8 +69,12 @@ pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
 
 /// Steps and snapshots allocate nothing once the sizes have settled.
 pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
+    stepped(suite, allocation_by)
+}
+
+fn allocation_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
     let Some((count, allowed)) = suite.allocations else { return Ok(()) };
-    let mut run = suite.start();
+    let mut run = suite.start_stepped(by);
     let mut snapshot = run.snapshot();
     for _ in 0..suite.steps {
         run.must_step(suite.dt, suite.pull.as_slice())?;
@@ -77,13 +96,17 @@ pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
 
 /// Under any pull no state is written that is not finite: the agent reports that it has diverged, or ignores the pull.
 pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
-    let mut run = suite.start();
+    stepped(suite, finite_by)
+}
+
+fn finite_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
+    let mut run = suite.start_stepped(by);
     for i in 0..suite.steps {
         check_finite(&run).map_err(|what| format!("before step {i}: {what}"))?;
         run.must_step(suite.dt, suite.pull.as_slice())?;
     }
     for pull in &suite.absurd {
-        let mut run = suite.start();
+        let mut run = suite.start_stepped(by);
         run.must_step(suite.dt, &[])?;
         match run.step(suite.dt, &[*pull]) {
             Ok(()) | Err(StepError::Diverged { .. }) => {}

@@ -6,7 +6,7 @@
 
 use super::RigidError;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_geometry::{Solid, Triangles, hull_triangles, is_closed, mesh_triangles};
+use metachron_geometry::{Solid, Triangles, hull_triangles, mesh_triangles};
 
 /// Mass, centre and principal moments of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ impl MassDistribution {
             Solid::Hull { points_m } => Self::inside(&hull_triangles(points_m)?, mass_kg),
             Solid::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
-                let solid = if encloses(&mesh) { mesh } else { hull_triangles(points_m)? };
+                let solid = if mesh.encloses() { mesh } else { hull_triangles(points_m)? };
                 Self::inside(&solid, mass_kg)
             }
         })
@@ -63,21 +63,6 @@ impl MassDistribution {
         let (moments, axes) = principal(inertia);
         Self { mass_kg, com: near + com, moments, axes }
     }
-}
-
-/// Whether a mesh is closed with outward triangles: only then it has an inside with mass.
-pub(super) fn encloses(mesh: &Triangles) -> bool {
-    is_closed(mesh) && volume(mesh) > 0.0
-}
-
-/// The volume inside a closed surface, m³; negative where its triangles face inwards.
-pub(super) fn volume(mesh: &Triangles) -> f64 {
-    let near = mesh.points[mesh.triangles[0][0] as usize];
-    mesh.triangles
-        .iter()
-        .map(|t| t.map(|i| mesh.points[i as usize] - near))
-        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
-        .sum()
 }
 
 /// The eigenvalues of a symmetric matrix and the rotation whose columns are its eigenvectors, by Jacobi rotations.

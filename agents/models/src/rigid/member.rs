@@ -3,13 +3,13 @@
 //! In: steps and velocities. Out: its inertia, its free flight, its skin. Never here: contacts. Theory: docs/theory/clusters.md, section 9.
 
 use super::RigidBody;
-use super::company::placed;
+use super::body::{CALM_M_S, REST_S};
 use super::motion::Motion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_core::{Anchor, StepError};
-use metachron_geometry::{ContactSide, Place, PlacedShape};
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// The block of its spin; block 0 is the velocity of its centre of mass.
 const SPIN: usize = 1;
@@ -19,7 +19,7 @@ const SPIN: usize = 1;
 pub(super) struct Unknowns {
     blocks: [Block; 2],
     /// Velocity and spin at the end of the step without contact, and now.
-    free: [DVec3; 2],
+    pub(super) free: [DVec3; 2],
     now: [DVec3; 2],
     kept: Option<Kept>,
 }
@@ -28,6 +28,7 @@ pub(super) struct Unknowns {
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     motion: Motion,
+    acceleration: DVec3,
     calm_s: f64,
     at_rest: bool,
     steps: u64,
@@ -101,14 +102,14 @@ impl ClusterMember for RigidBody {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        Some(placed(&self.company.form, &self.motion))
+        let Motion { position, rotation, .. } = self.motion;
+        Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
     }
 
     fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        let mut motion = self.motion;
-        motion.position += v[0] * t_s;
-        motion.rotation = DQuat::from_scaled_axis(v[SPIN] * t_s) * motion.rotation;
-        Some(placed(&self.company.form, &motion))
+        let Motion { position, rotation, .. } = self.motion;
+        let (position, rotation) = (position + v[0] * t_s, DQuat::from_scaled_axis(v[SPIN] * t_s) * rotation);
+        Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {
@@ -133,18 +134,18 @@ impl ClusterMember for RigidBody {
     }
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        v[0].length() + v[1].length() * self.world.mover.radius_m
+        v[0].length() + v[1].length() * self.radius_m
     }
 
     fn keep(&mut self) {
-        let Self { motion, calm_s, at_rest, steps, .. } = *self;
-        self.unknowns.kept = Some(Kept { motion, calm_s, at_rest, steps });
+        let Self { motion, acceleration, calm_s, at_rest, steps, .. } = *self;
+        self.unknowns.kept = Some(Kept { motion, acceleration, calm_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
-        let Some(Kept { motion, calm_s, at_rest, steps }) = self.unknowns.kept else { return };
-        (self.motion, self.calm_s, self.at_rest, self.steps) = (motion, calm_s, at_rest, steps);
-        self.world.moved();
+        let Some(Kept { motion, acceleration, calm_s, at_rest, steps }) = self.unknowns.kept else { return };
+        (self.motion, self.acceleration, self.calm_s) = (motion, acceleration, calm_s);
+        (self.at_rest, self.steps) = (at_rest, steps);
     }
 
     fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
@@ -158,29 +159,28 @@ impl ClusterMember for RigidBody {
             self.motion = before;
             return Err(self.diverged(h_s, "the body left the coordinate range"));
         }
+        self.acceleration = (self.motion.velocity - before.velocity) / h_s;
         self.steps += 1;
         self.at_rest = false;
         self.count_calm(&before, h_s, touched);
-        self.world.moved();
         Ok(())
     }
 
     fn is_calm(&self) -> bool {
-        self.may_sleep && self.calm_s >= super::body::REST_S
+        self.may_sleep && self.calm_s >= REST_S
     }
 
     fn rest(&mut self) {
         self.at_rest = true;
         (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
-        self.world.moved();
+        self.acceleration = DVec3::ZERO;
     }
 }
 
 impl RigidBody {
     /// Counts calm time after a step from `before`.
     fn count_calm(&mut self, before: &Motion, h_s: f64, touched: bool) {
-        let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
-        let still = self.motion.velocity.length() + swing < super::body::CALM_M_S;
+        let still = self.motion.velocity.length() + self.swing_m_s() < CALM_M_S;
         // one that hovers at the top of its flight is not at rest
         let held = touched || (self.gravity == DVec3::ZERO && *before == self.motion);
         self.calm_s = if still && held { self.calm_s + h_s } else { 0.0 };

@@ -8,7 +8,6 @@
 
 use super::mass_properties::MassDistribution;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::Twist;
 
 /// Position and motion of a rigid body, about its centre of mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,15 +20,6 @@ pub(super) struct Motion {
     pub velocity: DVec3,
     /// Angular momentum about the centre of mass, world axes, kg·m²/s.
     pub angular: DVec3,
-}
-
-/// A sudden change of the velocities, and for how long springs reacted to it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct VelocityStep {
-    /// The change of velocity and spin, m/s and rad/s.
-    pub change: Twist,
-    /// How long springs reacted to it, seconds.
-    pub span_s: f64,
 }
 
 /// A part of a flight turns the body by at most this, radians: fourth order then leaves about 1e-6 rad a turn.
@@ -85,18 +75,6 @@ impl Motion {
         self.position += self.velocity * t + gravity * (0.5 * t * t);
         self.velocity += gravity * t;
         self.turn(body, t);
-    }
-
-    /// Removes kinetic energy of `per_kg` J/kg from the motion along `direction`, as far as there is any; adds some where `per_kg`
-    /// is below zero.
-    ///
-    /// A body that is kept from moving down as far as its impulses would have carried it must not keep both the height and the speed.
-    pub(super) fn slow_by(&mut self, per_kg: f64, direction: DVec3) {
-        let along = self.velocity.dot(direction.normalize_or_zero());
-        if per_kg != 0.0 && along != 0.0 {
-            let left = (along * along - 2.0 * per_kg).max(0.0).sqrt();
-            self.velocity += direction.normalize_or_zero() * (left.copysign(along) - along);
-        }
     }
 
     /// Turns freely for `t` seconds; the angular momentum in world axes stays.

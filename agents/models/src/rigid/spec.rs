@@ -1,9 +1,7 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
-use super::{Joint, JointError};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, ShapeError, Solid, StaticSolidError};
-use std::sync::Arc;
+use metachron_geometry::{ShapeError, Solid};
 
 /// A rigid body before it is built.
 #[derive(Debug, Clone)]
@@ -26,10 +24,6 @@ pub struct RigidSpec {
     pub friction: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
-    /// Solids that never move.
-    pub obstacles: Arc<[Obstacle]>,
-    /// All joints of the scene, in the order the scene gives them; those that hold this body are its own.
-    pub joints: Arc<[Joint]>,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
 }
@@ -41,12 +35,6 @@ pub enum RigidError {
     /// The solid is invalid.
     #[error("the shape of the rigid body is invalid: {0}")]
     Shape(#[from] ShapeError),
-    /// A static solid is invalid.
-    #[error(transparent)]
-    Obstacle(#[from] StaticSolidError),
-    /// A joint is invalid.
-    #[error(transparent)]
-    Joint(#[from] JointError),
     /// A plane is unbounded, so it has no mass.
     #[error("a plane cannot be a moving body; make it a static solid")]
     MovingPlane,
@@ -72,7 +60,7 @@ pub enum RigidError {
 pub(super) const REACH_MAX: f64 = 1e6;
 
 impl RigidSpec {
-    /// A solid of `mass_kg` at `position` on which nothing acts: zero velocity, no gravity, no obstacle, no joint, friction 0.5, no bounce;
+    /// A solid of `mass_kg` at `position` on which nothing acts: zero velocity, no gravity, friction 0.5, no bounce;
     /// it never reports rest.
     #[must_use]
     pub fn free(solid: Solid, position: DVec3, mass_kg: f64) -> Self {
@@ -86,8 +74,6 @@ impl RigidSpec {
             restitution: 0.0,
             friction: 0.5,
             gravity: DVec3::ZERO,
-            obstacles: Arc::new([]),
-            joints: Arc::new([]),
             sleep: false,
         }
     }
@@ -104,15 +90,7 @@ impl RigidSpec {
         vector("the velocity", self.velocity)?;
         vector("the spin", self.spin)?;
         vector("the gravity", self.gravity)?;
-        rotation("the rotation", self.rotation)?;
-        for obstacle in self.obstacles.iter() {
-            number("an obstacle's friction", obstacle.friction, (0.0, 1e3), "between 0 and 1000")?;
-            number("an obstacle's restitution", obstacle.restitution, (0.0, 1.0), "between 0 and 1")?;
-            vector("an obstacle's position", obstacle.position)?;
-            rotation("an obstacle's rotation", obstacle.rotation)?;
-        }
-        self.joints.iter().try_for_each(Joint::check)?;
-        Ok(())
+        rotation("the rotation", self.rotation)
     }
 }
 

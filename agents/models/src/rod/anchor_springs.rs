@@ -5,11 +5,9 @@
 
 use super::discretization::Discretization;
 use super::spec::Attachment;
-use super::substep::Substep;
 use super::sym3::Sym3;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_contact::{Far, Link, Pulled};
 use metachron_core::{AgentId, Anchor};
 
 /// The spring of an attachment at one node.
@@ -94,82 +92,24 @@ pub struct Tie {
     pub segment: usize,
     /// Share of the segment at which the point is, 0 … 1.
     pub share: f64,
-    /// The other end of the spring.
-    pub end: End,
-    /// Position of the other end, extrapolated back to the start of the step by its present velocity.
-    target: DVec3,
-    target_velocity: DVec3,
-    stiffness: Sym3,
-    damping: Sym3,
-    /// Factor on the force, because the other end yields (eq. 35).
-    ease: DMat3,
+    /// The spring; its target is where it is at the start of the step.
+    spring: AnchorSpring,
     /// Impulse of the spring on the tube in this step, N·s.
     pub impulse: DVec3,
-    /// The part of it from the last substep.
-    pub given: DVec3,
-    /// Resistance of the spring to a change of velocity, as it is in the factor of the last substep, kg.
-    resistance: Sym3,
-    /// Impulse taken up since then from what other agents gave, still owed to the far end, N·s.
-    taken: DVec3,
-}
-
-/// The other end of a pull.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum End {
-    /// A user spring or a tool: driven, never yields.
-    Driven,
-    /// A point of another agent, which yields.
-    Linked(Link),
 }
 
 impl Tie {
     /// The tie of a pull; `None` where it has no point on this tube or is not finite.
     pub fn new(pull: &AnchorSpring, division: &Discretization) -> Option<Self> {
-        let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
-        let tie = Self::at(pull.anchor, pull.stiffness_n_m, pull.damping_n_s_m, division)?;
-        let (target, target_velocity) = (pull.target, pull.target_velocity);
-        finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
-    }
-
-    /// The tie of a link, whose far end is set later ([`Tie::set_far_end`]); `None` where it has no point on this tube.
-    pub fn of_link(link: &Link, division: &Discretization) -> Option<Self> {
-        let tie = Self::at(link.here, link.stiffness_n_m, link.damping_n_s_m, division)?;
-        Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
-    }
-
-    fn at(anchor: Anchor, stiffness_n_m: f64, damping_n_s_m: f64, division: &Discretization) -> Option<Self> {
+        let AnchorSpring { anchor, target, target_velocity, stiffness_n_m, damping_n_s_m, .. } = *pull;
         let Anchor::Arc(arc_m) = anchor else { return None };
         let fair = |c: f64| c.is_finite() && c >= 0.0;
-        if !(arc_m.is_finite() && fair(stiffness_n_m) && fair(damping_n_s_m)) {
+        let finite = target.is_finite() && target_velocity.is_finite();
+        if !(finite && arc_m.is_finite() && fair(stiffness_n_m) && fair(damping_n_s_m)) {
             return None;
         }
         let (segment, share) = division.locate(arc_m);
-        Some(Self {
-            by: None,
-            segment,
-            share,
-            end: End::Driven,
-            target: DVec3::ZERO,
-            target_velocity: DVec3::ZERO,
-            stiffness: Sym3::identity(stiffness_n_m),
-            damping: Sym3::identity(damping_n_s_m),
-            ease: DMat3::IDENTITY,
-            impulse: DVec3::ZERO,
-            given: DVec3::ZERO,
-            resistance: Sym3::default(),
-            taken: DVec3::ZERO,
-        })
-    }
-
-    /// Sets the far end of a link for a substep; `point` is the near end at its start (eq. 35, 36).
-    pub fn set_far_end(&mut self, far: &Far, point: DVec3, substep: Substep) {
-        let Substep { start_s: start, span_s: h } = substep;
-        let End::Linked(link) = self.end else { return };
-        let spring = far.spring(&link, point);
-        (self.stiffness, self.damping) = (Sym3::of(&spring.stiffness), Sym3::of(&spring.damping));
-        (self.target, self.target_velocity) = (spring.target - far.velocity * start, far.velocity);
-        let resistance = (self.stiffness * (h * h) + self.damping * h).full();
-        self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass).inverse();
+        Some(Self { by: pull.by, segment, share, spring: *pull, impulse: DVec3::ZERO })
     }
 
     /// Interpolates a quantity given at the ends of the segment to the tied point.
@@ -178,52 +118,21 @@ impl Tie {
         a * (1.0 - self.share) + b * self.share
     }
 
-    /// Records the impulse of a substep that has ended with the point at `x` and velocity `v`, including what the tie has taken up since
-    /// the last one.
-    pub fn record(&mut self, x: DVec3, v: DVec3, substep: Substep) {
-        let h = substep.span_s;
-        self.given = self.force(x, v, substep.end_s()) * h + self.taken;
-        self.impulse += self.given;
-        (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
+    /// Records the impulse of a substep of `h` seconds that has ended `after` seconds into the step, with the point at `x` and velocity `v`.
+    pub fn record(&mut self, x: DVec3, v: DVec3, [after, h]: [f64; 2]) {
+        self.impulse += self.force(x, v, after) * h;
     }
 
-    /// The impulse of the last substep; `None` for the user's spring, which has no agent to receive it.
-    pub fn pulled(&self) -> Option<Pulled> {
-        let link = if let End::Linked(link) = self.end { Some(link) } else { None };
-        self.by.map(|by| Pulled { by, link, given: self.given })
-    }
-
-    /// Records the impulse that the tie takes up where an impulse from another agent changes the velocities at the ends of its segment
-    /// by `a` and `b`: the factor of that response includes the tie (eq. 37a).
-    pub fn absorb(&mut self, a: DVec3, b: DVec3) {
-        self.taken -= self.resistance * self.mix(a, b);
-    }
-
-    /// Continues the same tie of the step before: inherits the impulse still owed to the far end.
-    pub fn continue_from(&mut self, before: &[Self]) {
-        let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
-        self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
-    }
-
-    /// Resets the tie's share of the factor: there is a new factor without it.
-    pub fn forget(&mut self) {
-        self.resistance = Sym3::default();
-    }
-
-    /// Force on the point at `x` with velocity `v`, `after` seconds into the step, N (eq. 24, 35).
+    /// Force on the point at `x` with velocity `v`, `after` seconds into the step, N (eq. 24).
     pub fn force(&self, x: DVec3, v: DVec3, after: f64) -> DVec3 {
-        let target = self.target + self.target_velocity * after;
-        self.ease * (self.stiffness * (target - x) + self.damping * (self.target_velocity - v))
+        let AnchorSpring { target, target_velocity, stiffness_n_m, damping_n_s_m, .. } = self.spring;
+        (target + target_velocity * after - x) * stiffness_n_m + (target_velocity - v) * damping_n_s_m
     }
 
-    /// Change of a substep's impulse per change of the point's velocity: h² k + h d, kg, reduced by the yield of the far end.
+    /// Change of a substep's impulse per change of the point's velocity: h² k + h d, kg.
     #[inline]
     pub fn implicit(&self, h: f64) -> Sym3 {
-        let resistance = self.stiffness * (h * h) + self.damping * h;
-        match self.end {
-            End::Driven => resistance,
-            End::Linked(_) => Sym3::of(&(self.ease * resistance.full())),
-        }
+        Sym3::identity(self.spring.stiffness_n_m * (h * h) + self.spring.damping_n_s_m * h)
     }
 }
 

@@ -1,15 +1,11 @@
-//! The tube's linear system: symmetric, 3×3 blocks, each row coupled to the two before it; factor, solve, inverse blocks.
+//! The tube's linear system: symmetric, 3×3 blocks, each row coupled to the two before it; factor, solve.
 //!
 //! In: [`Row`]s in the interleaved order x₀, φ₀, x₁, φ₁, … x_N ("slots": node k is slot 2k, segment k slot 2k + 1).
 //! Its pairs (φ_k, x_{k+1}) are the 6×6 blocks of a block-tridiagonal matrix.
-//! Out: L D Lᵀ without square roots in O(N), one answer A⁻¹ r in O(N), the blocks of A⁻¹ inside the band in O(N).
+//! Out: L D Lᵀ without square roots in O(N), one answer A⁻¹ r in O(N).
 //! Elimination runs from both ends simultaneously, two rows in one register, and meets in the three rows in the
 //! middle: half the latency of the pivots, and half the instructions.
-//! Never here: the physical meaning of the numbers, allocation once the sizes settle. Theory: docs/theory/rod.md, eq. 15–18.
-
-mod inverse;
-
-pub use inverse::InverseBlocks;
+//! Never here: the physical meaning of the numbers, allocation once the sizes settle. Theory: docs/theory/rod.md, eq. 15–17.
 
 use super::block::{Column, Matrix, Number, Symmetric, positive};
 use super::sym3::Sym3;
@@ -157,20 +153,6 @@ impl Factor {
     /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.ends[..]) + size_of_val(&*self.middle)
-    }
-
-    /// Copies another factor into the existing storage.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.ends.clone_from(&other.ends);
-        self.middle.clone_from(&other.middle);
-    }
-
-    /// The mean of the diagonal of each slot's inverse pivot: a scale, not the inverse mass itself.
-    pub fn scales(&self) -> impl Iterator<Item = f64> {
-        let ends = self.ends[..self.pairs()].iter().map(|row| row.inverse.apart());
-        let (front, back) = (ends.clone().map(|[front, _]| front), ends.rev().map(|[_, back]| back));
-        let middle = self.middle.iter().take(self.slots()).map(|row| row.inverse);
-        front.chain(middle).chain(back).map(|inverse| inverse.mean())
     }
 
     /// Discards the factor.
@@ -330,7 +312,7 @@ mod tests {
             let rows = example(n);
             let mut factor = Factor::default();
             factor.factor(&rows).unwrap();
-            assert_eq!((factor.slots(), factor.scales().count()), (n, n));
+            assert_eq!(factor.slots(), n);
             let x: Vec<_> = (0..n).map(|i| DVec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
             let mut r = multiply(&rows, &x);
             factor.solve(&mut r);

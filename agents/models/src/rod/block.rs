@@ -120,13 +120,6 @@ impl<T: Number> Symmetric<T> {
         self.minus([entry(0, 0), entry(1, 1), entry(2, 2)], [entry(1, 2), entry(0, 2), entry(0, 1)])
     }
 
-    /// self − aᵀ b, where aᵀ b is known to be symmetric.
-    #[inline(always)]
-    pub fn minus_along(&self, Matrix(a): &Matrix<T>, Matrix(b): &Matrix<T>) -> Self {
-        let entry = |i: usize, j: usize| a[i][0] * b[j][0] + a[i][1] * b[j][1] + a[i][2] * b[j][2];
-        self.minus([entry(0, 0), entry(1, 1), entry(2, 2)], [entry(1, 2), entry(0, 2), entry(0, 1)])
-    }
-
     /// self + other.
     #[inline(always)]
     pub fn plus(&self, Self { d, o }: Self) -> Self {
@@ -156,13 +149,7 @@ pub fn positive(minors: [f64; 3]) -> bool {
     minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY)
 }
 
-impl Symmetric<f64> {
-    /// The mean of the diagonal.
-    #[inline]
-    pub fn mean(&self) -> f64 {
-        self.d.iter().sum::<f64>() / 3.0
-    }
-}
+impl Symmetric<f64> {}
 
 /// The same entry of two blocks, side by side.
 #[inline(always)]

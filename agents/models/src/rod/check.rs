@@ -2,7 +2,6 @@
 
 use super::TubeSpec;
 use glam::DVec3;
-use metachron_geometry::ShapeError;
 
 /// Why a tube cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,9 +41,6 @@ pub enum TubeError {
         /// Its valid range.
         range: &'static str,
     },
-    /// An obstacle has no shape.
-    #[error("static solid near the tube: {0}")]
-    Obstacle(#[from] ShapeError),
 }
 
 /// The sharpest turn between two chords of a path, radians: past it the smooth curve is almost a cusp.

@@ -20,19 +20,17 @@ impl Stepper {
     ) -> Result<(), Divergence> {
         self.assemble_light(now, problem, false);
         self.factor_and_solve()?;
-        self.solve_contacts(now, problem, true);
         self.advance(now, problem, true);
         self.check_finite()
     }
 
-    /// A substep of XPBD: gravity and external springs, then the constraints, then contact.
+    /// A substep of XPBD: gravity and external springs, then the constraints.
     pub(super) fn step_xpbd(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> Result<(), Divergence> {
         self.assemble_light(now, problem, true);
         self.factor_and_solve()?;
         let Self { rhs, projector, .. } = self;
         let rod = DividedRod { matter: problem.matter, division: problem.division };
         projector.project(now, rhs, rod, problem.h);
-        self.solve_contacts(now, problem, true);
         self.advance(now, problem, true);
         self.check_finite()
     }

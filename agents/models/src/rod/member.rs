@@ -10,9 +10,9 @@ use super::step::{Divergence, Setting, TURN_MAX_RAD};
 use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
-use metachron_contact::StepContext;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
@@ -36,6 +36,7 @@ struct Kept {
     rest: RestDetector,
     time: SimTime,
     quiet_before: bool,
+    acceleration: DVec3,
     at_rest: bool,
     steps: u64,
 }
@@ -74,7 +75,6 @@ impl ClusterMember for Tube {
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
-        self.dt_s = h_s;
         let solved = self.step_by(h_s, |stepper, now, setting, _| {
             let problem = whole_step(setting, h_s);
             assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut stepper.rows, &mut stepper.rhs);
@@ -110,8 +110,8 @@ impl ClusterMember for Tube {
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
         let Unknowns { places, radii_m, .. } = &self.unknowns;
-        let form = self.stepper.company.form()?;
-        (!places.is_empty()).then(|| PlacedShape { form, view: ShapePose::Chain { positions: places, radii_m } })
+        (!places.is_empty())
+            .then(|| PlacedShape { form: &self.form, view: ShapePose::Chain { positions: places, radii_m } })
     }
 
     fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
@@ -157,19 +157,21 @@ impl ClusterMember for Tube {
     }
 
     fn keep(&mut self) {
-        let Self { now, rest, time, at_rest, steps, unknowns, .. } = self;
+        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, .. } = self;
         let kept = &mut unknowns.kept;
         kept.now.copy_from(now);
         kept.rest.copy_from(rest);
         (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
+        kept.acceleration = *acceleration;
     }
 
     fn go_back(&mut self) {
-        let Self { now, rest, time, at_rest, steps, unknowns, .. } = self;
+        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, .. } = self;
         let kept = &unknowns.kept;
         now.copy_from(&kept.now);
         rest.copy_from(&kept.rest);
         (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
+        *acceleration = kept.acceleration;
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {
@@ -180,6 +182,7 @@ impl ClusterMember for Tube {
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        let before = self.momentum().0;
         let finite = self.step_by(h_s, |stepper, now, setting, _| {
             stepper.rhs.clear();
             stepper.rhs.extend_from_slice(v);
@@ -194,6 +197,7 @@ impl ClusterMember for Tube {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
         self.unknowns.places.clone_from(&self.now.x);
+        self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
         self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         self.unknowns.quiet_before = self.observe_rest(h_s);
         self.at_rest = false;
@@ -207,6 +211,7 @@ impl ClusterMember for Tube {
 
     fn rest(&mut self) {
         self.at_rest = true;
+        self.acceleration = DVec3::ZERO;
         self.stop();
     }
 

@@ -1,10 +1,9 @@
 //! Substeps of second order: BDF2 and the energy-momentum rule, used where nothing external makes velocities jump.
 //!
-//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is in contact, pulled
-//! or near peers, and where the iteration does not converge, the substep is one of implicit Euler.
+//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is pulled, and
+//! where the iteration does not converge, the substep is one of implicit Euler.
 //! Never here: implicit Euler itself ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
 
-use super::contact::Solved;
 use super::energy_momentum::fill_mean;
 use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
@@ -30,8 +29,7 @@ impl Stepper {
         problem: &SubstepProblem<'_>,
         trial: Trial,
     ) -> Result<Verdict, Divergence> {
-        let free = problem.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
-        if free {
+        if problem.ties.is_empty() {
             let converged = match problem.integrator {
                 Integrator::EnergyMomentum => self.solve_energy_momentum(now, problem),
                 _ => self.solve_bdf2(now, problem),
@@ -41,7 +39,7 @@ impl Stepper {
             if trial.bounds_turns && !(converged && self.farthest_turn(now) <= TURN_MAX_RAD) {
                 return Ok(Verdict::TooFar);
             }
-            if converged && !self.would_touch(now, problem) {
+            if converged {
                 self.past.spend(rise);
                 return Ok(Verdict::Good);
             }
@@ -204,19 +202,5 @@ impl Stepper {
             turn.x * turn.x + turn.y * turn.y + turn.z * turn.z
         };
         2.0 * libm::asin(now.q.iter().zip(&self.next.q).map(share).fold(0.0, f64::max).sqrt().min(1.0))
-    }
-
-    /// Whether the skin comes near itself or a fixed solid on the way to the next state.
-    fn would_touch(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
-        let Self { rhs, next, rows, factor, contacts, .. } = self;
-        for k in 0..now.x.len() {
-            rhs[2 * k] = (next.x[k] - now.x[k]) / problem.h;
-        }
-        for k in 0..now.q.len() {
-            rhs[2 * k + 1] = next.u[2 * k + 1];
-        }
-        let solved =
-            Solved { matter: problem.matter, division: problem.division, rows, factor, h: problem.h, first: true };
-        contacts.would_touch(&now.x, rhs, &solved)
     }
 }

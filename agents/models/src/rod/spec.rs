@@ -3,8 +3,6 @@
 use super::Integrator;
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
-use metachron_geometry::Obstacle;
-use std::sync::Arc;
 
 /// A tube, cable or rod before it is divided into segments.
 #[derive(Debug, Clone)]
@@ -48,8 +46,6 @@ pub struct TubeSpec {
     pub friction: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
-    /// Solids that never move.
-    pub obstacles: Arc<[Obstacle]>,
     /// Whether the tube may report that it is at rest.
     pub sleep: bool,
 }
@@ -144,7 +140,6 @@ impl TubeSpec {
             self_contact: false,
             friction: 0.0,
             gravity: DVec3::ZERO,
-            obstacles: [].into(),
             sleep: false,
         }
     }

@@ -4,25 +4,16 @@
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
 use super::anchor_springs::{NodeSpring, Tie};
-use super::apply_impulses::{DisplacementLimit, FactoredSystem};
-use super::banded_ldl::InverseBlocks;
 use super::banded_ldl::{Factor, Row};
-use super::company::Company;
-use super::contact::{Solved, TubeContacts, respond};
 use super::discretization::Discretization;
 use super::energy_limiter;
-use super::footing::Footing;
 use super::history::History;
-use super::horizon::Horizon;
 use super::method::Integrator;
 use super::rotation::{exp, unit};
-use super::state::{DividedRod, RodMaterial, RodState};
-use super::substep::Substep;
+use super::state::{RodMaterial, RodState};
 use super::system::{Iterate, SubstepProblem, assemble};
 use super::xpbd::Projector;
-use glam::{DMat3, DVec3};
-use metachron_contact::Presses;
-use metachron_core::Lies;
+use glam::DVec3;
 
 /// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
 pub const TURN_MAX_RAD: f64 = 0.25;
@@ -66,8 +57,6 @@ pub struct Divergence {
 #[derive(Debug, Clone, Default)]
 pub struct Stepper {
     pub(super) rows: Vec<Row>,
-    /// Contact impulses of the last substep.
-    pub(super) presses: Presses,
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
     pub(super) next: RodState,
@@ -75,18 +64,6 @@ pub struct Stepper {
     pub(super) past: History,
     pub(super) ahead: RodState,
     pub(super) projector: Projector,
-    /// Contacts of the skin.
-    pub contacts: TubeContacts,
-    /// Nearby peers.
-    pub company: Company,
-    /// The predicted next step, for slower owners.
-    pub(super) horizon: Horizon,
-    /// Supports of the tube, for others that need them.
-    pub(super) footing: Footing,
-    /// Work that contact does in the trial substep, J.
-    pushed_j: f64,
-    /// The length of the last substep, seconds.
-    pub(super) span_s: f64,
     /// Systems factored in the step for accepted substeps, iterations included: its work.
     pub(super) solves: u32,
 }
@@ -98,16 +75,6 @@ pub struct Trial {
     pub bounds_turns: bool,
     /// Whether a smaller substep may take its place.
     pub may_divide: bool,
-}
-
-/// A tube's response to impulses, as it is published.
-pub struct PublishedResponse<'a> {
-    /// The factor of the predicted step, or else of the last one.
-    pub factor: &'a Factor,
-    /// The length of the last substep, seconds.
-    pub span_s: f64,
-    /// Its supports, and the factor that includes them.
-    pub supported: Lies<'a, Factor>,
 }
 
 /// The result of a trial substep.
@@ -129,26 +96,26 @@ impl Stepper {
         let tick = setting.dt / ticks as f64;
         let (mut elapsed, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
         while elapsed < ticks {
-            let substep = Substep { start_s: tick * elapsed as f64, span_s: tick * size as f64 };
-            self.company.aim(ties, &now.x, substep);
+            let h = tick * size as f64;
             let problem = SubstepProblem {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
                 ties,
-                h: substep.span_s,
+                h,
                 until: tick * (elapsed + size) as f64,
                 integrator: setting.integrator,
             };
-            let stretched = substep.span_s * now.stretch > setting.longest_s && size > 1;
+            let stretched = h * now.stretch > setting.longest_s && size > 1;
             let solves = self.solves;
             let trial = Trial { bounds_turns: size > TURN_TICKS, may_divide: size > 1 };
             if stretched || self.attempt(now, &problem, trial)? == Verdict::TooFar {
                 (self.solves, size) = (solves, size / 2);
                 continue;
             }
-            self.accept(now, ties, substep);
-            self.remember(now, setting.integrator, ties.is_empty(), substep.span_s);
+            let until = problem.until;
+            self.accept(now, ties, [until, h]);
+            self.remember(now, setting.integrator, ties.is_empty(), h);
             (elapsed, taken) = (elapsed + size, taken + 1);
             // double again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && elapsed.is_multiple_of(2 * size) {
@@ -158,114 +125,15 @@ impl Stepper {
         Ok(taken)
     }
 
-    /// Applies to `now` what others gave: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is displaced by more than `way_m`. `ties` are
-    /// those of the step before.
-    ///
-    /// # Errors
-    /// [`Divergence`] where the system cannot be factored; `now` is then untouched.
-    pub fn receive(
-        &mut self,
-        now: &mut RodState,
-        setting: &Setting<'_>,
-        ties: &mut [Tie],
-        way_m: f64,
-    ) -> Result<(), Divergence> {
-        if self.company.received().is_empty() {
-            return Ok(());
-        }
-        self.prepare(now, setting)?;
-        let Self { company, factor, footing, contacts, .. } = self;
-        let push = company.received().push();
-        let lies = Some(&*footing).filter(|footing| footing.stance.bears(push));
-        let factor = lies.and_then(Footing::factor).unwrap_or(factor);
-        let feet = lies.map_or(&[][..], |footing| footing.stance.on_others());
-        let system = FactoredSystem { factor, ties, feet };
-        let rod = DividedRod { matter: setting.matter, division: setting.division };
-        company.received().apply(now, system, rod, DisplacementLimit { walls: contacts, way_m });
-        Ok(())
-    }
-
-    /// Factors the system of a substep about `now` where there is no factor of this division yet.
-    ///
-    /// # Errors
-    /// [`Divergence`] where it cannot be factored.
-    pub fn prepare(&mut self, now: &RodState, setting: &Setting<'_>) -> Result<(), Divergence> {
-        if self.factor.slots() == now.u.len() {
-            return Ok(());
-        }
-        let Setting { matter, division, springs, dt, substeps, integrator, .. } = *setting;
-        let h = dt / f64::from(substeps);
-        let problem = SubstepProblem { matter, division, springs, ties: &[], h, until: h, integrator };
-        match integrator {
-            Integrator::SymplecticEuler | Integrator::Xpbd => {
-                self.assemble_light(now, &problem, integrator == Integrator::Xpbd);
-            }
-            _ => assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
-        }
-        self.factor.factor(&self.rows).map_err(|slot| {
-            self.factor.forget();
-            Divergence { slot: Some(slot) }
-        })
-    }
-
     /// Discards all data by node and segment: the tube was divided anew.
     pub fn forget(&mut self) {
         self.factor.forget();
-        self.horizon.forget();
-        self.footing.stance.forget();
-        self.presses.forget();
-        self.contacts.forget();
         self.past.forget();
     }
 
     /// The factor of the last substep; without slots where the division has changed since.
     pub fn factor(&self) -> &Factor {
         &self.factor
-    }
-
-    /// The length of that substep, seconds; zero before the first.
-    pub fn span_s(&self) -> f64 {
-        self.span_s
-    }
-
-    /// The tube's response to impulses, as others are to expect it.
-    pub fn published_response(&self) -> PublishedResponse<'_> {
-        let Self { footing, horizon, factor, span_s, .. } = self;
-        let supported = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
-        PublishedResponse {
-            factor: horizon.factor().unwrap_or(factor),
-            span_s: *span_s,
-            supported: supported.filter(|(feet, _)| !feet.is_empty()),
-        }
-    }
-
-    /// Finds the supports of the tube after its last substep, where others need them (`watched`).
-    pub fn find_supports(&mut self, held: [bool; 2], watched: bool) {
-        let Self { footing, rows, contacts, company, .. } = self;
-        if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
-    }
-
-    /// Computes the effective inverse mass of the strongest contact with each touched peer, by the factor of the last substep.
-    pub fn update_inverse_masses(&mut self, held: [bool; 2]) {
-        let Self { factor, company, .. } = self;
-        company.mates_mut().weigh(factor.slots(), |impulses| respond(factor, held, impulses));
-    }
-
-    /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, in the last
-    /// substep (eq. 18); `None` where the segments have changed since, or no step was taken.
-    pub fn inverse_mass(&self, segment: usize, w: f64, matter: &RodMaterial, slots: usize) -> Option<DMat3> {
-        if self.factor.slots() != slots {
-            return None;
-        }
-        let last = 2 * segment + 3 == slots;
-        let (start, end) = (matter.held[0] && segment == 0, matter.held[1] && last);
-        // a held node does not move: the identity stands in its row of the matrix, which is no mobility
-        let (v, w) = (if start { 0.0 } else { 1.0 - w }, if end { 0.0 } else { w });
-        let mut blocks = InverseBlocks::default();
-        self.factor.inverse_blocks(&mut blocks);
-        let (a, b) = (blocks.diag[2 * segment].full(), blocks.diag[2 * segment + 2].full());
-        let across = blocks.far[2 * segment];
-        Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
     /// One trial substep, from `now` into `next`.
@@ -311,33 +179,19 @@ impl Stepper {
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
-    /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
+    /// Builds and solves the system about the iterate; leaves the change of velocities in `rhs` (eq. 11).
     fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
         assemble(problem, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
-        self.factor_and_solve()?;
-        self.solve_contacts(now, problem, first);
-        Ok(())
+        self.factor_and_solve()
     }
 
-    /// Factors and solves the assembled system, with the received impulses that act through the substep.
+    /// Factors and solves the assembled system.
     pub(super) fn factor_and_solve(&mut self) -> Result<(), Divergence> {
-        self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
         Ok(())
-    }
-
-    /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    pub(super) fn solve_contacts(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) {
-        let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
-        let solved = Solved { matter: problem.matter, division: problem.division, rows, factor, h: problem.h, first };
-        // contact is a law of whole velocities, not of their change in an iteration
-        let known = if first { &[][..] } else { &next.u[..] };
-        rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
-        *pushed_j = contacts.act(&now.x, rhs, &solved, company);
-        rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
     }
 
     /// The fastest spin in `rhs`, rad/s.
@@ -364,14 +218,10 @@ impl Stepper {
         next.strain(problem.matter, problem.division);
     }
 
-    /// Energy of `next` beyond that of `now` and the work of pulls, contact and received impulses, less rounding, J (eq. 27).
+    /// Energy of `next` beyond that of `now` and the work of pulls, less rounding, J (eq. 27).
     pub(super) fn energy_rise(&self, now: &RodState, problem: &SubstepProblem<'_>) -> f64 {
         let (before, after) = (energy(now, problem.springs), energy(&self.next, problem.springs));
-        // energy that friction removes must not be added elsewhere
-        let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
-        let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
-        work += fresh;
-        effort += fresh.abs();
+        let (mut work, mut effort) = (0.0, 0.0_f64);
         for tie in problem.ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let x = tie.mix(self.next.x[a], self.next.x[b]);
@@ -393,32 +243,23 @@ impl Stepper {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;
         }
-        if untied && self.company.is_empty() && !self.contacts.is_touching() {
+        if untied {
             self.past.record(&self.next, now, h);
         } else {
             self.past.forget();
         }
     }
 
-    /// Makes `next` the state and books the impulses of pulls and contacts.
-    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], substep: Substep) {
-        let Substep { start_s: start, span_s: h } = substep;
+    /// Makes `next` the state and books the impulses of pulls, `end` seconds into the step in a substep of `h` seconds.
+    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], [end, h]: [f64; 2]) {
         std::mem::swap(now, &mut self.next);
-        self.span_s = h;
-        self.company.received().spend();
         for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             // constraints act after the tie: its impulse belongs to the velocity before them
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
             let (x, v) = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
-            tie.record(x, v, substep);
+            tie.record(x, v, [end, h]);
         }
-        if self.company.is_watched() {
-            self.presses.note(self.contacts.impulses(), now.u.len(), h);
-        } else {
-            self.presses.forget();
-        }
-        self.company.accept(self.contacts.impulses(), ties, (now.u.len(), start, h));
     }
 }
 

@@ -1,11 +1,10 @@
 //! The tube's own estimate of its error in time, metres: some steps are repeated in twice the substeps.
 //!
 //! In: the state before a step and after it. Out: the error accumulated in a tenth of a second. Never here: errors in space
-//! ([`super::residual`]), any change of the tube's state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
+//! ([`super::residual`]), any change of the tube's state. Theory: docs/theory/control.md, eq. 31, 32.
 
 use super::anchor_springs::Tie;
 use super::banded_ldl::Factor;
-use super::company::Company;
 use super::history::History;
 use super::method::Integrator;
 use super::state::RodState;
@@ -26,8 +25,6 @@ struct FinerRun {
     state: RodState,
     past: History,
     factor: Factor,
-    /// Empty: impulses are received and given once only, in the real step.
-    company: Company,
     ties: Vec<Tie>,
 }
 
@@ -52,13 +49,9 @@ impl Doubling {
         self.schedule.begins(steps, me)
     }
 
-    /// Prepares for a step from `now`, after [`Self::begins`]. A step with peers or received impulses is not repeated: impulses are
-    /// given once only.
+    /// Prepares for a step from `now`, after [`Self::begins`].
     pub fn begin(&mut self, begins: bool, now: &RodState, ties: &[Tie], stepper: &Stepper) {
-        if !stepper.company.is_empty()
-            || !stepper.company.fresh().is_empty()
-            || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now))
-        {
+        if self.again.as_ref().is_some_and(|again| !begins && !again.fits(now)) {
             self.schedule.cancel();
         }
         if !self.schedule.is_on() {
@@ -78,13 +71,12 @@ impl Doubling {
     /// Repeats the step that has ended at `now`, made in `setting`'s substeps, with twice as many.
     pub fn end(&mut self, stepper: &mut Stepper, now: &RodState, setting: &Setting<'_>) {
         let Some(again) = self.again.as_deref_mut() else { return };
-        let touching = stepper.contacts.is_touching();
         let setting = Setting { substeps: 2 * setting.substeps, ..*setting };
         if !again.step(stepper, &setting) {
             return self.schedule.cancel();
         }
         if self.schedule.finish_step(setting.dt) {
-            self.schedule.record(farthest(&now.x, &again.state.x), order(setting.integrator, touching));
+            self.schedule.record(farthest(&now.x, &again.state.x), order(setting.integrator));
         }
     }
 }
@@ -97,25 +89,22 @@ impl FinerRun {
 
     /// Advances by a step with the tube's stepper, its memory swapped for this one's; returns whether there is a next state.
     fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> bool {
-        let Self { state, past, factor, company, ties } = self;
+        let Self { state, past, factor, ties } = self;
         let mut swap_memory = |stepper: &mut Stepper| {
             std::mem::swap(&mut stepper.factor, factor);
             std::mem::swap(&mut stepper.past, past);
-            std::mem::swap(&mut stepper.company, company);
         };
-        let span = stepper.span_s;
         swap_memory(stepper);
         let taken = stepper.step(state, setting, ties);
         swap_memory(stepper);
-        stepper.span_s = span;
         taken.is_ok()
     }
 }
 
-/// The order of the rule: in contact all of them are of first order.
-const fn order(integrator: Integrator, touching: bool) -> i32 {
+/// The order of the rule.
+const fn order(integrator: Integrator) -> i32 {
     match integrator {
-        Integrator::Bdf2 | Integrator::EnergyMomentum if !touching => 2,
+        Integrator::Bdf2 | Integrator::EnergyMomentum => 2,
         _ => 1,
     }
 }

@@ -38,13 +38,6 @@ impl Sym3 {
         Self { d: w * v, o: DVec3::new(w.y * v.z, w.x * v.z, w.x * v.y) }
     }
 
-    /// The symmetric part of a matrix.
-    #[inline]
-    pub fn of(m: &DMat3) -> Self {
-        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
-        Self { d: DVec3::new(x.x, y.y, z.z), o: DVec3::new(y.z + z.y, x.z + z.x, x.y + y.x) * 0.5 }
-    }
-
     /// The same matrix with all nine entries.
     #[inline]
     pub fn full(&self) -> DMat3 {

@@ -1,18 +1,14 @@
 //! The tube as an agent: one divided rod, its attachments, its radius, its rest.
 //!
 //! In: a [`TubeSpec`], steps, pulls, neighbours, requests for a resolution. Out: snapshots ([`super::publish`]). Never here: how a
-//! step is solved ([`super::step`]), contact with peers ([`super::company`]), the transfer of a state to another division
+//! step is solved ([`super::step`]), contact, the transfer of a state to another division
 //! ([`super::remesh`]). Theory: docs/theory/rod.md.
 
 use super::anchor_springs::{NodeSpring, Tie, springs};
 use super::check::{TubeError, check};
-use super::company::Company;
-use super::contact::TubeContacts;
 use super::discretization;
 use super::discretization::Discretization;
-use super::horizon::owns_it;
 use super::member::Unknowns;
-use super::publish::bounds;
 use super::remesh::{MeshedRod, Remesher};
 use super::rest::RestDetector;
 use super::rest_curve::RestCurve;
@@ -20,16 +16,11 @@ use super::state::{RodMaterial, RodState};
 use super::step::{Divergence, Setting, Stepper, energy};
 use super::step_doubling::Doubling;
 use super::{Section, TubeSpec};
-use glam::{DMat3, DVec3};
-use metachron_contact::beside;
-use metachron_contact::beside::has_a_say;
-use metachron_contact::crowd;
-use metachron_contact::crowd::Lately;
-use metachron_contact::smooth;
+use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
-use metachron_geometry::{CollisionShape, ShapeKind, height_j_kg};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
@@ -47,27 +38,18 @@ pub struct Tube {
     remesher: Remesher,
     springs: Vec<NodeSpring>,
     pub(super) ties: Vec<Tie>,
-    pub(super) ties_before: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
     pub(super) rest: RestDetector,
     pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
-    /// Acceleration of the centre of mass in the last step, without what others gave at its start, m/s².
+    /// The mean acceleration of its centre of mass in the last step, m/s².
     pub(super) acceleration: DVec3,
-    /// The same for each slot; empty where no peer is near.
-    pub(super) accelerations: Vec<DVec3>,
-    /// The same with the supports' response; empty without a prediction or without supports.
-    pub(super) standing_accelerations: Vec<DVec3>,
-    /// The length of the step that these predict, seconds; zero where they are those of the last one.
-    pub(super) ahead_s: f64,
+    pub(super) form: Arc<CollisionShape>,
     pub(super) resolution: Resolution,
     pub(super) time: SimTime,
     /// Own time at which its wave starts, seconds.
     wave_from_s: f64,
-    pub(super) dt_s: f64,
     pub(super) steps: u64,
-    /// Its recent support by fixed solids, and its last step length.
-    pub(super) lately: Lately,
     /// What it is in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
@@ -96,8 +78,10 @@ impl Tube {
         let matter = matter_of(&spec);
         let mut now = RodState::at_rest(&division);
         now.strain(&matter, &division);
+        let form = CollisionShape { kind: ShapeKind::Chain, friction: spec.friction, restitution: 0.0 };
         let mut tube = Self {
             resolution: nearest_resolution(resolution, &skeleton, count),
+            acceleration: spec.gravity,
             spec,
             skeleton,
             matter,
@@ -107,37 +91,18 @@ impl Tube {
             remesher: Remesher::default(),
             springs: vec![],
             ties: vec![],
-            ties_before: vec![],
             grips: vec![],
             rest: RestDetector::default(),
             doubling: Doubling::default(),
             at_rest: false,
-            acceleration: DVec3::ZERO,
-            accelerations: vec![],
-            standing_accelerations: vec![],
-            ahead_s: 0.0,
+            form: Arc::new(form),
             time: SimTime::ZERO,
             wave_from_s: 0.0,
-            dt_s: 0.0,
             steps: 0,
-            lately: Lately::default(),
             unknowns: Unknowns::default(),
         };
-        let held_ends = tube.matter.held.map(u8::from).iter().sum();
-        let height_j_kg = height_j_kg(&tube.now.x, tube.spec.gravity, held_ends > 0);
-        let kind = ShapeKind::Chain { held_ends, height_j_kg };
-        let form = CollisionShape { kind, friction: tube.spec.friction, restitution: 0.0 };
-        tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
-        tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
-        tube.prepare();
         Ok(tube)
-    }
-
-    /// Ensures that the response to impulses can be published, also before the first step.
-    /// A matrix without a factor is reported by the next step.
-    fn prepare(&mut self) {
-        let _ = self.step_by(self.dt_s, |stepper, now, setting, _| stepper.prepare(now, setting));
     }
 
     /// Passes all that the stepper works on to `act`, for a step of `dt` seconds.
@@ -147,7 +112,7 @@ impl Tube {
         act: impl FnOnce(&mut Stepper, &mut RodState, &Setting<'_>, &mut [Tie]) -> T,
     ) -> T {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
-        let substeps = self.spec.substeps.max(stepper.company.parts(dt));
+        let substeps = self.spec.substeps;
         let integrator = self.spec.integrator;
         let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
         act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s }, ties)
@@ -198,17 +163,6 @@ impl Tube {
         list
     }
 
-    /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
-    /// impulse (N·s) on it causes, within the last substep (docs/theory/rod.md, eq. 18).
-    ///
-    /// One O(N) sweep. `None` before the first step, and after a change of resolution until the next where no peer is near.
-    #[must_use]
-    pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
-        let stepped = (self.steps > 0).then_some(&self.stepper)?;
-        let (segment, share) = self.division.locate(arc_m);
-        stepped.inverse_mass(segment, share, &self.matter, self.now.u.len())
-    }
-
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
     #[must_use]
     pub fn radius_at_m(&self, arc_m: f64) -> f64 {
@@ -227,14 +181,6 @@ impl Tube {
     /// The largest radius that its skin can have, metres.
     pub(super) fn widest_m(&self) -> f64 {
         pressed_radius_m(&self.spec.section, self.spec.pressure_pa)
-    }
-
-    /// Sets the contact radii to those at the end of the step.
-    fn widen(&mut self, then: SimTime) {
-        let mut contacts = std::mem::take(&mut self.stepper.contacts);
-        let has_peers = !self.stepper.company.is_empty();
-        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_at_time_m(s, then)), has_peers);
-        self.stepper.contacts = contacts;
     }
 
     /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
@@ -261,35 +207,6 @@ impl Tube {
         StepError::Diverged { model: self.model(), dt_s, what }
     }
 
-    /// Stores the motion before a step, for [`Self::measure_accelerations`]; returns the momentum, if a peer needs it.
-    fn record_velocities(&mut self, watched: bool) -> Option<DVec3> {
-        self.accelerations.clear();
-        self.standing_accelerations.clear();
-        self.accelerations.extend(self.now.u.iter().filter(|_| watched));
-        watched.then(|| self.momentum().0)
-    }
-
-    /// Computes the accelerations to publish after a step of `dt` seconds.
-    fn measure_accelerations(&mut self, before: Option<DVec3>, context: &StepContext<'_>, dt: f64) {
-        let Some(before) = before else { return };
-        let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
-        self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
-        if self.is_foretold(context, dt) {
-            self.foretell(dt);
-            return;
-        }
-        // own contact may have been an impact; otherwise the change is the motion to expect over its implicit step
-        let lasts = !self.stepper.contacts.is_touching() && context.neighbours.iter().any(|n| owns_it(n, context));
-        for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {
-            let gained = (*u - *a) / dt;
-            *a = match slot % 2 {
-                1 => DVec3::ZERO,
-                _ if lasts => gained,
-                _ => smooth(gained, gravity),
-            };
-        }
-    }
-
     /// Whether its radius changes by itself.
     fn has_wave(&self) -> bool {
         self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0)
@@ -308,7 +225,7 @@ impl Tube {
 
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
     fn update_rest(&mut self, dt: f64) -> bool {
-        if !self.spec.sleep || self.has_wave() || !self.ties.is_empty() || !self.stepper.company.is_calm() {
+        if !self.spec.sleep || self.has_wave() || !self.ties.is_empty() {
             self.rest.wake();
             return false;
         }
@@ -350,49 +267,30 @@ impl Agent for Tube {
 
     /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
     ///
-    /// meet     impulses received, and the neighbours in reach
-    /// pulls    the springs of the user and of tools on this tube, and its links
-    /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
+    /// pulls    the springs of the user and of tools on this tube
+    /// step     substeps of its integrator (`Stepper::step`)
     /// doubling the error in time, estimated now and then
     /// grips    the mean force of each pull
     /// rest     whether it may sleep
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         self.check_substep(dt_s)?;
-        self.receive(context, dt)?;
-        self.take_pulls(context);
-        self.widen(context.time + dt);
-        let watched = self.stepper.company.is_watched();
-        let before = self.record_velocities(watched);
+        self.ties.clear();
+        self.ties.extend(context.anchor_springs().filter_map(|pull| Tie::new(&pull, &self.division)));
+        let before = self.momentum().0;
         self.stepper.solves = 0;
         let begins = self.doubling.begins(self.steps, context.me);
         self.doubling.begin(begins, &self.now, &self.ties, &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|divergence| self.diverged(divergence, dt_s))?;
-        self.stepper.update_inverse_masses(self.matter.held);
-        self.stepper.find_supports(self.matter.held, watched);
         self.repeat_step(dt_s, substeps);
         self.record_grips(dt_s);
-        self.stepper.company.close(context, dt_s);
-        self.measure_accelerations(before, context, dt_s);
-        self.foresee(context, dt_s);
+        self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * dt_s);
         self.time = context.time + dt;
-        self.lately.pass(self.stepper.contacts.is_grounded(), dt_s);
         self.steps += 1;
         self.at_rest = self.update_rest(dt_s);
         let work = self.segments() as f64 * f64::from(self.stepper.solves);
         Ok(StepReport { work, substeps, at_rest: self.at_rest })
-    }
-
-    fn observe(&mut self, dt: SimSpan, context: &StepContext<'_>) {
-        self.foresee(context, dt.as_secs_f64());
-    }
-
-    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
-        let bounds = || bounds(&self.now, self.widest_m());
-        let dt = beside::longest_step(dt, context, bounds, |n| has_a_say(n, context));
-        let Some(form) = self.stepper.company.form() else { return dt };
-        crowd::crowded(dt, context, bounds, crowd::Member::bent(self.lately, form))
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -425,12 +323,8 @@ impl Agent for Tube {
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
         self.stepper.forget();
-        self.ties.iter_mut().for_each(Tie::forget);
         self.rest.wake();
         self.at_rest = false;
-        if self.stepper.company.is_watched() {
-            self.prepare();
-        }
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -442,7 +336,7 @@ impl Agent for Tube {
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
-        self.stepper.company.form().cloned()
+        Some(self.form.clone())
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {

@@ -1,4 +1,4 @@
-//! Size of a tube's step: the memory it works on, and its contacts.
+//! Size of a tube's step: the memory it works on.
 //!
 //! Out: numbers for benchmarks. Never here: time.
 
@@ -7,19 +7,13 @@ use super::discretization::Discretization;
 use super::state::RodState;
 
 impl Tube {
-    /// Bytes that a step reads and writes, contacts excluded: the state and the next one, the division, the linear
+    /// Bytes that a step reads and writes: the state and the next one, the division, the linear
     /// system and its factor.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
         let stepper = &self.stepper;
         let system = size_of_val(&stepper.rows[..]) + size_of_val(&stepper.rhs[..]) + stepper.factor().bytes();
         of_state(&self.now) + of_state(&stepper.next) + of_division(&self.division) + system
-    }
-
-    /// Number of contacts of the last substep: with itself, with fixed solids, and with peers.
-    #[must_use]
-    pub fn contacts(&self) -> usize {
-        self.stepper.contacts.impulses().count()
     }
 }
 

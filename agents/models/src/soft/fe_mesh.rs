@@ -263,8 +263,8 @@ impl FeMesh {
         self.edges.iter().map(share).fold(0.0, f64::max)
     }
 
-    /// The skin, as peers touch it, of a body that starts at `height_j_kg` (see [`SurfaceShape`]).
-    pub fn surface(&self, height_j_kg: f32) -> SurfaceShape {
+    /// The skin, as others touch it.
+    pub fn surface(&self) -> SurfaceShape {
         let mut on = vec![false; self.rest.len()];
         self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
         let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
@@ -275,9 +275,7 @@ impl FeMesh {
             edges: self.edges.clone().into(),
             triangles: self.triangles.clone().into(),
             radius_m: self.radius_m,
-            height_j_kg,
             closed: !self.hexahedra.is_empty(),
-            held: self.held.contains(&true),
             fans: VoronoiRegions::of(&self.edges, &self.triangles).into(),
         }
     }

@@ -1,11 +1,12 @@
 //! A soft body in a contact cluster: one block for each vertex that is not held.
 //!
 //! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
-//! Theory: docs/theory/soft.md, eq. 1–4; docs/theory/clusters.md, section 9.
+//! Theory: docs/theory/soft.md, eq. 1–3; docs/theory/clusters.md, section 9.
 
 use super::body::SoftBody;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
+use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
@@ -30,6 +31,7 @@ struct Kept {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
     turns: Vec<DQuat>,
+    acceleration: DVec3,
     quiet_s: f64,
     at_rest: bool,
     steps: u64,
@@ -68,7 +70,6 @@ impl ClusterMember for SoftBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         self.ties.clear();
-        self.given.clear();
         self.predict(h_s).map_err(|what| self.diverged(what, h_s))?;
         let Self { system, free, velocities, positions, unknowns, .. } = self;
         let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
@@ -98,14 +99,14 @@ impl ClusterMember for SoftBody {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(&self.positions) })
+        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(&self.positions) })
     }
 
     fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
         let moved = |row: Option<u32>| row.map_or(DVec3::ZERO, |row| v[row as usize] * t_s);
         nodes.clear();
         nodes.extend(self.positions.iter().zip(self.system.rows()).map(|(at, row)| *at + moved(*row)));
-        Some(PlacedShape { form: &self.contacts.form, view: ShapePose::Surface(nodes) })
+        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {
@@ -133,6 +134,7 @@ impl ClusterMember for SoftBody {
         kept.velocities.clone_from(&self.velocities);
         kept.turns.clear();
         kept.turns.extend(self.mesh.turns());
+        kept.acceleration = self.acceleration;
         (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
     }
 
@@ -141,6 +143,7 @@ impl ClusterMember for SoftBody {
         self.positions.clone_from(&kept.positions);
         self.velocities.clone_from(&kept.velocities);
         self.mesh.set_turns(&kept.turns);
+        self.acceleration = kept.acceleration;
         (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
     }
 
@@ -156,6 +159,7 @@ impl ClusterMember for SoftBody {
             self.positions.clone_from(&self.unknowns.start);
             return Err(self.diverged("a vertex left the coordinate range", h_s));
         }
+        let before = self.linear_momentum();
         let Self { system, velocities, unknowns, .. } = self;
         for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
             *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
@@ -164,6 +168,7 @@ impl ClusterMember for SoftBody {
             .iter()
             .zip(&unknowns.now)
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
+        self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;
         self.steps += 1;
@@ -176,6 +181,7 @@ impl ClusterMember for SoftBody {
 
     fn rest(&mut self) {
         self.at_rest = true;
+        self.acceleration = DVec3::ZERO;
         self.velocities.fill(DVec3::ZERO);
     }
 

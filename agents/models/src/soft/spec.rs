@@ -2,8 +2,6 @@
 
 use super::grid::Side;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, StaticSolidError};
-use std::sync::Arc;
 
 /// A soft body before it is built.
 #[derive(Debug, Clone)]
@@ -24,8 +22,6 @@ pub struct SoftSpec {
     pub friction: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
-    /// Solids that never move.
-    pub obstacles: Arc<[Obstacle]>,
     /// Whether it may report that it is at rest.
     pub sleep: bool,
 }
@@ -117,9 +113,6 @@ pub enum SoftError {
         /// The side's name.
         side: &'static str,
     },
-    /// A static solid is invalid.
-    #[error(transparent)]
-    Obstacle(#[from] StaticSolidError),
 }
 
 /// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.

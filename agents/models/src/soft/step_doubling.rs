@@ -1,7 +1,7 @@
 //! A soft body's own estimate of its error in time, metres: from time to time steps are repeated with twice the substeps.
 //!
 //! In: the body before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
-//! ([`crate::soft::fe_mesh`]), any change of its state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
+//! ([`crate::soft::fe_mesh`]), any change of its state. Theory: docs/theory/control.md, eq. 31, 32.
 
 use super::anchor_springs::VertexSpring;
 use super::body::SoftBody;
@@ -24,16 +24,12 @@ pub(super) struct Doubling {
 
 impl SoftBody {
     /// Repeats the coming step of `dt` seconds with twice the substeps of the last one, in parallel to the state, where it is the turn
-    /// of the body `me`; returns the number of substeps. Steps under contact or impulses of peers are made once, as their impulses are
-    /// given once.
+    /// of the body `me`; returns the number of substeps.
     pub(super) fn repeat_step(&mut self, me: AgentId, dt: f64) -> u32 {
         let Self { doubling, positions, velocities, ties, .. } = self;
         if doubling.watch.begins(self.steps, me) {
             doubling.finer[0].clone_from(positions);
             doubling.finer[1].clone_from(velocities);
-        }
-        if !(self.company.mates().is_empty() && self.given.is_empty()) {
-            doubling.watch.cancel();
         }
         if !doubling.watch.is_on() {
             return 0;
@@ -63,7 +59,6 @@ impl SoftBody {
         if self.predict(h).is_err() {
             return false;
         }
-        self.solve_contacts(h);
         let Self { positions, velocities, free, ties, .. } = self;
         velocities.clone_from(free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);

@@ -46,11 +46,6 @@ impl System {
         }
     }
 
-    /// Number of vertices.
-    pub const fn vertices(&self) -> usize {
-        self.forces.len()
-    }
-
     /// Begins a substep of `h` seconds: no force, no stiffness.
     pub fn begin(&mut self, h: f64) {
         // the factor overwrote the matrix in place, of the same shape
@@ -70,11 +65,6 @@ impl System {
         if i >= j {
             self.add(i as usize, j as usize, stiffness * self.square);
         }
-    }
-
-    /// Adds an inertia that couples the velocities of two vertices, `i` not below `j`, kg.
-    pub fn join(&mut self, i: u32, j: u32, inertia: DMat3) {
-        self.add(i as usize, j as usize, inertia);
     }
 
     /// Adds an inertia to a vertex, kg.
@@ -108,13 +98,6 @@ impl System {
         self.matrix.respond_at(impulses);
     }
 
-    /// The scale of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
-    pub fn mobility(&self, vertex: usize) -> f64 {
-        let Factor { matrix, rows } = &self.matrix;
-        let trace = |row: u32| (0..3).map(|axis| matrix.diagonal(3 * row as usize + axis)).sum::<f64>();
-        rows[vertex].map_or(0.0, |row| 3.0 / trace(row))
-    }
-
     /// The lower half of the matrix, in blocks of moving vertices; entries with one place add up.
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
@@ -139,17 +122,6 @@ impl Response for Factor {
 }
 
 impl Factor {
-    /// Number of vertices; zero before the first step.
-    pub const fn vertices(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Copies `other` into the existing storage.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.matrix.copy_from(&other.matrix);
-        self.rows.clone_from(&other.rows);
-    }
-
     /// A⁻¹ on impulses, one for each vertex; held vertices stay still.
     pub fn respond_at(&self, impulses: &mut [DVec3]) {
         let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));

@@ -1,18 +1,9 @@
 //! What a soft body must do, against closed forms.
 
-mod bullets;
 mod error;
-mod falls;
-mod foretold;
-mod links;
-mod lying;
-mod meetings;
 mod promises;
 mod skins;
-mod slides;
-mod slopes;
 mod statics;
-mod thin;
 
 use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use glam::{DQuat, DVec3};
@@ -34,7 +25,6 @@ fn spec(shape: SoftShape) -> SoftSpec {
         held: vec![],
         friction: 0.5,
         gravity: DVec3::ZERO,
-        obstacles: [].into(),
         sleep: false,
     }
 }

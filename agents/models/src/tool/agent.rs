@@ -1,29 +1,25 @@
 //! The tool agent: the sequence of one step.
 //!
-//! In: a span, the user spring, graspable neighbours. Out: a [`ToolState`]. Never here: forces; the grasped or touched agent solves them.
+//! In: a span, the user spring, graspable neighbours. Out: a [`ToolState`]. Never here: contact forces.
 //!
 //! The tip follows a commanded point: the script, or the user spring while one holds the tool. The offset from that target decays
 //! like a critically damped spring, solved exactly, so that being taken, released or put off by lost time never makes it jump.
-//! Contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
+//! In a cluster contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
 
 use super::drive::{Drive, PointMotion};
-use super::force_sensor::ContactForces;
 use super::gripper::{Jaws, nearest, nearest_of};
 use super::member::Unknowns;
-use super::spec::REACH_MAX_M;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
-use crate::limits::PART_MAX_S;
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_contact::{Knock, beside};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{
     AgentId, Anchor, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState,
-    check_span,
+    check_span, shortest_turn,
 };
 use metachron_geometry::ToolShape;
-use metachron_geometry::{CollisionShape, PlacedShape, ShapeKind, ShapePose};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use std::fmt;
 use std::sync::Arc;
 
@@ -39,8 +35,6 @@ pub struct Tool {
     /// Distance of the tip from the target of the script or the user spring, metres.
     pub(super) lag_m: f64,
     pub(super) jaws: Jaws,
-    forces: ContactForces,
-    knock: Knock,
     pub(super) form: Arc<CollisionShape>,
     /// Speed of its fastest point in the last step, m/s.
     pub(super) speed_m_s: f64,
@@ -88,7 +82,6 @@ impl Tool {
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
         let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
-        let (jaws, forces, knock) = (Jaws::new(), ContactForces::default(), Knock::default());
         let (commanded, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
         let unknowns = Unknowns::new(&tool, drive.mass_kg());
         Ok(Self {
@@ -98,9 +91,7 @@ impl Tool {
             commanded,
             drive,
             lag_m: 0.0,
-            jaws,
-            forces,
-            knock,
+            jaws: Jaws::new(),
             form,
             speed_m_s: 0.0,
             at_rest: false,
@@ -152,42 +143,12 @@ impl Tool {
         }
     }
 
-    /// Whether the tool grasps a neighbour or is linked to it: such neighbours see it as driven, and it takes their impulses so.
-    fn is_held_by(&self, other: &Neighbour, context: &StepContext<'_>) -> bool {
-        let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
-        held || context.links.iter().any(|link| link.other == other.id)
-    }
-
-    /// Moves the tip by the drive, against the impulses it received in contact.
-    fn drive_on(&mut self, led: ToolState, context: &StepContext<'_>, dt_s: f64) -> ToolState {
-        let mut forces = std::mem::take(&mut self.forces);
-        let given = forces.read(context, |other| self.is_held_by(other, context), dt_s);
-        self.forces = forces;
-        let to = PointMotion { position: led.tip, velocity: led.velocity };
-        let [held_back, tip] = self.drive.advance([self.commanded, to], &given, dt_s);
-        self.commanded = held_back;
-        ToolState { tip: tip.position, velocity: tip.velocity, ..led }
-    }
-
-    /// The agent, among those that are `wanted`, that open jaws may grasp or have just released: the nearest of those that are near them,
-    /// or may be within two steps of `dt_s` seconds.
-    pub(super) fn open_for(
-        &self,
-        context: &StepContext<'_>,
-        dt_s: f64,
-        wanted: impl Fn(&Neighbour) -> bool,
-    ) -> Option<AgentId> {
+    /// The agent that open jaws may grasp or have just released: the nearest of those that are near them, or may be within two steps of
+    /// `dt_s` seconds.
+    pub(super) fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
-        let nearest = || nearest_of(&self.spec, self.tool.tip, context, reach_m, wanted);
+        let nearest = || nearest_of(&self.spec, self.tool.tip, context, reach_m);
         if self.tool.jaw > GRASP_BELOW { nearest().map(|near| near.target) } else { None }
-    }
-
-    /// Finds the sleeping agents that it may hit.
-    fn wake_others(&mut self, context: &StepContext<'_>, dt_s: f64) {
-        let ToolState { tip, rotation, jaw, .. } = self.tool;
-        let bounds = bounds(&self.tool, self.speed_m_s);
-        let placed = PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } };
-        self.knock.find(&placed, &bounds, (context, dt_s));
     }
 
     /// Whether the commanded point has reached the end of the script: an obstacle that saturates the drive holds it back.
@@ -196,15 +157,12 @@ impl Tool {
     }
 
     /// Whether the tool has come to the end of its script and waits there, empty.
-    fn try_rest(&mut self, end: &Pose) -> bool {
-        // a body that sleeps on it gives no more force: the tool keeps still as well, or it would rise into that body
-        let still = self.drive.has_arrived()
-            || (self.forces.is_supporting() && self.tool.velocity.length() < SUPPORTING_MAX_M_S);
-        let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
+    fn try_rest(&mut self) -> bool {
+        let end = self.script.at(self.unknowns.time().as_secs_f64());
+        let rests = self.tool.is_idle && self.drive.has_arrived() && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
             self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
-            self.tool.tip = if self.drive.has_arrived() { end.tip } else { self.tool.tip };
-            self.tool.velocity = DVec3::ZERO;
+            (self.tool.tip, self.tool.velocity) = (end.tip, DVec3::ZERO);
         }
         rests
     }
@@ -238,9 +196,7 @@ pub(super) fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
 
 /// The angular velocity that turns one rotation into another in `dt` seconds, world axes, rad/s.
 pub(super) fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
-    let turned = to * from.conjugate();
-    let shorter = if turned.w < 0.0 { -turned } else { turned };
-    if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
+    shortest_turn(from, to) / dt
 }
 
 /// A deviation after `t` seconds of critical damping: exact for any step.
@@ -258,52 +214,17 @@ impl Agent for Tool {
         "tool"
     }
 
-    /// Moves the tip by `dt`, moves the jaws, reads the forces on it.
+    /// Moves the tip by `dt` along its path, and the jaws.
     ///
     /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        let (start_s, end_s) = (context.time.as_secs_f64(), (context.time + dt).as_secs_f64());
-        let end = self.script.at(end_s);
-        let spring = context.hands.first();
-        let led = match spring {
-            Some(spring) => self.follow_user_spring(spring, dt_s, self.may_catch(context)),
-            None => self.follow_script(&self.script.at(start_s), &end, dt_s),
-        };
-        let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
-        if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
-            let what = format!("the user spring moves the tip to {}", led.tip);
-            return Err(StepError::Diverged { model: "tool", dt_s, what });
-        }
-        let was = self.tool.jaw;
-        let wanted = spring.map_or(end.tip, |spring| self.user_target(spring).position);
-        let led = self.drive_on(led, context, dt_s);
-        self.lag_m = led.tip.distance(wanted);
-        self.speed_m_s = speed(&self.tool, &led, dt_s);
-        let is_idle = spring.is_none() && self.script.is_over(end_s) && self.has_reached(&end);
-        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_idle, ..led };
-        self.jaws.age(dt_s);
-        self.jaws.move_to(&self.spec, was, &self.tool, context);
-        self.tool.grasp = self.jaws.grasp(&self.spec);
-        let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
-        self.tool.admits = self.open_for(context, dt_s, rigid);
-        self.wake_others(context, dt_s);
-        self.tool.force_n = self.forces.force_n();
-        self.steps += 1;
-        self.at_rest = is_idle && self.try_rest(&end);
+        self.begin_at(context);
+        self.begin(dt_s)?;
+        self.end(&[self.alone_m_s(dt_s)], dt_s, false)?;
+        self.move_jaws(context, dt_s);
+        self.at_rest = self.try_rest();
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
-    }
-
-    /// Shortens the step near agents that it may push: neither the tool nor such an agent can predict the joint effect of drive and body,
-    /// and an impulse received once in several steps of a peer would go on through all of the tool's steps.
-    fn longest_step(&self, dt: SimSpan, context: &StepContext<'_>) -> SimSpan {
-        let spared = |n: &Neighbour| self.tool.admits == Some(n.id) || self.is_held_by(n, context);
-        let bounds = || bounds(&self.tool, self.speed_m_s);
-        let part = beside::longest_step(dt, context, bounds, |n| !spared(n));
-        // a body that it comes to grasp will be let in between the jaws
-        let catches = |n: &Neighbour| self.tool.jaw > GRASP_BELOW && self.spec.graspable.contains(&n.id);
-        let pushes = |n: &Neighbour| !(spared(n) || catches(n));
-        beside::no_longer(part, context, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -312,11 +233,6 @@ impl Agent for Tool {
 
     fn resolution(&self) -> Option<Resolution> {
         None
-    }
-
-    /// Publishes the length of a step before the first one: peers predict the drive over that span.
-    fn observe(&mut self, dt: SimSpan, context: &StepContext<'_>) {
-        self.drive.set_step(self.longest_step(dt, context).as_secs_f64());
     }
 
     /// A tool has no nodes to redistribute: nothing changes.
@@ -330,13 +246,9 @@ impl Agent for Tool {
         into.energy_j = 0.0;
         into.residual_m = self.lag_m;
         into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
-        into.touches
-            .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
         into.at_rest = self.at_rest;
         into.inertia = self.drive.inertia();
-        into.sprung.set(Some(self.drive.sprung(self.commanded.velocity)));
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));
-        self.forces.write(into);
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

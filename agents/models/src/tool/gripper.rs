@@ -99,18 +99,17 @@ impl Jaws {
 
 /// The nearest graspable point within reach.
 pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, context: &StepContext<'_>) -> Option<GraspCandidate> {
-    nearest_of(spec, tip, context, spec.reach_m, |_| true)
+    nearest_of(spec, tip, context, spec.reach_m)
 }
 
-/// The nearest point within `reach_m` on graspable agents that are `wanted`.
+/// The nearest point within `reach_m` on graspable agents.
 pub(super) fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
     context: &StepContext<'_>,
     reach_m: f64,
-    wanted: impl Fn(&Neighbour) -> bool,
 ) -> Option<GraspCandidate> {
-    let graspable = context.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
+    let graspable = context.neighbours.iter().filter(|other| spec.graspable.contains(&other.id));
     let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= reach_m);
     near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
 }

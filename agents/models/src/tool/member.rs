@@ -1,7 +1,7 @@
 //! A tool in a contact cluster: its tip is a mass on a drive that follows the commanded point; its turns and its jaws are led.
 //!
 //! In: what leads it, steps, the velocity of its tip. Out: the tip's mass, its drive, its skin. Never here: contacts, the path.
-//! Theory: docs/theory/coupling.md, eq. 9d and 9f; docs/theory/clusters.md, section 9.
+//! Theory: docs/theory/coupling.md, eq. 9d; docs/theory/clusters.md, section 9.
 
 use super::Tool;
 use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin};
@@ -52,6 +52,11 @@ struct Kept {
 }
 
 impl Unknowns {
+    /// Its own time.
+    pub fn time(&self) -> SimTime {
+        self.time
+    }
+
     pub fn new(tool: &ToolState, mass_kg: f64) -> Self {
         let value = DMat3::from_diagonal(DVec3::splat(mass_kg));
         Self {
@@ -78,10 +83,33 @@ impl Tool {
         match hand {
             Some(spring) => self.follow_user_spring(spring, h_s, *is_near),
             None => {
-                let start_s = time.as_secs_f64();
-                self.follow_script(&self.script.at(start_s), &self.script.at(start_s + h_s), h_s)
+                let end = *time + span(h_s);
+                let [from, to] = [*time, end].map(|time| self.script.at(time.as_secs_f64()));
+                self.follow_script(&from, &to, h_s)
             }
         }
+    }
+}
+
+impl Tool {
+    /// Takes over what leads it from the start of a macro step on.
+    pub(super) fn begin_at(&mut self, context: &StepContext<'_>) {
+        let hand = context.hands.first().copied();
+        let is_near = hand.is_some() && self.may_catch(context);
+        (self.unknowns.time, self.unknowns.hand, self.unknowns.is_near) = (context.time, hand, is_near);
+    }
+
+    /// Lets the jaws grasp and release by how they have moved since this was last called; steps are of `dt_s` seconds.
+    pub(super) fn move_jaws(&mut self, context: &StepContext<'_>, dt_s: f64) {
+        let was = std::mem::replace(&mut self.unknowns.jaw_before, self.tool.jaw);
+        self.jaws.move_to(&self.spec, was, &self.tool, context);
+        self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.tool.admits = self.open_for(context, dt_s);
+    }
+
+    /// The velocity of its tip at the end of the step begun, of `h_s` seconds, where nothing but its drive acts on it, m/s.
+    pub(super) fn alone_m_s(&self, h_s: f64) -> DVec3 {
+        self.unknowns.led_m_s + self.drive.rate_alone(h_s)
     }
 }
 
@@ -91,13 +119,8 @@ impl ClusterMember for Tool {
     }
 
     fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
-        let hand = context.hands.first().copied();
-        let is_near = hand.is_some() && self.may_catch(context);
-        let was = std::mem::replace(&mut self.unknowns.jaw_before, self.tool.jaw);
-        (self.unknowns.time, self.unknowns.hand, self.unknowns.is_near) = (context.time, hand, is_near);
-        self.jaws.move_to(&self.spec, was, &self.tool, context);
-        self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.admits = self.open_for(context, dt_s, |_| true);
+        self.begin_at(context);
+        self.move_jaws(context, dt_s);
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
@@ -228,7 +251,7 @@ impl ClusterMember for Tool {
         self.speed_m_s = speed(&self.tool, &tip, h_s);
         let force_n = (pushed_n_s - driven.impulse_n_s).length() / h_s;
         let unknowns = &mut self.unknowns;
-        unknowns.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        unknowns.time += span(h_s);
         if let Some(hand) = &mut unknowns.hand {
             hand.target += hand.target_velocity * h_s;
         }
@@ -253,4 +276,9 @@ impl ClusterMember for Tool {
         self.at_rest = true;
         self.tool.velocity = DVec3::ZERO;
     }
+}
+
+/// A step of `h_s` seconds in whole nanoseconds, as clocks count.
+fn span(h_s: f64) -> SimSpan {
+    SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO)
 }

@@ -1,14 +1,13 @@
 //! A driven tool: follows keyframes or a user spring, opens, closes, grasps a tube, a soft or a rigid body and drags it.
 //!
 //! In: a [`ToolSpec`], steps, the user spring, the snapshots of graspable agents. Out: a tip, jaws, a grasp.
-//! Never here: the grasp force. The held agent solves it in its own step and books it in a ledger (`force_sensor.rs` reads it).
+//! Never here: the grasp force; it is a row of the cluster's problem.
 //!
 //! `trajectory.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `gripper.rs` the
 //! grasp, `agent.rs` is the agent, `member.rs` what it is in a contact cluster.
 
 mod agent;
 mod drive;
-mod force_sensor;
 mod gripper;
 mod member;
 mod spec;

@@ -1,18 +1,9 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
-mod bound;
-mod holds;
-mod pushes;
-mod rigid;
-
 use super::{Keyframe, Tool, ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_core::{
-    AgentId, Anchor, Body, Bounds, CurveState, SimSpan, SimTime, Snapshot, StepError, StepReport, ToolState,
-};
-use metachron_core::{Impulse, Ledger, Site};
-use metachron_geometry::{CollisionShape, ShapeKind};
+use metachron_core::{AgentId, Anchor, Body, CurveState, SimSpan, SimTime, Snapshot, StepError, StepReport, ToolState};
 use std::sync::Arc;
 
 const ME: AgentId = AgentId(7);
@@ -197,31 +188,6 @@ fn a_tube_out_of_reach_is_not_grasped() {
 }
 
 #[test]
-fn a_tool_reports_received_impulses_as_the_mean_force_since_its_last_read() {
-    let over = DVec3::new(0.3, 0.0, 0.02);
-    let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
-    let account = |with, linear: DVec3| {
-        let mut ledger = Ledger::new(with);
-        ledger.give(Site::Whole, SimTime::ZERO, 0.0, Impulse { linear, angular: DVec3::ZERO });
-        ledger
-    };
-    let at = |given, millis: u64| {
-        let near = tube();
-        let time = SimTime::from_nanos(millis * 1_000_000);
-        let snapshot = Snapshot { time, given, ..near.snapshot.as_ref().clone() };
-        vec![Neighbour { snapshot: Arc::new(snapshot), ..near }]
-    };
-    stage.neighbours = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
-    stage.step();
-    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12); // 0.5 N·s in 100 ms
-    stage.step();
-    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12, "nothing new is known");
-    stage.neighbours = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
-    stage.step();
-    assert_eq!(state(&stage.tool).force_n, 0.0, "nothing more was given");
-}
-
-#[test]
 fn a_user_spring_moves_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
     let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
     let (mut before, target) = (state(&stage.tool), DVec3::new(0.5, 1.0, 0.5));
@@ -300,42 +266,5 @@ fn invalid_scripts_are_refused() {
         assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber { .. }));
         let damped = Tool::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
-    }
-}
-
-#[test]
-fn a_tool_wakes_only_the_sleeping_agents_in_its_way() {
-    let form = Arc::new(CollisionShape {
-        kind: ShapeKind::Chain { held_ends: 0, height_j_kg: 0.0 },
-        friction: 0.2,
-        restitution: 0.0,
-    });
-    let asleep = |mut neighbour: Neighbour| {
-        let snapshot = Snapshot {
-            at_rest: true,
-            bounds: Some(Bounds { low: DVec3::splat(-0.01), high: DVec3::new(1.01, 0.01, 0.01), speed_m_s: 0.0 }),
-            body: neighbour.snapshot.body.clone(),
-            ..Snapshot::default()
-        };
-        (neighbour.snapshot, neighbour.form) = (Arc::new(snapshot), Some(Arc::clone(&form)));
-        neighbour
-    };
-    // 0.3 m down in a second, the jaws shut and open along z: the tip ends 0.1 m above the axis, or 5 mm
-    for (end_m, wakes) in [(0.1, false), (0.005, true)] {
-        let down = [key(0.0, DVec3::new(0.3, 0.0, 0.4), 0.0), key(1.0, DVec3::new(0.3, 0.0, end_m), 0.0)];
-        let turned = down.map(|key| Keyframe { rotation: DQuat::from_rotation_x(std::f64::consts::PI), ..key });
-        let mut stage = Stage::new(spec(turned.to_vec()));
-        stage.neighbours = vec![asleep(tube())];
-        let mut woke_at_m = None;
-        for _ in 0..130 {
-            stage.step();
-            if snapshot(&stage.tool).touches == [TUBE] {
-                woke_at_m.get_or_insert(state(&stage.tool).tip.z);
-            }
-        }
-        assert_eq!(woke_at_m.is_some(), wakes, "down to {end_m} m");
-        // the jaws reach a centimetre beyond the tip, the skin of the tube one more, two steps at most one more
-        assert!(woke_at_m.is_none_or(|z| z > 0.01 && z < 0.06), "{woke_at_m:?}");
-        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool at rest wakes no agent");
     }
 }

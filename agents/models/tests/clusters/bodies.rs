@@ -6,7 +6,6 @@ use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
-use std::sync::Arc;
 
 pub fn matter(young_pa: f64) -> SoftMatter {
     SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0 }
@@ -22,7 +21,6 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
         held: vec![],
         friction: 0.5,
         gravity: GRAVITY,
-        obstacles: Arc::new([]),
         sleep: false,
     }
 }

@@ -3,14 +3,17 @@
 mod bodies;
 mod errors;
 mod grasp;
+mod hands;
 mod joints;
 mod links;
 mod own_model;
 mod passing;
 mod rebounds;
 mod scenes;
+mod shapes;
 mod slope;
 mod stacks;
 mod steps;
 mod table;
 mod tools;
+mod tubes;

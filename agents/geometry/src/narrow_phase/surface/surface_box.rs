@@ -1,7 +1,7 @@
 //! Contacts of a closed skin with a box: vertices over its faces, its edges across those of the skin, its corners over triangles.
 //!
 //! In: a closed skin and a box that may touch. Out: touching places with normals towards the skin. Never here: open skins, tools.
-//! Theory: docs/theory/soft.md, eq. 15c.
+//! Theory: docs/theory/contact.md, eq. 9.
 //!
 //! The normal of each place is that of its two features, not the way between two points: that way vanishes where the two lie on each
 //! other, and turns round or aside where they overlap.

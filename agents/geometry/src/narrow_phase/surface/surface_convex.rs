@@ -1,7 +1,7 @@
 //! Contacts of soft bodies' skins with blocks: which of their places are nearest, and in which direction they push.
 //!
 //! In: a surface and a block that may touch. Out: touching places. Never here: round pieces, other surfaces.
-//! Theory: docs/theory/soft.md, eq. 15a.
+//! Theory: docs/theory/contact.md, eq. 8.
 
 use super::super::convex_convex::parts;
 use super::super::gjk::{Convex, Difference, Rounded, Separation};

@@ -1,7 +1,7 @@
 //! Contacts between the skins of two soft bodies: which of their places are nearest, and in which direction they push.
 //!
 //! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, round pieces.
-//! Theory: docs/theory/soft.md, eq. 15a, 15b.
+//! Theory: docs/theory/contact.md, eq. 8, 10, 11.
 
 use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};

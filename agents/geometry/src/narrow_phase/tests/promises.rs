@@ -11,7 +11,7 @@ fn cast() -> Vec<CollisionShape> {
 fn place<'a>(form: &'a CollisionShape, (position, rotation): (DVec3, DQuat), nodes: &'a [DVec3]) -> PlacedShape<'a> {
     let view = match form.kind {
         ShapeKind::Solid(_) => ShapePose::Solid { position, rotation },
-        ShapeKind::Chain { .. } => ShapePose::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
+        ShapeKind::Chain => ShapePose::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
         ShapeKind::Tool(_) => ShapePose::Tool { tip: position, rotation, jaw: 0.3 },
         ShapeKind::Surface(_) => ShapePose::Surface(nodes),
     };

@@ -52,9 +52,7 @@ pub(super) fn skin_of(triangles: &[[u32; 3]], vertices: u32, radius_m: f64, clos
         triangles: triangles.into(),
         radius_m,
         edge_m: EDGE,
-        height_j_kg: 0.0,
         closed,
-        held: false,
     };
     CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }
 }
@@ -112,7 +110,7 @@ proptest! {
             prop_assert!(!list.is_empty());
             // what is beneath a face pushes along that
             let face = rotation * DVec3::NEG_Z;
-            // of a ball the slack of eq. 15a stays: a thousandth of a diagonal over its radius
+            // of a ball the slack of eq. 8 stays: a thousandth of a diagonal over its radius
             let off = if matches!(solid.kind, ShapeKind::Solid(SolidShape { solid: Solid::Ball { .. }, .. })) { 1.5e-3 * EDGE / 0.02 } else { 1e-9 };
             let straight = |normal: DVec3| normal.distance(DVec3::NEG_Z) < off || normal.distance(face) < off;
             prop_assert!(list.iter().all(|touch| straight(touch.normal)), "{list:?}");
@@ -171,9 +169,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         triangles: triangles.into(),
         radius_m: 0.0,
         edge_m: 1.0,
-        height_j_kg: 0.0,
         closed: true,
-        held: false,
     };
     let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
@@ -207,9 +203,7 @@ fn on_a_ridge(there: &PlacedShape<'_>) -> Vec<Touch> {
         triangles: triangles.into(),
         radius_m: 0.0,
         edge_m: 1.0,
-        height_j_kg: 0.0,
         closed: true,
-        held: false,
     };
     let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);

@@ -159,7 +159,7 @@ pub(super) fn placed<'a>(
 ) -> PlacedShape<'a> {
     let view = match form.kind {
         ShapeKind::Solid(_) => ShapePose::Solid { position, rotation },
-        ShapeKind::Chain { .. } => ShapePose::Chain { positions: points, radii_m },
+        ShapeKind::Chain => ShapePose::Chain { positions: points, radii_m },
         ShapeKind::Tool(_) => ShapePose::Tool { tip: position, rotation, jaw: 0.5 + 0.5 * position.x.signum() },
         ShapeKind::Surface(_) => ShapePose::Surface(points),
     };

@@ -1,7 +1,6 @@
 //! What the tube promises, against independent answers (`tests/reference/`).
 
 mod buckling;
-mod coupling;
 mod error;
 mod methods;
 mod motion;

@@ -260,21 +260,3 @@ fn an_overstretched_tube_warns() {
     tube.set_state(state);
     assert!(tube.warnings()[0].contains("1.50"), "{:?}", tube.warnings());
 }
-
-#[test]
-fn the_inverse_mass_of_a_point_predicts_the_effect_of_a_pull() {
-    let mut spec = reference_spec(1e6, 16);
-    spec.clamp = [true, false];
-    let mut still = Tube::new(spec).unwrap();
-    let mut pulled = still.clone();
-    assert_eq!(still.inverse_mass(0.7), None);
-    run(&mut still, 4.0, 0.004);
-    // a spring so soft and far that it is a force of 1 mN along y
-    let hands = [AnchorSpring { stiffness_n_m: 1e-9, damping_n_s_m: 0.0, ..pull(0.7, DVec3::new(0.7, 1e6, 0.0)) }];
-    let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-    pulled.step(millis(4.0), &context).unwrap();
-    let moved = snapshot(&pulled).body.point(metachron_core::Anchor::Arc(0.7)).unwrap().1;
-    let want = still.inverse_mass(0.7).unwrap() * DVec3::Y * 1e-3 * 4e-3;
-    assert_eq!(still.inverse_mass(0.0), Some(glam::DMat3::ZERO));
-    assert!((moved - want).length() < 1e-9 * want.length(), "{moved}, not {want}"); // linear but for the spring's 1e-9 N/m
-}

@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// How far the search looks, metres.
 const REACH_M: f64 = 1e-3;
 
-/// What eq. 15a leaves: a thousandth of an edge, metres.
+/// What contact.md, eq. 8, leaves: a thousandth of an edge, metres.
 const LEFT_M: f64 = 5e-5;
 /// The cosine of the same over the half thickness of a sheet.
 const STRAIGHT: f64 = 0.98;

@@ -2,7 +2,7 @@
 //!
 //! Both ends are pulled by dead loads; one is raised slowly until the other end moves. Euler and Eytelwein: T₂/T₁ = exp(μφ).
 //! The tube is thin compared with the cylinder, so that it does not matter that its tension acts at its axis and friction at its
-//! surface (docs/theory/contact.md, eq. 24, gives the difference for thicker tubes).
+//! surface (docs/theory/contact.md, eq. 14, gives the difference for thicker tubes).
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};

@@ -1,0 +1,32 @@
+//! The shortest turn between two rotations.
+
+use glam::{DQuat, DVec3};
+
+/// The shortest turn that leads `from` one rotation `to` another, as a rotation vector in world axes, radians, of length at most π; exactly
+/// zero between equal ones.
+#[must_use]
+pub fn shortest_turn(from: DQuat, to: DQuat) -> DVec3 {
+    let turned = to * from.conjugate();
+    let shorter = if turned.w < 0.0 { -turned } else { turned };
+    if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_turn_leads_from_one_to_the_other_and_never_the_long_way() {
+        let from = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.0);
+        for angle in [0.0, 1e-9, 1.0, 3.1, 3.2, 6.0] {
+            let to = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), angle) * from;
+            for to in [to, -to] {
+                let turn = shortest_turn(from, to);
+                assert!(turn.length() <= std::f64::consts::PI, "{angle}: {turn}");
+                let there = DQuat::from_scaled_axis(turn) * from;
+                assert!(there.dot(to).abs() > 1.0 - 1e-15, "{angle}: {there} is not {to}"); // a few roundings
+            }
+        }
+        assert_eq!(shortest_turn(from, from), DVec3::ZERO);
+    }
+}
