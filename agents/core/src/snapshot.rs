@@ -14,9 +14,6 @@ pub struct Snapshot {
     pub time: SimTime,
     /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub clock_offset: SimSpan,
-    /// How long its last step was where that was shorter than its scene wants, written like its time; `None`
-    /// elsewhere.
-    pub shortened_step: Option<SimSpan>,
     /// Number of steps so far.
     pub steps: u64,
     /// The resolution that the simulation runs at; `None` for a model that has none.
@@ -88,12 +85,6 @@ impl Snapshot {
     #[must_use]
     pub fn moment(&self) -> SimTime {
         self.time + self.clock_offset
-    }
-
-    /// Its usual step length, seconds, where its scene requests `wanted_s`.
-    #[must_use]
-    pub fn step_s(&self, wanted_s: f64) -> f64 {
-        self.shortened_step.map_or(wanted_s, SimSpan::as_secs_f64)
     }
 
     /// Whether every number that others use is finite.

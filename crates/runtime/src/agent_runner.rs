@@ -5,23 +5,20 @@
 //!
 //! Between the two an executor lets the turn's time pass: on a thread it has passed, lockstep charges it. A turn that fails, by an error of
 //! the model, a state that is not finite or a panic (a bug of metachron), parks the agent with the reason; nothing of it is published and
-//! the other agents go on. Never here: threads, sleeping, events, any law of control, the turns of the agents that an agent leads
-//! ([`super::island`]).
+//! the other agents go on. Never here: threads, sleeping, events, any law of control, the step and the turns of the agents that an agent
+//! leads ([`super::cluster`]).
 
 use super::agent_clock::Timeline;
 use super::agent_clock::{AgentClock, LAG_CAP, Start};
-use super::broad_phase::PlannedStep;
-use super::cluster::{ClusterSeat, Span};
+use super::cluster::{ClusterSeat, Leap, Led, Span};
 use super::faults::Faults;
-use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
-use super::island::Company;
 use super::metrics::{MetricsWriter, SMOOTHING};
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
 use metachron_contact::Link;
-use metachron_contact::{Agent, AnchorSpring, StepContext};
+use metachron_contact::{Agent, AnchorSpring};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -42,15 +39,15 @@ pub(super) struct AgentRunner {
     pub observer: Observer,
     pub links: Vec<Link>,
     pub hands: Vec<AnchorSpring>,
-    /// Its place in a contact cluster; `None` where it steps by itself.
+    /// Its place in a contact cluster; `None` of an agent that is no member of any.
     pub cluster: Option<Box<ClusterSeat>>,
     /// The agents it leads.
-    pub company: Company,
+    pub led: Led,
     pub metrics: MetricsWriter,
     pub turn_period: TurnPeriod,
     pub open: Option<PendingTurn>,
-    /// Whether an agent that does not step with it was next to it in its previous turn, if that was checked.
-    pub beside: Option<bool>,
+    /// Whether an agent that does not step with it was near it in its previous turn, if that was checked.
+    pub was_near: Option<bool>,
     /// The state that was written last is withheld.
     pub withheld: bool,
     /// Up to which revision each ledger was announced to its receiver.
@@ -149,33 +146,11 @@ impl AgentRunner {
         self.metrics.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Reads the neighbours before the first step and publishes the result, if the agent has links; to be called after [`Self::publish_initial`] of all
-    /// agents.
-    pub fn observe(&mut self) {
-        if self.links.is_empty() || self.is_parked() || self.cluster.is_some() {
-            return;
-        }
-        let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
-        let step = PlannedStep { start: self.pace.scene_time(), dt };
-        self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
-        let neighbours = self.observer.neighbours();
-        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
-        let agent = &mut self.agent;
-        let looked = contained(|| {
-            agent.observe(dt, &context);
-            Ok(())
-        });
-        match looked {
-            Ok(()) => self.publish_initial(),
-            Err(reason) => self.park(reason),
-        }
-    }
-
     /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
     /// and is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
         self.shared.sleep.clear_wake(self.id());
-        self.take_in();
+        self.admit_arrivals();
         match contained(|| self.attempt(timeline, wall)) {
             Ok((open, effort)) => {
                 self.open = open;
@@ -220,10 +195,10 @@ impl AgentRunner {
 
     /// Accounts for the wall time of a turn, shared equally with the agents it leads.
     pub fn count(&mut self, wall: Duration) {
-        let share = if self.company.is_empty() { wall } else { wall / (1 + self.company.len() as u32) };
+        let share = if self.led.is_empty() { wall } else { wall / (1 + self.led.len() as u32) };
         let share_ns = share.as_nanos() as u64;
         self.unsettled_ns += share_ns;
-        self.company.each(|seat| seat.unsettled_ns += share_ns);
+        self.led.each(|seat| seat.unsettled_ns += share_ns);
     }
 
     /// Accounts for the CPU time of the turns since the last call: the fraction `share` of their wall time.
@@ -232,7 +207,7 @@ impl AgentRunner {
         let cpu = &self.shared.gauges.cpu_nanos;
         // no other thread writes: an atomic exchange would cost more
         cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
-        self.company.each(|seat| seat.settle(share));
+        self.led.each(|seat| seat.settle(share));
     }
 
     /// Completes the metrics at the end of a run: a resting agent has rested until now, and the last state is published.
@@ -244,7 +219,7 @@ impl AgentRunner {
             self.metrics.pace(&self.shared.gauges, &self.pace);
         }
         self.metrics.flush(&self.shared.gauges);
-        self.company.each(|seat| seat.close_account(timeline, wall));
+        self.led.each(|seat| seat.close_account(timeline, wall));
     }
 
     /// Parks the agent for good, for this reason.
@@ -256,22 +231,22 @@ impl AgentRunner {
         if let Some(broad_phase) = &self.peers.broad_phase {
             broad_phase.publish_rest(self.id());
         }
-        self.shut_door();
+        self.close();
     }
 
     /// Returns no open turn if it waits instead, or hands its turns over before it steps.
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<PendingTurn>, Effort), String> {
         self.take_commands();
         let now = timeline.sim_at(wall);
-        let near = self.keeps_company(now, self.pace.is_late(timeline, wall));
+        let near = self.is_near_others(now, self.pace.is_late(timeline, wall));
         let before = self.pace.time();
         let start = self.pace.begin(timeline, wall, near);
-        let leapt = self.pace.time().since(before);
+        let jumped = self.pace.time().since(before);
         if near && start.late > LAG_CAP || self.pace.clock_offset() > SimSpan::ZERO {
             self.shared.sleep.note_far_behind(now);
         }
         // even if it waits: the awaited agents may wait for one that it leads
-        let alone = self.gather(timeline, wall, (&start, leapt));
+        let alone = self.gather(timeline, wall, Leap { start: &start, jumped });
         if self.waits(wall) || self.should_join() {
             return Ok((None, Effort { work: 0.0, steps: alone }));
         }
@@ -282,26 +257,17 @@ impl AgentRunner {
         let is_met = self.peers.broad_phase.is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
-        let (StepOutcome { report, dt }, led) = if self.cluster.is_some() {
-            let stretched = wanted.as_secs_f64() / self.pace.wanted().as_secs_f64();
-            let led = self.company.seats_at(self.pace.time()).count() as u32;
-            match self.step_cluster(Span::Wanted(stretched.max(1.0))) {
-                Ok(outcome) => (outcome, led),
-                Err(reason) if led == 0 => return Err(reason),
-                // they part: one of them will fail alone, the others find together again
-                Err(_) => {
-                    self.scatter();
-                    (self.step_cluster(Span::Wanted(1.0))?, 0)
-                }
+        let led = self.led.members_at(self.pace.time()).count() as u32;
+        let (StepOutcome { report, dt }, led) = match self.step_alone(Span::Wanted(wanted)) {
+            Ok(outcome) => (outcome, led),
+            Err(reason) if led == 0 => return Err(reason),
+            // they part: one of them will fail alone, the others find together again
+            Err(_) => {
+                self.release_all();
+                (self.step_alone(Span::Wanted(self.pace.wanted()))?, 0)
             }
-        } else if self.company.is_empty() {
-            (self.step(wanted)?, 0)
-        } else {
-            self.lead(wanted)?
         };
         self.pace.shorten(wanted, dt);
-        let done = &self.shared.gauges.work;
-        done.set(done.get() + report.work * f64::from(1 + led));
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
         if rests && self.cluster.is_some() {
             self.rest_members();
@@ -317,23 +283,11 @@ impl AgentRunner {
     /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
     /// not be where its leader expects it.
     fn should_join(&mut self) -> bool {
-        if self.shared.seating.is_none() || self.observer.neighbours().is_empty() {
+        if self.shared.handover.is_none() || self.observer.neighbours().is_empty() {
             return false;
         }
         self.observer.refresh();
         self.seek_leader().is_some()
-    }
-
-    /// Steps alone, by `wanted` or by the shorter step that the agent chooses.
-    pub fn step(&mut self, wanted: SimSpan) -> Result<StepOutcome, String> {
-        let time = self.pace.time();
-        let step = PlannedStep { start: self.pace.scene_time(), dt: wanted };
-        self.observer.update(&self.peers, &self.writer, step, &Fellows::default());
-        let (me, neighbours) = (self.shared.id, self.observer.neighbours());
-        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
-        let dt = self.agent.longest_step(wanted, &context).min(wanted);
-        let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
-        Ok(StepOutcome { report, dt })
     }
 
     pub fn take_commands(&mut self) {
@@ -387,7 +341,7 @@ impl AgentRunner {
     }
 
     fn try_to_rest(&mut self, now: SimTime) -> bool {
-        let led = self.company.ids();
+        let led = self.led.ids();
         let rests = self.shared.sleep.try_rest(self.id(), led, now);
         if rests {
             self.rest_now();
@@ -403,7 +357,7 @@ impl AgentRunner {
         if let Some(broad_phase) = &self.peers.broad_phase {
             broad_phase.publish_rest(self.id());
         }
-        self.company.each(AgentRunner::rest_now);
+        self.led.each(AgentRunner::rest_now);
     }
 
     /// Continues after a rest, at the timeline's present, with all agents it leads.
@@ -411,13 +365,13 @@ impl AgentRunner {
         self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
         // as an agent that newly comes near its peers: while it slept their time went on
-        self.beside = Some(false);
+        self.was_near = Some(false);
         self.turn_period = TurnPeriod::default();
         self.metrics.restart(timeline.sim_at(wall));
         self.metrics.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.set_resting(false);
         self.notify_reader();
-        self.company.each(|seat| seat.resume(timeline, wall));
+        self.led.each(|seat| seat.resume(timeline, wall));
     }
 }
 

@@ -1,9 +1,21 @@
 //! The turn of a contact cluster: its leader steps all members as one problem.
 //!
 //! In: the members at the leader's time, what each of them sees. Out: their new states, who each is bonded with, who has lost touch.
-//! Never here: how members come and go ([`super::island`]), the problem itself ([`metachron_contact::stepper`]).
+//! Never here: how members come and go ([`seats`]), what else belongs to a turn ([`turn`]), the problem itself
+//! ([`metachron_contact::stepper`]).
 
-use super::agent_runner::{AgentRunner, StepOutcome};
+mod common_time;
+mod membership;
+mod seats;
+#[cfg(test)]
+mod tests;
+mod turn;
+
+pub(super) use membership::{Epoch, Membership};
+pub(super) use seats::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
+pub(super) use turn::Leap;
+
+use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
 use super::observation::Observer;
 use metachron_contact::stepper::{
@@ -13,7 +25,8 @@ use metachron_contact::stepper::{
 use metachron_contact::{Law, Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
-    AgentId, Body, ClusterSolves, ClusterState, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport,
+    AgentId, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot,
+    StepReport, recycled,
 };
 use std::sync::Arc;
 
@@ -48,7 +61,7 @@ pub(super) struct ClusterSeat {
     /// Storage, empty between turns.
     participants: Vec<Participant<'static>>,
     wishes: Vec<Wish>,
-    groups: Vec<usize>,
+    groups: DisjointSets,
     ids: Vec<AgentId>,
 }
 
@@ -67,11 +80,11 @@ pub(super) struct MemberCost {
     pub work: f64,
 }
 
-/// How long the step of a cluster may be.
+/// How long a step may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Span {
-    /// As its members want, stretched by this factor, ≥ 1.
-    Wanted(f64),
+    /// What the agent that makes it wants; a cluster's is stretched as its leader's is longer than usual.
+    Wanted(SimSpan),
     /// No longer than this, to come to a given time.
     AtMost(SimSpan),
 }
@@ -106,7 +119,7 @@ impl ClusterSeat {
             solves: ClusterSolves::default(),
             participants: Vec::new(),
             wishes: Vec::new(),
-            groups: Vec::new(),
+            groups: DisjointSets::default(),
             ids: Vec::new(),
         }
     }
@@ -164,44 +177,74 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> Option<AgentId> {
 }
 
 impl AgentRunner {
+    /// Steps it with all that it leads and that are at its time; an agent that is no member of clusters by itself.
+    ///
+    /// # Errors
+    /// The reason why one of them cannot go on.
+    pub fn step_alone(&mut self, span: Span) -> Result<StepOutcome, String> {
+        if self.cluster.is_some() {
+            return self.step_cluster(span);
+        }
+        let (Span::Wanted(dt) | Span::AtMost(dt)) = span;
+        let time = self.pace.time();
+        let step = PlannedStep { start: self.pace.scene_time(), dt };
+        self.observer.update(&self.peers, &self.writer, step, &Membership::default());
+        let (me, neighbours) = (self.shared.id, self.observer.neighbours());
+        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
+        let done = &self.shared.gauges.work;
+        done.set(done.get() + report.work);
+        Ok(StepOutcome { report, dt })
+    }
+
+    /// Calls `visit` with itself and with each that it leads and that is at its time, by rising numbers.
+    fn each_member(&mut self, mut visit: impl FnMut(&mut Self)) {
+        let time = self.pace.time();
+        visit(self);
+        self.led.members_at(time).for_each(visit);
+    }
+
     /// Steps all that it leads and that are at its time, with itself, as one problem.
     ///
     /// # Errors
     /// The reason why a member cannot go on: all that belong to the cluster stop with it.
-    pub fn step_cluster(&mut self, span: Span) -> Result<StepOutcome, String> {
+    fn step_cluster(&mut self, span: Span) -> Result<StepOutcome, String> {
         let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.steps());
-        self.company.gather_fellows(id, time);
+        self.led.note_membership(id, time);
         let (plan, dt) = self.plan(span)?;
         self.look(time, dt);
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
-        let mut list = emptied(std::mem::take(&mut seat.participants));
+        let mut list = recycled(std::mem::take(&mut seat.participants));
         let mut stepper = seat.stepper.take().unwrap_or_default();
         let mut doubling = seat.repeats(steps, id);
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
-        let mut company = std::mem::take(&mut self.company);
-        let all = std::iter::once(&mut *self).chain(company.seats_at(time));
+        let mut led = std::mem::take(&mut self.led);
+        let all = std::iter::once(&mut *self).chain(led.members_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
         list.extend(all.zip(parts).filter_map(|(actor, parts)| actor.participant(time, parts)));
-        // a finer step that diverges says nothing of this one
-        let extra = doubling.as_mut().and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
-        let outcome = stepper.step(&scene, &mut list, dt);
-        if let (Some(doubling), Ok(report)) = (&mut doubling, &outcome) {
-            doubling.compare(&list, report.dt);
-        }
-        let at_rest = list.iter().all(|one| one.member.is_calm());
-        let list = emptied(list);
-        self.company = company;
+        let outcome = contained(|| {
+            // a finer step that diverges says nothing of this one
+            let extra = doubling.as_mut().and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
+            let report = stepper.step(&scene, &mut list, dt).map_err(|error| error.to_string())?;
+            if let Some(doubling) = &mut doubling {
+                doubling.compare(&list, report.dt);
+            }
+            Ok((report, extra, list.iter().all(|one| one.member.is_calm())))
+        });
+        let list = recycled(list);
+        // a panic of one member must not end the others
+        self.led = led;
         if let Some(seat) = &mut self.cluster {
             (seat.participants, seat.wishes) = (list, wishes);
         }
-        let report = outcome.map_err(|error| error.to_string())?;
+        let (report, extra, at_rest) = outcome?;
         let dt = report.dt;
         if let Some(doubling) = doubling {
-            self.note_errors(doubling, time, dt);
+            self.note_errors(doubling, dt);
         }
-        self.note_pairs(&stepper, time, dt);
+        self.note_pairs(&stepper, dt);
         self.note_solves(&report, plan, dt);
-        self.find_groups(time + dt);
+        self.note_groups(time + dt);
         if let Some(seat) = &mut self.cluster {
             seat.stepper = Some(stepper);
         }
@@ -217,10 +260,13 @@ impl AgentRunner {
         };
         wishes.clear();
         wishes.extend(self.wish());
-        wishes.extend(self.company.seats_at(time).filter_map(Self::wish));
+        wishes.extend(self.led.members_at(time).filter_map(Self::wish));
         let plan = Plan::of(wishes.iter().map(|wish| (wish.role, wish.step_s)));
         let macro_s = match span {
-            Span::Wanted(factor) => (plan.macro_s * factor).min(plan.macro_s.max(STRETCHED_MAX_S)),
+            Span::Wanted(span) => {
+                let factor = (span.as_secs_f64() / self.pace.wanted().as_secs_f64()).max(1.0);
+                (plan.macro_s * factor).min(plan.macro_s.max(STRETCHED_MAX_S))
+            }
             Span::AtMost(most) => plan.macro_s.min(most.as_secs_f64()),
         };
         if let Some(seat) = &mut self.cluster {
@@ -253,14 +299,14 @@ impl AgentRunner {
     /// Looks around for itself and for all that step with it.
     fn look(&mut self, time: SimTime, dt: SimSpan) {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
-        let Self { observer, company, peers, writer, links, cluster, .. } = self;
-        observer.update(peers, writer, step, company.all_fellows());
+        let Self { observer, led, peers, writer, links, cluster, .. } = self;
+        observer.update(peers, writer, step, led.membership());
         if let Some(seat) = cluster {
             seat.bond(observer, links);
         }
-        company.each_at(time, |actor, fellows| {
+        led.each_at(time, |actor, membership| {
             let Self { observer, peers, writer, links, cluster, .. } = actor;
-            observer.update(peers, writer, step, fellows);
+            observer.update(peers, writer, step, membership);
             if let Some(seat) = cluster {
                 seat.bond(observer, links);
             }
@@ -269,13 +315,7 @@ impl AgentRunner {
 
     /// Notes how the step was made and solved.
     fn note_solves(&mut self, report: &ClusterReport, plan: Plan, dt: SimSpan) {
-        let (leader, time, step_s) = (self.shared.id, self.pace.time(), dt.as_secs_f64());
-        let note = |actor: &mut Self, solves: Option<ClusterSolves>| {
-            let parts = actor.wish().map_or(1, |wish| plan.parts_in(wish.role, wish.step_s));
-            if let Some(seat) = &mut actor.cluster {
-                seat.state = Some(ClusterState { leader, parts, step_s, solves });
-            }
-        };
+        let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
         let ClusterReport { contacts, factors, passes, cut, depth_m, .. } = *report;
         let solves = &mut seat.solves;
@@ -285,15 +325,18 @@ impl AgentRunner {
         solves.passes += u64::from(passes);
         solves.cut += u64::from(cut);
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
-        let solves = Some(*solves);
-        note(self, solves);
-        let mut company = std::mem::take(&mut self.company);
-        company.seats_at(time).for_each(|actor| note(actor, None));
-        self.company = company;
+        let mut solves = Some(*solves);
+        self.each_member(|actor| {
+            let parts = actor.wish().map_or(1, |wish| plan.parts_in(wish.role, wish.step_s));
+            if let Some(seat) = &mut actor.cluster {
+                // those of the leader, which is the first
+                seat.state = Some(ClusterState { leader, parts, step_s, solves: solves.take() });
+            }
+        });
     }
 
     /// Hands every member how far a step of `dt` is from the same in halves.
-    fn note_errors(&mut self, doubling: Box<StepDoubling>, time: SimTime, dt: SimSpan) {
+    fn note_errors(&mut self, doubling: Box<StepDoubling>, dt: SimSpan) {
         let Some(seat) = &mut self.cluster else { return };
         let is_first = seat.row_s == 0.0;
         seat.row_s += dt.as_secs_f64();
@@ -303,28 +346,24 @@ impl AgentRunner {
             seat.schedule.cancel();
         }
         let mut apart_m = doubling.apart_m().iter();
-        let mut note = |actor: &mut Self| {
+        self.each_member(|actor| {
             if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next()) {
                 seat.apart_m = if is_first { *apart_m } else { seat.apart_m + apart_m };
                 if let Some(span_s) = span_s {
                     seat.drift_m = drift_m(seat.apart_m, 1, span_s);
                 }
             }
-        };
-        note(self);
-        let mut company = std::mem::take(&mut self.company);
-        company.seats_at(time).for_each(&mut note);
-        self.company = company;
+        });
         if let Some(seat) = &mut self.cluster {
             seat.doubling = Some(doubling);
         }
     }
 
     /// Hands every pair what it gave each other, and every member its work.
-    fn note_pairs(&mut self, stepper: &ClusterStepper, time: SimTime, dt: SimSpan) {
-        let (dt_s, now) = (dt.as_secs_f64(), time + dt);
+    fn note_pairs(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
+        let (dt_s, now) = (dt.as_secs_f64(), self.pace.time() + dt);
         let mut place = 0;
-        let mut note = |actor: &mut Self| {
+        self.each_member(|actor| {
             let (me, Some(seat)) = (place, &mut actor.cluster) else { return };
             seat.pairs.retain_mut(|pair| {
                 (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
@@ -336,41 +375,30 @@ impl AgentRunner {
                 }
             }
             seat.work = stepper.work_of(me);
+            let done = &actor.shared.gauges.work;
+            done.set(done.get() + seat.work);
             place += 1;
-        };
-        note(self);
-        let mut company = std::mem::take(&mut self.company);
-        company.seats_at(time).for_each(&mut note);
-        self.company = company;
+        });
     }
 
-    /// Finds who has lost touch: numbers of groups of those that still belong together, zero for the leader's own.
-    fn find_groups(&mut self, now: SimTime) {
-        let Some(mut groups) = self.cluster.as_mut().map(|seat| std::mem::take(&mut seat.groups)) else { return };
-        let (id, time) = (self.shared.id, self.pace.time());
-        let mut company = std::mem::take(&mut self.company);
-        let mut ids = self.cluster.as_mut().map(|seat| std::mem::take(&mut seat.ids)).unwrap_or_default();
+    /// Notes which of those that it leads still belong together at the end of a step, `now`.
+    fn note_groups(&mut self, now: SimTime) {
+        let Some(seat) = &mut self.cluster else { return };
+        let (mut groups, mut ids) = (std::mem::take(&mut seat.groups), std::mem::take(&mut seat.ids));
         ids.clear();
-        ids.push(id);
-        ids.extend(company.seats_at(time).map(|actor| actor.shared.id));
-        groups.clear();
-        groups.extend(0..ids.len());
-        let mut join = |place: usize, actor: &Self| {
-            let Some(seat) = &actor.cluster else { return };
+        self.each_member(|actor| ids.push(actor.shared.id));
+        groups.reset(ids.len());
+        let mut places = 0..;
+        self.each_member(|actor| {
+            let (Some(place), Some(seat)) = (places.next(), &actor.cluster) else { return };
             let tied = actor.links.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other);
             for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
                 if let Ok(other) = ids.binary_search(&other) {
-                    let (a, b) = (top(&groups, place), top(&groups, other));
-                    groups[a.max(b)] = a.min(b);
+                    groups.join(place, other);
                 }
             }
-        };
-        join(0, self);
-        company.seats_at(time).enumerate().for_each(|(place, actor)| join(place + 1, actor));
-        company.apart.clear();
-        company.apart.extend((1..ids.len()).map(|place| top(&groups, place) as u32));
-        company.note_apart(time);
-        self.company = company;
+        });
+        self.led.note_groups(self.pace.time(), &mut groups);
         if let Some(seat) = &mut self.cluster {
             (seat.groups, seat.ids) = (groups, ids);
         }
@@ -379,33 +407,15 @@ impl AgentRunner {
     /// What the last turn cost of its own body and of each that it leads.
     pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
         std::iter::once(self)
-            .chain(self.company.all())
+            .chain(self.led.all())
             .filter_map(|actor| Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work }))
     }
 
     /// Stops all that step with it: they rest.
     pub fn rest_members(&mut self) {
-        let time = self.pace.time();
-        let rest = |actor: &mut Self| {
+        self.each_member(|actor| {
             actor.agent.member().into_iter().for_each(|member| member.rest());
             actor.cluster.iter_mut().for_each(|seat| seat.drift_m = 0.0);
-        };
-        rest(self);
-        self.company.seats_at(time).for_each(rest);
+        });
     }
-}
-
-/// The lowest place that belongs together with `at`.
-fn top(groups: &[usize], mut at: usize) -> usize {
-    while groups[at] != at {
-        at = groups[at];
-    }
-    at
-}
-
-/// The storage of `participants` for other ones.
-fn emptied<'b>(mut participants: Vec<Participant<'_>>) -> Vec<Participant<'b>> {
-    participants.clear();
-    // nothing is left to be mapped; the standard library collects in place, so that the storage stays
-    participants.into_iter().map(|_| unreachable!("cleared above")).collect()
 }

@@ -2,8 +2,8 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
+use super::cluster::Handover;
 use super::histogram::Histogram;
-use super::island::Seating;
 use super::mailbox::{Command, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
@@ -26,7 +26,7 @@ pub(super) struct Shared {
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
-    pub seating: Option<Seating>,
+    pub handover: Option<Handover>,
     /// Used by readers only: the agent never waits for this lock.
     pub ages: Mutex<Histogram>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
@@ -94,7 +94,7 @@ impl AgentHandle {
         self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The leader of the island in which it steps; `None` if it makes its own turns.
+    /// The leader of the cluster in which it steps; `None` if it makes its own turns.
     #[must_use]
     pub fn led_by(&self) -> Option<AgentId> {
         Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)

@@ -6,7 +6,7 @@
 //! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`]
 //! gives each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time
 //! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`broad_phase`),
-//! and agents in lasting contact share the turns of one of them (`island`).
+//! and those that may touch or are tied step as one problem, a cluster, in the turns of one of them (`cluster`).
 //!
 //! ```
 //! use glam::DVec3;
@@ -25,7 +25,6 @@
 //! assert!(t >= 1.99 && (position.x - t).abs() < 1e-9); // 1 m/s, for the agent's own time
 //! ```
 
-mod abreast;
 mod agent_clock;
 mod agent_runner;
 mod broad_phase;
@@ -34,11 +33,9 @@ mod cluster;
 mod cpu;
 mod dirty_set;
 mod faults;
-mod fellows;
 mod governor;
 mod handle;
 mod histogram;
-mod island;
 #[cfg(test)]
 mod live_tests;
 mod lockstep;

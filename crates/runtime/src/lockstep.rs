@@ -9,9 +9,9 @@ mod cores;
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
+use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
-use super::island::{Seating, empty_rooms, move_in};
 use super::machine::{Machine, duration};
 use super::metrics::AgentStats;
 use super::sleep::SleepRegistry;
@@ -119,8 +119,8 @@ impl Lockstep {
                     entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let home = self.handles[agent].shared.seating.as_ref().and_then(Seating::come_home);
-                    let Some(actor) = home else { continue };
+                    let returned = self.handles[agent].shared.handover.as_ref().and_then(Handover::take_returned);
+                    let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
                     entry.actor = Some(actor);
                 }
@@ -207,7 +207,7 @@ impl Lockstep {
     fn hand_over(&mut self, agent: usize, leader: AgentId) {
         self.settle();
         let entry = &mut self.entries[agent];
-        entry.actor = entry.actor.take().and_then(|actor| move_in(actor, leader).err());
+        entry.actor = entry.actor.take().and_then(|actor| hand_over(actor, leader).err());
         if entry.actor.is_none() {
             entry.phase = Phase::Led;
         }
@@ -229,7 +229,7 @@ impl Lockstep {
     fn end(&mut self) {
         let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
-        empty_rooms(&self.handles, &self.timeline, self.now);
+        close_remaining(&self.handles, &self.timeline, self.now);
     }
 
     fn settle(&mut self) {

@@ -77,7 +77,7 @@ pub struct AgentStats {
     pub residual_m: f64,
     /// The part of it caused by its time steps, metres.
     pub drift_m: f64,
-    /// The leader that makes its turns, on the leader's thread and clock, because the two share an island; `None` if it makes them itself.
+    /// The leader that makes its turns, on the leader's thread and clock, because the two are of one cluster; `None` if it makes them itself.
     pub led_by: Option<AgentId>,
 }
 

@@ -5,11 +5,11 @@
 //! settle. Never here: when an agent looks.
 
 use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
-use super::fellows::Fellows;
+use super::cluster::Membership;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
-use metachron_contact::{Law, OwnershipTraits, acknowledged, keep_step, owns};
+use metachron_contact::{Law, acknowledged};
 use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -20,8 +20,6 @@ pub(super) struct Peers {
     pub all: Vec<Peer>,
     /// `None` if no two agents could touch: then no agent searches for peers.
     pub broad_phase: Option<BroadPhase>,
-    /// Pairs joined by links with the ledger law, each in both orders, sorted.
-    pub linked: Vec<[AgentId; 2]>,
 }
 
 /// Data of one agent for its peers.
@@ -52,8 +50,8 @@ pub(super) struct Observer {
 #[derive(Debug)]
 struct Source {
     slot: Arc<LatestSlot<Snapshot>>,
-    /// It steps in the same island: the island's solve, and no law, determines their interaction.
-    island_member: bool,
+    /// It steps as one with the agent: their problem is common, and no law determines their interaction.
+    is_member: bool,
 }
 
 impl std::fmt::Debug for Peer {
@@ -63,10 +61,6 @@ impl std::fmt::Debug for Peer {
 }
 
 impl Peer {
-    fn standing(&self) -> OwnershipTraits {
-        OwnershipTraits::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
-    }
-
     fn law(&self, other: AgentId) -> Law {
         self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Ledger, |at| self.laws[at].1)
     }
@@ -77,20 +71,16 @@ impl Peer {
         !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
-    /// The neighbour `other` as seen by this agent; `linked`: a link by the ledger joins the two.
-    fn neighbour(&self, other: &Self, linked: bool) -> Neighbour {
+    /// The neighbour `other` as seen by this agent.
+    fn neighbour(&self, other: &Self) -> Neighbour {
         // a tool needs the form to grasp it, even if it passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
-        let snapshot = other.shared.slot.latest();
-        let (mine, its) = (self.standing(), other.standing());
         Neighbour {
             id: other.shared.id,
-            step_s: snapshot.step_s(other.shared.wanted_hz.recip()),
-            snapshot,
+            step_s: other.shared.wanted_hz.recip(),
+            snapshot: other.shared.slot.latest(),
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
-            owned: owns(mine, its, linked),
-            in_step: keep_step(mine, its, linked),
         }
     }
 }
@@ -102,8 +92,7 @@ impl Peers {
 
     /// The neighbour `other` as seen by `me`.
     fn neighbour_of(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
-        let linked = self.linked.binary_search(&[me, other]).is_ok();
-        Some(self.get(me)?.neighbour(self.get(other)?, linked))
+        Some(self.get(me)?.neighbour(self.get(other)?))
     }
 
     /// The view of `me`, which is linked to `links`.
@@ -153,8 +142,8 @@ impl Observer {
         }
     }
 
-    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which shares an island with `members`.
-    pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, members: &Fellows) {
+    /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which steps as one with `members`.
+    pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, members: &Membership) {
         let me = self.me;
         if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
             let mine = peers.get(me);
@@ -165,10 +154,10 @@ impl Observer {
             self.list_wanted(peers);
         }
         for (neighbour, source) in self.neighbours.iter_mut().zip(&mut self.sources) {
-            let island_member = members.has(neighbour.id);
-            if island_member != source.island_member {
-                source.island_member = island_member;
-                set_island_member(neighbour, peers, me, island_member);
+            let is_member = members.has(neighbour.id);
+            if is_member != source.is_member {
+                source.is_member = is_member;
+                set_member(neighbour, peers, me, is_member);
             }
             neighbour.snapshot = source.slot.latest();
         }
@@ -176,7 +165,7 @@ impl Observer {
 
     /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
     /// body to which this agent also gives.
-    fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, members: &Fellows) {
+    fn collect_wanted(&mut self, broad_phase: &BroadPhase, writer: &SlotWriter<Snapshot>, members: &Membership) {
         let Self { me, neighbours, links, neighbour_list, wanted, sources } = self;
         let (me, links) = (*me, *links as usize);
         let (linked, near_once) = neighbours.split_at_mut(links);
@@ -224,7 +213,7 @@ impl Observer {
     fn list(&mut self, peers: &Peers, id: AgentId) {
         let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.neighbour_of(self.me, id)) else { return };
         self.neighbours.push(neighbour);
-        self.sources.push(Source { slot: Arc::clone(&theirs.shared.slot), island_member: false });
+        self.sources.push(Source { slot: Arc::clone(&theirs.shared.slot), is_member: false });
     }
 }
 
@@ -233,10 +222,10 @@ const fn is_led(form: &CollisionShape) -> bool {
     matches!(form.kind, ShapeKind::Tool(_))
 }
 
-/// Treats `neighbour` as a member of the same island, or again as a peer outside it.
-fn set_island_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, island_member: bool) {
-    if island_member {
-        (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
+/// Treats `neighbour` as a member of the same cluster, or again as a peer outside it.
+fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
+    if is_member {
+        (neighbour.form, neighbour.law) = (None, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {
         *neighbour = outsider;
     }

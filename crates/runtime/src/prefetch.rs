@@ -25,7 +25,7 @@ impl AgentRunner {
         black_box([
             self.links.len(),
             self.hands.len(),
-            self.company.len(),
+            self.led.len(),
             self.announced.len(),
             self.observer.neighbours().len(),
         ]);
@@ -46,13 +46,13 @@ fn fetch_shared(shared: &Shared) {
         shared.wanted_hz.to_bits(),
         u64::from(shared.id.0),
     ]);
-    black_box([gauges.is_running(), shared.seating.is_some(), shared.traces.is_empty(), shared.mail.has_pending()]);
+    black_box([gauges.is_running(), shared.handover.is_some(), shared.traces.is_empty(), shared.mail.has_pending()]);
     shared.slot.fetch();
 }
 
 fn fetch_state(state: &Snapshot) {
     black_box([state.time.as_nanos(), state.steps, state.energy_j.to_bits(), state.acceleration.x.to_bits()]);
     black_box([state.touches.len(), state.grips.len(), state.given.len(), state.pairs.len(), state.bonds.len()]);
-    black_box([state.at_rest, state.resolution.is_some(), state.stand.is_some(), state.bounds.is_some()]);
+    black_box([state.at_rest, state.resolution.is_some(), state.bounds.is_some()]);
     black_box([matches!(state.body, Body::Nothing), matches!(state.inertia, Inertia::Immovable)]);
 }

@@ -36,7 +36,7 @@ impl AgentRunner {
     /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
         let cluster = self.cluster.as_deref();
-        let (agent, clock_offset, shorter) = (&self.agent, self.pace.clock_offset(), self.pace.shorter());
+        let (agent, clock_offset) = (&self.agent, self.pace.clock_offset());
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
@@ -44,7 +44,7 @@ impl AgentRunner {
             if let Some(seat) = cluster {
                 seat.complete(into);
             }
-            (into.time, into.clock_offset, into.shortened_step, into.at_rest) = (time, clock_offset, shorter, at_rest);
+            (into.time, into.clock_offset, into.at_rest) = (time, clock_offset, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;

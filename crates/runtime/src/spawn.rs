@@ -6,12 +6,11 @@
 use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::broad_phase::BroadPhase;
-use super::cluster::ClusterSeat;
+use super::cluster::{ClusterSeat, Handover, Led, assign_leaders};
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
 use super::histogram::Histogram;
-use super::island::{Company as Led, Seating, assign};
 use super::mailbox::Mailbox;
 use super::metrics::{Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
@@ -22,7 +21,6 @@ use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::{Arc, Mutex};
 
 /// Description of an agent to be started.
@@ -45,10 +43,11 @@ pub struct AgentSpawn {
     pub laws: Vec<(AgentId, Law)>,
     /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
     pub attached: Vec<Link>,
-    /// An agent with which it shares an island from the first step on: the lower number leads.
+    /// An agent with which it shares a cluster from the first step on: the lower number leads.
     pub together: Option<AgentId>,
-    /// The surroundings in whose contact clusters it is stepped; `None` for an agent that steps by itself.
-    pub clusters: Option<Arc<ClusterScene>>,
+    /// The surroundings of the clusters in which it is stepped; without effect for an agent that is no member
+    /// ([`metachron_contact::Agent::member`]).
+    pub scene: Arc<ClusterScene>,
     /// Faults injected on purpose.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
@@ -58,7 +57,7 @@ pub struct AgentSpawn {
 }
 
 impl AgentSpawn {
-    /// An agent that steps `rate_hz` times a second with a fixed step, without links and without a governor.
+    /// An agent that steps `rate_hz` times a second with a fixed step, without surroundings, links and a governor.
     #[must_use]
     pub fn alone(name: impl Into<String>, agent: Box<dyn Agent>, rate_hz: f64) -> Self {
         // an invalid rate is reported when the run begins
@@ -74,7 +73,7 @@ impl AgentSpawn {
             laws: Vec::new(),
             attached: Vec::new(),
             together: None,
-            clusters: None,
+            scene: Arc::default(),
             faults: Faults::default(),
             watches: Vec::new(),
             governor: None,
@@ -166,9 +165,8 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<AssembledRun, RunE
     let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
-    actors.iter_mut().for_each(AgentRunner::observe);
     let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign(actors, &together), handles, sleep })
+    Ok(AssembledRun { actors: assign_leaders(actors, &together), handles, sleep })
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -213,38 +211,19 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 /// The data fixed at the start, and the writer of each agent.
 fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
-    // only rigid bodies can lead and be led
-    let rigid =
-        |form: &Option<Arc<CollisionShape>>| form.as_ref().is_some_and(|form| matches!(form.kind, ShapeKind::Solid(_)));
-    let led = forms.iter().filter(|form| rigid(form)).count() > 1;
-    let clustered = spawns.iter().filter(|spawn| spawn.clusters.is_some()).count() > 1;
+    let members: Vec<_> = spawns.iter_mut().map(|spawn| spawn.agent.member().is_some()).collect();
+    let any_lead = members.iter().filter(|is_member| **is_member).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
-    for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
+    for (((spawn, id), form), is_member) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms).zip(members) {
         let writer = SlotWriter::new(Snapshot::default());
-        let seated = match spawn.clusters {
-            Some(_) => clustered && spawn.agent.member().is_some(),
-            None => led && rigid(&form),
-        };
-        let shared = Arc::new(shared(id, spawn, sleep, &writer, seated));
+        let shared = Arc::new(shared(id, spawn, sleep, &writer, is_member && any_lead));
         writers.push(writer);
         all.push(Peer { shared, form, laws: Vec::new() });
     }
     store_laws(spawns, &mut all);
     let broad_phase = may_any_touch(&all).then(|| BroadPhase::new(all.len()));
-    let linked = linked(spawns);
-    (Peers { all, broad_phase, linked }, writers)
-}
-
-/// Pairs joined by links with the ledger law, each in both orders, sorted.
-fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
-    let mut linked = Vec::new();
-    for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
-        let links = spawn.attached.iter().filter(|link| link.law == Law::Ledger);
-        linked.extend(links.map(|link| [me, link.other]));
-    }
-    linked.sort_unstable();
-    linked
+    (Peers { all, broad_phase }, writers)
 }
 
 /// Whether any two agents could touch.
@@ -272,7 +251,7 @@ fn shared(
     spawn: &mut AgentSpawn,
     sleep: &Arc<SleepRegistry>,
     writer: &SlotWriter<Snapshot>,
-    seated: bool,
+    moves: bool,
 ) -> Shared {
     Shared {
         id,
@@ -283,7 +262,7 @@ fn shared(
         mail: Mailbox::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
-        seating: seated.then(Seating::default),
+        handover: moves.then(Handover::default),
         ages: Mutex::new(Histogram::default()),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
@@ -297,8 +276,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
             links.push(link);
         }
     }
-    let scene = spawn.clusters.filter(|_| spawn.agent.member().is_some());
-    let cluster = scene.map(|scene| Box::new(ClusterSeat::new(scene)));
+    let cluster = spawn.agent.member().is_some().then(|| Box::new(ClusterSeat::new(spawn.scene)));
     AgentRunner {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
@@ -313,11 +291,11 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         links: spawn.attached,
         hands: Vec::new(),
         cluster,
-        company: Led::default(),
+        led: Led::default(),
         metrics: MetricsWriter::new(),
         turn_period: TurnPeriod::default(),
         open: None,
-        beside: None,
+        was_near: None,
         withheld: false,
         announced: Vec::new(),
         unsettled_ns: 0,
@@ -328,6 +306,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::Dummy;
     use super::*;
     use glam::DVec3;
     use metachron_geometry::Solid;
@@ -351,14 +330,14 @@ mod tests {
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
         let sleep = Arc::new(SleepRegistry::new(spawns.len()));
         let (peers, _) = peers(&mut spawns, &sleep);
-        (peers.broad_phase.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
+        (peers.broad_phase.is_some(), peers.all.iter().filter(|peer| peer.shared.handover.is_some()).count())
     }
 
     #[test]
     fn unneeded_parts_of_a_run_are_not_set_up() {
         assert_eq!(set_up(vec![ball()]), (false, 0));
         assert_eq!(set_up(vec![tube()]), (false, 0));
-        assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 0));
-        assert_eq!(set_up(vec![tube(), ball(), ball()]), (true, 2));
+        assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 3));
+        assert_eq!(set_up(vec![Dummy::new(1.0).at(100.0), ball(), ball()]), (true, 2));
     }
 }

@@ -1,20 +1,22 @@
-//! An agent without physics for the runtime's tests: it counts, drifts towards its neighbours and fails on demand.
+//! An agent without physics for the runtime's tests: it counts, drifts towards its neighbours and fails on demand; as a member of clusters
+//! it moves as it is led.
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
 use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::Exchange;
-use metachron_contact::{Agent, IslandMember, StepContext};
+use metachron_contact::cluster::{Block, Side};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{
-    AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
-    StepReport,
+    AgentId, Anchor, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot,
+    StepError, StepReport,
 };
 use metachron_core::{Impulse, Site};
-use metachron_geometry::Solid;
-use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
-use rapier3d::geometry::SharedShape;
-use std::sync::{Arc, Mutex};
+use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
+use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -75,8 +77,14 @@ pub(super) enum Fault {
     Hang,
 }
 
-/// Whether two agents, by rising numbers, are bonded at a time.
-pub(super) type Bond = fn(u32, u32, SimTime) -> bool;
+/// How a member moves along z: up and down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Swing {
+    pub reach_m: f64,
+    pub rate_hz: f64,
+    /// In turns.
+    pub phase: f64,
+}
 
 /// One step that was made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,15 +93,15 @@ pub(super) struct RecordedStep {
     pub from: SimTime,
     pub to: SimTime,
     pub thread: String,
-    /// The neighbours it saw, and whether it was to act on them.
-    pub saw: Vec<(AgentId, bool)>,
+    /// The neighbours it saw.
+    pub saw: Vec<AgentId>,
 }
 
 /// All steps made by any agent.
 pub(super) type Log = Arc<Mutex<Vec<RecordedStep>>>;
 
 /// The test agent. Its snapshot reports the impulse taken as energy and the impulse given as residual.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Dummy {
     /// The work each step reports; with the model "synthetic", microseconds.
     pub work: f64,
@@ -101,8 +109,6 @@ pub(super) struct Dummy {
     pub rest_from: Option<u64>,
     /// Fails at this step.
     pub fault: Option<(u64, Fault)>,
-    /// Up to this step none is longer than this.
-    pub short: Option<(u64, SimSpan)>,
     /// The agent it acts on, and from which step on.
     pub touches: Option<(u64, AgentId)>,
     pub resolution: Resolution,
@@ -110,9 +116,11 @@ pub(super) struct Dummy {
     pub x: f64,
     /// It has a form: a ball of this radius that moves along z with this speed.
     pub ball: Option<(f64, f64)>,
-    /// The agents to which it is bonded.
-    pub bond: Option<Bond>,
-    /// It gives one newton second to every peer whose pair it owns, at each of its first so many steps.
+    /// It is a member of clusters, touched by nothing.
+    pub is_member: bool,
+    /// How it moves as a member; it stays where it is without.
+    pub swing: Option<Swing>,
+    /// It gives one newton second to everybody near, at each of its first so many steps; not as a member.
     pub impulses: u64,
     /// Impulses along x taken, newton seconds.
     pub taken: f64,
@@ -124,6 +132,20 @@ pub(super) struct Dummy {
     pub time: SimTime,
     /// Position of its matter along z.
     pub z: f64,
+    pub form: Option<Arc<CollisionShape>>,
+    /// Its macro step, until it is written.
+    pub step: Mutex<Option<RecordedStep>>,
+    pub kept: Kept,
+}
+
+/// What a macro step of a member may begin again from.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Kept {
+    /// Into the macro step, seconds.
+    after_s: f64,
+    steps: u64,
+    x: f64,
+    z: f64,
 }
 
 impl Dummy {
@@ -133,13 +155,13 @@ impl Dummy {
             work,
             rest_from: None,
             fault: None,
-            short: None,
             touches: None,
             resolution: Resolution { eps_m: 0.01, n: 1 },
             steps: 0,
             x: 0.0,
             ball: None,
-            bond: None,
+            is_member: false,
+            swing: None,
             impulses: 0,
             taken: 0.0,
             given: 0.0,
@@ -148,25 +170,49 @@ impl Dummy {
             me: AgentId(0),
             time: SimTime::ZERO,
             z: 0.0,
+            form: None,
+            step: Mutex::new(None),
+            kept: Kept::default(),
         }
     }
 
-    /// An agent that is bonded to others as `bond` says, and whose steps are recorded in `log`.
-    pub fn bonded(work: f64, bond: Bond, log: &Log) -> Self {
-        Self { ball: Some((0.1, 0.0)), bond: Some(bond), log: Some(Arc::clone(log)), ..Self::new(work) }
+    /// A member of clusters that stays where it is, whose steps are recorded in `log`.
+    pub fn member(work: f64, log: &Log) -> Self {
+        Self { ball: Some((0.1, 0.0)), is_member: true, log: Some(Arc::clone(log)), ..Self::new(work) }
     }
 
     /// A spawn at this rate with a fixed step.
-    pub fn at(self, rate_hz: f64) -> AgentSpawn {
+    pub fn at(mut self, rate_hz: f64) -> AgentSpawn {
+        self.form = self.ball.map(|(radius_m, _)| ball_form(radius_m));
         let range = Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) });
         AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
     }
 
-    fn write_down(&self, to: SimTime, context: &StepContext<'_>) {
-        let Some(log) = &self.log else { return };
-        let thread = thread::current().name().unwrap_or_default().to_owned();
-        let saw = context.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
-        log.lock().unwrap().push(RecordedStep { id: context.me, from: context.time, to, thread, saw });
+    fn record(&self, to: SimTime, context: &StepContext<'_>) {
+        if let Some(log) = &self.log {
+            log.lock().unwrap().push(RecordedStep { to, ..recorded(context) });
+        }
+    }
+
+    /// Fails if it is to.
+    fn fail(&mut self, dt_s: f64) -> Result<(), StepError> {
+        match self.fault.filter(|(step, _)| *step == self.steps + 1) {
+            Some((_, Fault::NotFinite)) => self.x = f64::NAN,
+            Some((_, Fault::Diverged)) => {
+                return Err(StepError::Diverged { model: "synthetic", dt_s, what: "on demand".into() });
+            }
+            Some((_, Fault::Panic)) => panic!("on demand"),
+            Some((_, Fault::Hang)) => loop {
+                thread::park();
+            },
+            None => {}
+        }
+        Ok(())
+    }
+
+    fn speed_m_s(&self) -> f64 {
+        let swing = self.swing.map(|swing| swing.reach_m * TAU * swing.rate_hz);
+        swing.or(self.ball.map(|(_, speed_m_s)| speed_m_s)).unwrap_or(0.0).abs()
     }
 
     fn exchange_impulses(&mut self, context: &StepContext<'_>, dt_s: f64) {
@@ -174,7 +220,7 @@ impl Dummy {
         self.exchange.open(context);
         self.exchange.take(context, context.time, |_, _, impulse, _| *taken += impulse.linear.x);
         if self.steps <= self.impulses {
-            for other in context.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
+            for other in context.neighbours.iter().filter(|n| n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
                 self.exchange.give(other.id, Site::Whole, 0.0, push);
                 self.given += 1.0;
@@ -184,19 +230,16 @@ impl Dummy {
     }
 }
 
-/// Writes the group of every agent but the first of `ids` into `apart`: zero is bonded to the first.
-fn groups(bond: Bond, ids: impl Fn(usize) -> AgentId, count: usize, time: SimTime, apart: &mut Vec<u32>) {
-    apart.extend(0..count as u32);
-    for _ in 0..count {
-        for (i, j) in (0..count).flat_map(|i| (0..i).map(move |j| (i, j))) {
-            let (a, b) = (ids(i).0.min(ids(j).0), ids(i).0.max(ids(j).0));
-            if bond(a, b, time) {
-                let least = apart[i].min(apart[j]);
-                (apart[i], apart[j]) = (least, least);
-            }
-        }
-    }
-    apart.remove(0);
+/// A step that begins.
+fn recorded(context: &StepContext<'_>) -> RecordedStep {
+    let thread = thread::current().name().unwrap_or_default().to_owned();
+    let saw = context.neighbours.iter().map(|n| n.id).collect();
+    RecordedStep { id: context.me, from: context.time, to: context.time, thread, saw }
+}
+
+fn ball_form(radius_m: f64) -> Arc<CollisionShape> {
+    let solid = SolidShape::new(Solid::Ball { radius_m }, DVec3::ZERO).unwrap();
+    Arc::new(CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.0, restitution: 0.0 })
 }
 
 impl Agent for Dummy {
@@ -206,20 +249,10 @@ impl Agent for Dummy {
 
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = dt.as_secs_f64();
-        match self.fault.filter(|(step, _)| *step == self.steps + 1) {
-            Some((_, Fault::NotFinite)) => self.x = f64::NAN,
-            Some((_, Fault::Diverged)) => {
-                return Err(StepError::Diverged { model: "synthetic", dt_s, what: "on demand".into() });
-            }
-            Some((_, Fault::Panic)) => panic!("on demand"),
-            Some((_, Fault::Hang)) => {
-                self.write_down(context.time, context);
-                loop {
-                    thread::park();
-                }
-            }
-            None => {}
+        if self.fault == Some((self.steps + 1, Fault::Hang)) {
+            self.record(context.time, context);
         }
+        self.fail(dt_s)?;
         self.steps += 1;
         let met = context.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
         let pulled = context.anchor_springs().map(|p| p.target.x);
@@ -227,14 +260,9 @@ impl Agent for Dummy {
         self.exchange_impulses(context, dt_s);
         (self.me, self.time) = (context.me, context.time + dt);
         self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
-        self.write_down(self.time, context);
+        self.record(self.time, context);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
-    }
-
-    fn longest_step(&self, dt: SimSpan, _context: &StepContext<'_>) -> SimSpan {
-        let shorter = self.short.filter(|(until, _)| self.steps < *until);
-        shorter.map_or(dt, |(_, span)| dt.min(span))
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -253,14 +281,14 @@ impl Agent for Dummy {
         (into.energy_j, into.residual_m) = (self.taken, self.given);
         into.touches.extend(self.touches.filter(|(from, _)| self.steps >= *from).map(|(_, id)| id));
         // the published bounds do not follow x, so that tests can place them
-        into.bounds = self.ball.map(|(radius_m, speed_m_s)| {
+        into.bounds = self.ball.map(|(radius_m, _)| {
             let (centre, half) = (DVec3::Z * self.z, DVec3::splat(radius_m));
-            Bounds { low: centre - half, high: centre + half, speed_m_s: speed_m_s.abs() }
+            Bounds { low: centre - half, high: centre + half, speed_m_s: self.speed_m_s() }
         });
         self.exchange.write(into);
-        if let Some(bond) = self.bond {
-            let others = (0..16).filter(|k| *k != self.me.0);
-            into.bonds.extend(others.filter(|k| bond(self.me.0.min(*k), self.me.0.max(*k), self.time)).map(AgentId));
+        let step = self.step.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let (Some(log), Some(step)) = (&self.log, step) {
+            log.lock().unwrap_or_else(PoisonError::into_inner).push(step);
         }
     }
 
@@ -273,30 +301,95 @@ impl Agent for Dummy {
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
-        self.ball.map(|(radius_m, _)| {
-            let solid = Solid::Ball { radius_m };
-            let shape = SharedShape::ball(radius_m as f32);
-            let kind = ShapeKind::Solid(SolidShape { solid, shape, com_local: DVec3::ZERO, radius_m });
-            Arc::new(CollisionShape { kind, friction: 0.0, restitution: 0.0 })
-        })
+        self.form.clone()
     }
 
-    fn step_island(
-        &mut self,
-        dt: SimSpan,
-        context: &StepContext<'_>,
-        others: &mut [IslandMember<'_>],
-        apart: &mut Vec<u32>,
-    ) -> Result<StepReport, StepError> {
-        let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
-        let mut report = self.step(dt, context)?;
-        for other in others.iter_mut() {
-            let one = other.agent.step(dt, &other.context)?;
-            report.work += one.work;
-            report.at_rest &= one.at_rest;
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        if self.is_member { Some(self) } else { None }
+    }
+}
+
+impl ClusterMember for Dummy {
+    fn role(&self) -> Role {
+        Role::Kinematic
+    }
+
+    fn look(&mut self, context: &StepContext<'_>, _dt_s: f64) {
+        (self.me, self.time, self.kept.after_s) = (context.me, context.time, 0.0);
+        if self.log.is_some() {
+            *self.step.lock().unwrap() = Some(recorded(context));
         }
-        let ids = |k: usize| if k == 0 { context.me } else { others[k - 1].id };
-        groups(bond, ids, others.len() + 1, context.time + dt, apart);
-        Ok(report)
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        self.fail(h_s)
+    }
+
+    fn blocks(&self) -> &[Block] {
+        &[]
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &[]
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &[]
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        let view = ShapePose::Solid { position: DVec3::Z * self.z, rotation: DQuat::IDENTITY };
+        Some(PlacedShape { form: self.form.as_deref()?, view })
+    }
+
+    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
+        Side::FIXED
+    }
+
+    fn anchor(&self, _anchor: Anchor) -> Option<MaterialPoint> {
+        None
+    }
+
+    fn spares(&self, _other: AgentId) -> bool {
+        true
+    }
+
+    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
+        self.speed_m_s()
+    }
+
+    fn keep(&mut self) {
+        self.kept = Kept { after_s: self.kept.after_s, steps: self.steps, x: self.x, z: self.z };
+    }
+
+    fn go_back(&mut self) {
+        (self.steps, self.x, self.z, self.kept.after_s) = (self.kept.steps, self.kept.x, self.kept.z, 0.0);
+    }
+
+    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {}
+
+    fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        // the macro step counts as one
+        self.steps += u64::from(self.kept.after_s == 0.0);
+        self.kept.after_s += h_s;
+        self.x += h_s;
+        let now = self.time + SimSpan::from_secs_f64(self.kept.after_s).unwrap();
+        if let Some(Swing { reach_m, rate_hz, phase }) = self.swing {
+            self.z = reach_m * libm::sin(TAU * (now.as_secs_f64() * rate_hz + phase));
+        }
+        if let Some(step) = &mut *self.step.lock().unwrap() {
+            step.to = now;
+        }
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        self.rest_from.is_some_and(|from| self.steps >= from)
+    }
+
+    fn rest(&mut self) {}
+
+    fn work(&self) -> f64 {
+        self.work
     }
 }

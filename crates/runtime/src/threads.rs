@@ -8,9 +8,9 @@ use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::clock::{Clock, wait_until};
+use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
-use super::island::{Seating, empty_rooms, move_in};
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::sleep::SleepRegistry;
@@ -107,7 +107,7 @@ impl Threads {
             handle.shared.gauges.park(format!("a step did not end within {} s", PATIENCE.as_secs_f64()));
         }
         self.threads.clear();
-        empty_rooms(&self.handles, &self.timeline.read(), self.clock.now());
+        close_remaining(&self.handles, &self.timeline.read(), self.clock.now());
     }
 }
 
@@ -176,7 +176,7 @@ impl AgentThread {
                     Some(actor) if actor.is_parked() => return,
                     moved => moved,
                 },
-                None => self.wait_for(shared.seating.as_ref()),
+                None => self.wait_for(shared.handover.as_ref()),
             };
         }
         if let Some(mut actor) = here {
@@ -195,7 +195,7 @@ impl AgentThread {
                 Next::Rest => self.rest(&mut actor),
                 Next::Join(leader) => {
                     self.settle(&mut actor);
-                    actor = move_in(actor, leader).err()?;
+                    actor = hand_over(actor, leader).err()?;
                     Next::Due
                 }
                 Next::Parked => {
@@ -208,12 +208,12 @@ impl AgentThread {
     }
 
     /// Waits until the agent returns from its leader.
-    fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<AgentRunner>> {
-        let home = seating.and_then(Seating::come_home);
-        if home.is_none() {
+    fn wait_for(&self, handover: Option<&Handover>) -> Option<Box<AgentRunner>> {
+        let returned = handover.and_then(Handover::take_returned);
+        if returned.is_none() {
             thread::park();
         }
-        home
+        returned
     }
 
     /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which is harmless.

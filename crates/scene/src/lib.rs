@@ -38,12 +38,10 @@ use build::{Objects, SceneContext};
 use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
-use format::{ContactPath, ContactsFile, SceneFile, WorldFile};
+use format::{ContactsFile, SceneFile, WorldFile};
 use glam::DVec3;
-use metachron_models::rigid::Joint;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
-use std::sync::Arc;
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
@@ -115,14 +113,13 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     // ties between objects that are wrong themselves would give spurious problems
     let sound = c.count() == 0;
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
-    let joints: Arc<[Joint]> = joints.into();
-    objects.set_joints(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     let contacts = file.world.as_ref().and_then(|world| world.contacts);
-    let clusters = contacts == Some(ContactsFile::By(ContactPath::Clusters));
-    if clusters {
-        build::without_laws(c, &couplings);
+    if let Some(ContactsFile::By(_)) = contacts {
+        let expected =
+            "expected no such key: contacts are solved in clusters; or false, for those that a coupling names alone";
+        c.wrong(&Place::new("world", "of `[world]`"), "contacts", "is neither true nor false", expected);
     }
     Scene {
         name: source.name().to_owned(),
@@ -140,8 +137,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         scenery: objects.scenery,
         groups,
         contacts: contacts != Some(ContactsFile::Whether(false)),
-        clusters,
-        joints,
+        joints: joints.into(),
         couplings,
         probes,
         overlaps: Vec::new(),

@@ -1,28 +1,26 @@
 //! Couplings between agents in a run, collected from the states that they publish.
 //!
 //! In: the newest states at each gathering, and which agents have new ones. Out: a [`Coupling`] for every pair and kind that ever occurred.
-//! A pair is read again only when one of its agents has a new state: a heap at rest costs nothing. Never here: forces; only the owners of
-//! the pairs know them.
+//! A pair is read again only when one of its agents has a new state: a heap at rest costs nothing. Never here: forces.
 
 use glam::DVec3;
 use metachron_core::{AgentId, Snapshot};
 use metachron_core::{PairKind, PairState};
-use metachron_world::Scene;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The interaction of two agents.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coupling {
-    /// The grasping tool, or the owner of the pair; in an island the lower number.
+    /// The grasping tool, or the side that publishes the pair: in a cluster the lower number.
     pub a: AgentId,
     /// The peer.
     pub b: AgentId,
-    /// The kind of coupling: `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `island`, `grasp`, `attach`.
+    /// The kind of coupling: `cluster`, `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `grasp`, `attach`.
     pub kind: &'static str,
     /// Contacts or attachments at the end of the run.
     pub contacts: u32,
-    /// Force at the end of the run, newtons; zero in an island, whose inner forces are not published.
+    /// Force at the end of the run, newtons.
     pub force_n: f64,
     /// Largest force seen by a frame, newtons.
     pub force_max_n: f64,
@@ -41,7 +39,7 @@ pub struct Coupling {
     /// Whether both ledgers were ever seen at the same revision.
     pub(super) compared: bool,
     /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
-    /// other; `None` where no contact was solved between the two: in an island, which is one solve, and for links, penalties and lines.
+    /// other; `None` where none are published: in clusters, and for links, penalties and lines.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// Energy left in the energy tank, joules; `None` where the law has none.
     pub tank_j: Option<f64>,
@@ -52,11 +50,7 @@ pub struct Coupling {
 /// All couplings of a run so far.
 #[derive(Debug, Default)]
 pub(super) struct Couplings {
-    /// Pairs in resting contact from the start: they share an island already, without having formed a bond.
-    resting: Vec<(AgentId, AgentId)>,
     all: Vec<Coupling>,
-    /// Number of joints of each coupling.
-    joints: Vec<u32>,
     known: BTreeMap<(AgentId, AgentId, &'static str), usize>,
     /// Indices of each agent's couplings.
     of: Vec<Vec<usize>>,
@@ -64,9 +58,6 @@ pub(super) struct Couplings {
     changed: Vec<AgentId>,
     is_changed: Vec<bool>,
 }
-
-/// Rigid bodies that share a clock.
-const ISLAND: &str = "island";
 
 impl Coupling {
     pub(super) const fn new(a: AgentId, b: AgentId, kind: &'static str) -> Self {
@@ -87,12 +78,6 @@ impl Coupling {
             tank_j: None,
             parasitic_kg: 0.0,
         }
-    }
-
-    /// Whether the two share a clock.
-    #[must_use]
-    pub fn is_island(&self) -> bool {
-        self.kind == ISLAND
     }
 
     fn update(&mut self, state: &PairState) {
@@ -127,20 +112,6 @@ impl Coupling {
 }
 
 impl Couplings {
-    /// The couplings before the first step: jointed bodies share a clock from the start.
-    pub(super) fn of(scene: &Scene) -> Self {
-        if scene.clusters {
-            return Self::default();
-        }
-        let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
-        for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
-            let at = couplings.number(a.min(b), a.max(b), ISLAND);
-            couplings.joints[at] += 1;
-            couplings.all[at].contacts = couplings.joints[at];
-        }
-        couplings
-    }
-
     /// All couplings, in the order in which they were first seen.
     pub(super) fn all(&self) -> &[Coupling] {
         &self.all
@@ -157,11 +128,9 @@ impl Couplings {
         }
     }
 
-    /// Updates the couplings of the agents reported by [`Self::mark_changed`] from the `newest` states; `leader` gives the leader of an agent's
-    /// island.
-    pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
+    /// Updates the couplings of the agents reported by [`Self::mark_changed`] from the `newest` states.
+    pub(super) fn note(&mut self, newest: &[Arc<Snapshot>]) {
         self.reset_changed();
-        self.note_resting(&leader);
         let changed = std::mem::take(&mut self.changed);
         for &id in &changed {
             let Some(snapshot) = newest.get(id.0 as usize) else { continue };
@@ -169,17 +138,7 @@ impl Couplings {
             for state in &snapshot.pairs {
                 self.note_pair(id, state, newest);
             }
-            if snapshot.cluster.is_some() {
-                continue;
-            }
-            // both sides publish the bond while they share a clock: the lower number records it
-            for other in snapshot.bonds.iter().filter(|other| **other > id) {
-                let coupling = self.at(id, *other, ISLAND);
-                coupling.contacts = coupling.contacts.max(1);
-            }
         }
-        let alone = |id: &&AgentId| newest.get(id.0 as usize).is_none_or(|state| state.cluster.is_none());
-        changed.iter().filter(alone).for_each(|id| self.note_island_member(*id, leader(*id)));
         changed.iter().for_each(|id| self.is_changed[id.0 as usize] = false);
         self.changed = changed;
         self.changed.clear();
@@ -191,38 +150,13 @@ impl Couplings {
         for k in 0..self.changed.len() {
             for &at in of.get(self.changed[k].0 as usize).into_iter().flatten() {
                 let coupling = &mut self.all[at];
-                (coupling.contacts, coupling.force_n, coupling.penetration_m) = (self.joints[at], 0.0, 0.0);
+                (coupling.contacts, coupling.force_n, coupling.penetration_m) = (0, 0.0, 0.0);
                 let (a, b) = (coupling.a, coupling.b);
                 self.mark_changed(a);
                 self.mark_changed(b);
             }
         }
         self.of = of;
-    }
-
-    fn note_resting(&mut self, leader: &impl Fn(AgentId) -> AgentId) {
-        let mut resting = std::mem::take(&mut self.resting);
-        resting.retain(|&(a, b)| {
-            if ![a, b].iter().any(|id| self.is_changed.get(id.0 as usize) == Some(&true)) {
-                return true;
-            }
-            let together = leader(a) == leader(b);
-            if together {
-                let coupling = self.at(a, b, ISLAND);
-                coupling.contacts = coupling.contacts.max(1);
-            }
-            together
-        });
-        self.resting = resting;
-    }
-
-    /// Records an agent that shares an island without having published a bond (it joined before it touched any body) as coupled to its
-    /// leader.
-    fn note_island_member(&mut self, id: AgentId, leader: AgentId) {
-        let is_recorded = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
-        if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(is_recorded)) {
-            self.at(leader, id, ISLAND).contacts = 1;
-        }
     }
 
     /// Records the grasp of a tool.
@@ -275,7 +209,6 @@ impl Couplings {
         let at = self.all.len();
         self.known.insert((a, b, kind), at);
         self.all.push(Coupling::new(a, b, kind));
-        self.joints.push(0);
         for id in [a, b].map(|id| id.0 as usize) {
             if self.of.len() <= id {
                 self.of.resize_with(id + 1, Vec::new);
@@ -307,18 +240,11 @@ mod tests {
     use metachron_core::Body;
     use metachron_core::{Ahead, Impulse, Ledger, Site};
     use metachron_core::{SimTime, ToolState};
-    use metachron_scene::{Source, load};
 
-    fn two_balls() -> Scene {
-        let text = "format = 1\nobject = [\n{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 },\n\
-                    { name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, position_m = [9, 0, 0] },\n]\n";
-        Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
-    }
-
-    /// Reports all `states`, of agents without a shared island.
+    /// Reports all `states`.
     fn note(couplings: &mut Couplings, states: &[Arc<Snapshot>]) {
         (0..).map(AgentId).take(states.len()).for_each(|id| couplings.mark_changed(id));
-        couplings.note(states, |id| id);
+        couplings.note(states);
     }
 
     fn pushed(x: f64) -> Impulse {
@@ -345,8 +271,7 @@ mod tests {
             force_n: 3.0,
             ..PairState::new(AgentId(1), PairKind::Ledger)
         };
-        let scene = two_balls();
-        let mut couplings = Couplings::of(&scene);
+        let mut couplings = Couplings::default();
         note(&mut couplings, &states(&given, early.clone(), state));
         // two of four newton seconds are not taken yet, and the owner reports one and a half in flight
         assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
@@ -370,8 +295,7 @@ mod tests {
         for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
             let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
             let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
-            let scene = two_balls();
-            let mut couplings = Couplings::of(&scene);
+            let mut couplings = Couplings::default();
             note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
             let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
             assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, name));
@@ -381,7 +305,6 @@ mod tests {
 
     #[test]
     fn inverse_masses_are_in_the_order_of_the_two_agents() {
-        let scene = two_balls();
         let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
         let still = DVec3::ZERO;
         let tool = ToolState {
@@ -401,7 +324,7 @@ mod tests {
         ] {
             let pair = PairState { inverse_mass_per_kg: Some([3.0, 2.0]), ..PairState::new(AgentId(1), kind) };
             let owner = Snapshot { pairs: vec![pair], ..Snapshot::default() };
-            let mut couplings = Couplings::of(&scene);
+            let mut couplings = Couplings::default();
             note(&mut couplings, &[Arc::new(owner), Arc::new(Snapshot { body, ..Snapshot::default() })]);
             let rows = &couplings.all()[0];
             assert_eq!((rows.a.0, rows.b.0, rows.inverse_mass_per_kg.unwrap()), want, "{kind:?}");
@@ -409,48 +332,21 @@ mod tests {
     }
 
     #[test]
-    fn bodies_that_share_a_clock_are_an_island_until_they_part() {
-        let bound = |with| Arc::new(Snapshot { bonds: vec![AgentId(with)], ..Snapshot::default() });
-        let scene = two_balls();
-        let mut couplings = Couplings::of(&scene);
-        note(&mut couplings, &[bound(1), bound(0)]);
-        assert_eq!(
-            couplings.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>(),
-            [(0, 1, "island", 1)]
-        );
-        assert_eq!(couplings.all()[0].inverse_mass_per_kg, None, "its contacts meet in the shared world");
-        note(&mut couplings, &[Arc::default(), Arc::default()]);
-        assert_eq!(couplings.all()[0].contacts, 0);
-    }
-
-    #[test]
-    fn an_island_member_without_contact_is_coupled_to_its_leader() {
-        let mut couplings = Couplings::of(&two_balls());
-        let states = [Arc::default(), Arc::default()];
-        (0..2).for_each(|id| couplings.mark_changed(AgentId(id)));
-        couplings.note(&states, |_| AgentId(0));
-        let rows = |c: &Couplings| c.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>();
-        assert_eq!(rows(&couplings), [(0, 1, "island", 1)]);
-        note(&mut couplings, &states);
-        assert_eq!(rows(&couplings), [(0, 1, "island", 0)], "the body has left the island");
-    }
-
-    #[test]
     fn a_coupling_without_new_states_is_kept_and_either_agent_resets_it() {
         let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
         let state = |pairs: Vec<PairState>| Arc::new(Snapshot { pairs, ..Snapshot::default() });
-        let mut couplings = Couplings::of(&two_balls());
+        let mut couplings = Couplings::default();
         let touching = [state(vec![pair(3)]), Arc::default()];
         note(&mut couplings, &touching);
         // no agent has a new state: nothing is read
-        couplings.note(&[], |id| id);
+        couplings.note(&[]);
         assert_eq!(couplings.all()[0].contacts, 3);
         // the peer has a new state: the owner is read again
         couplings.mark_changed(AgentId(1));
-        couplings.note(&touching, |id| id);
+        couplings.note(&touching);
         assert_eq!(couplings.all()[0].contacts, 3);
         couplings.mark_changed(AgentId(0));
-        couplings.note(&[Arc::default(), Arc::default()], |id| id);
+        couplings.note(&[Arc::default(), Arc::default()]);
         assert_eq!((couplings.all().len(), couplings.all()[0].contacts), (1, 0));
     }
 }

@@ -64,10 +64,10 @@ pub struct PairError {
     pub position_max_m: f64,
     /// Largest difference of momentum of either agent, N·s.
     pub momentum_max_n_s: f64,
-    /// Impulse exchanged in the run, N·s; `None` where some of it stayed inside an island, which does not publish it.
-    pub impulse_n_s: Option<f64>,
+    /// Impulse exchanged in the run, N·s.
+    pub impulse_n_s: f64,
     /// Impulse exchanged on the common clock, N·s.
-    pub impulse_oracle_n_s: Option<f64>,
+    pub impulse_oracle_n_s: f64,
 }
 
 /// Distance of one agent's states from those on the common clock.
@@ -209,20 +209,19 @@ fn pairs(run: &[Coupling], common: &[Coupling], distances: &[Distance]) -> Vec<P
             position_rms_m: ((one.square_sum + two.square_sum) / points).sqrt(),
             position_max_m: one.max_m.max(two.max_m),
             momentum_max_n_s: one.momentum_max_n_s.max(two.momentum_max_n_s),
-            impulse_n_s: run.get(&(a, b)).copied().unwrap_or(Some(0.0)),
-            impulse_oracle_n_s: common.get(&(a, b)).copied().unwrap_or(Some(0.0)),
+            impulse_n_s: run.get(&(a, b)).copied().unwrap_or(0.0),
+            impulse_oracle_n_s: common.get(&(a, b)).copied().unwrap_or(0.0),
         }
     };
     all.into_iter().map(pair).collect()
 }
 
-/// The impulse that every pair exchanged, summed over the kinds of coupling; `None` where some of it stayed inside an island.
-fn impulses(couplings: &[Coupling]) -> BTreeMap<(AgentId, AgentId), Option<f64>> {
+/// The impulse that every pair exchanged, summed over the kinds of coupling.
+fn impulses(couplings: &[Coupling]) -> BTreeMap<(AgentId, AgentId), f64> {
     let mut sums = BTreeMap::new();
     for coupling in couplings {
         let pair = (coupling.a.min(coupling.b), coupling.a.max(coupling.b));
-        let sum = sums.entry(pair).or_insert(Some(0.0));
-        *sum = sum.filter(|_| !coupling.is_island()).map(|sum| sum + coupling.impulse_n_s);
+        *sums.entry(pair).or_insert(0.0) += coupling.impulse_n_s;
     }
     sums
 }
@@ -254,13 +253,13 @@ mod tests {
     }
 
     #[test]
-    fn impulses_of_all_kinds_are_summed_and_an_island_keeps_its_own() {
+    fn impulses_of_all_kinds_are_summed() {
         let coupling =
             |a, b, kind, impulse_n_s| Coupling { impulse_n_s, ..Coupling::new(AgentId(a), AgentId(b), kind) };
         let sums =
-            impulses(&[coupling(1, 0, "ledger", 2.0), coupling(0, 1, "attach", 3.0), coupling(1, 2, "island", 0.0)]);
+            impulses(&[coupling(1, 0, "cluster", 2.0), coupling(0, 1, "attach", 3.0), coupling(1, 2, "cluster", 1.0)]);
         let sum = |a, b| sums[&(AgentId(a), AgentId(b))];
-        assert_eq!((sum(0, 1), sum(1, 2)), (Some(5.0), None));
+        assert_eq!((sum(0, 1), sum(1, 2)), (5.0, 1.0));
     }
 
     /// Two pairs of balls, one of which meets after 0.1 s and the other after 0.6 s.
@@ -290,7 +289,7 @@ mod tests {
         assert!(interrupted && (0.3..0.5).contains(&sim_s), "{sim_s} s");
         let [pair] = &pairs[..] else { panic!("only one pair has met: {pairs:?}") };
         // equal masses that bounce without loss exchange their 1 m/s
-        let exchanged = [pair.impulse_n_s, pair.impulse_oracle_n_s].map(Option::unwrap);
+        let exchanged = [pair.impulse_n_s, pair.impulse_oracle_n_s];
         assert!(
             (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 1e-6),
             "{pair:?}"

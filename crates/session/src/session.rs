@@ -140,7 +140,7 @@ impl Session {
             world,
             views: Vec::new(),
             levels: Vec::new(),
-            couplings: Couplings::of(&scene),
+            couplings: Couplings::default(),
             trace: None,
             records: Vec::new(),
             chosen: Chosen::default(),
@@ -441,9 +441,7 @@ impl Session {
         });
         self.scene_view.pose(now, states(self.scene.states));
         self.chosen.sim = now;
-        let agents = self.world.agents();
-        let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
-        self.couplings.note(self.reader.newest(), leader);
+        self.couplings.note(self.reader.newest());
         if let Some(trace) = &mut self.trace {
             trace.note(&self.scene, self.reader.newest());
             trace.note_couplings(now, self.couplings.all());

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Scene`]. Out: spawns for the runtime. Never here: time passing, a law of control.
 
-use super::contact_laws::{Ties, faults};
 use super::kinds::{ExecutorKind, PriorityKind};
+use super::ties::{Ties, faults};
 use super::world::WorldError;
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
@@ -26,17 +26,17 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 /// [`WorldError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    let clusters = if scene.clusters { Some(Arc::new(clusters(scene)?)) } else { None };
+    let surroundings = Arc::new(surroundings(scene)?);
     let all = scene.agents.iter();
     all.map(|member| {
         let spawn = spawn(scene, member, executor, &mut *govern, &mut ties)?;
-        Ok(AgentSpawn { clusters: clusters.clone(), ..spawn })
+        Ok(AgentSpawn { scene: Arc::clone(&surroundings), ..spawn })
     })
     .collect()
 }
 
 /// What all contact clusters of a scene share: its static solids and joints.
-fn clusters(scene: &Scene) -> Result<ClusterScene, WorldError> {
+fn surroundings(scene: &Scene) -> Result<ClusterScene, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
     among.jointed(Arc::clone(&scene.joints)).map_err(|error| failed(error.to_string()))
@@ -81,7 +81,7 @@ fn spawn(
         laws: ties.laws(member.id),
         attached: ties.attached(member.id),
         together: ties.together(member.id),
-        clusters: None,
+        scene: Arc::default(),
         faults: faults(member.faults),
         watches: watches.collect(),
         governor: govern(member),

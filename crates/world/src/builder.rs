@@ -242,7 +242,7 @@ impl Tube {
         self
     }
 
-    fn spec(self, gravity: DVec3, obstacles: &Arc<[Obstacle]>) -> TubeSpec {
+    fn spec(self, gravity: DVec3) -> TubeSpec {
         let material = Elastic {
             young_pa: self.young_pa,
             poisson: TISSUE.0,
@@ -256,7 +256,6 @@ impl Tube {
             self_contact: true,
             friction: TUBE_FRICTION,
             gravity,
-            obstacles: Arc::clone(obstacles),
             sleep: true,
             ..TubeSpec::free(self.path_m, section, self.segments)
         }
@@ -312,7 +311,7 @@ impl SceneBuilder {
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
-            ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity, &obstacles)).collect();
+            ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -337,7 +336,6 @@ impl SceneBuilder {
             scenery: Vec::new(),
             groups: Vec::new(),
             contacts: true,
-            clusters: false,
             joints: Arc::new([]),
             couplings: Vec::new(),
             probes: Vec::new(),
@@ -357,13 +355,7 @@ const DEFAULT_APPEARANCE: Appearance = Appearance {
     shading: ShadingKind::PerPixel,
 };
 
-fn member(
-    id: AgentId,
-    name: String,
-    part: Part,
-    gravity: DVec3,
-    obstacles: &Arc<[Obstacle]>,
-) -> Result<Member, SceneBuildError> {
+fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
         Part::Tube(tube) => tube.rate_hz,
@@ -372,11 +364,11 @@ fn member(
     let Some(dt) = dt else { return Err(SceneBuildError::BadRate { name, rate_hz: rate_hz.to_string() }) };
     let (spec, start) = match part {
         Part::Rigid(rigid) => {
-            let spec = RigidSpec { gravity, obstacles: Arc::clone(obstacles), ..rigid.spec };
+            let spec = RigidSpec { gravity, ..rigid.spec };
             (Spec::Rigid(spec), Resolution { eps_m: 1.0, n: N_MAX })
         }
         Part::Tube(tube) => {
-            let spec = tube.spec(gravity, obstacles);
+            let spec = tube.spec(gravity);
             let start = spec.resolution;
             (Spec::Tube(spec), start)
         }

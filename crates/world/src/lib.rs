@@ -21,7 +21,6 @@
 
 mod assemble;
 mod builder;
-pub mod contact_laws;
 pub mod couplings;
 mod initial_overlap;
 mod initial_shape;
@@ -29,6 +28,7 @@ pub mod kinds;
 mod overlap;
 mod scene;
 mod spec;
+mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};

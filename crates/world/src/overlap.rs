@@ -1,13 +1,12 @@
 //! Finds agents that start in contact with or inside each other or static solids.
 //!
-//! In: a scene. Out: all pairs that overlap although they collide, and how deep; every pair of rigid bodies in contact at rest; every
+//! In: a scene. Out: all pairs that overlap although they collide, and how deep; every pair in contact; every
 //! pair of rigid bodies so near that rotation could bring them into contact.
 //! Never here: the response to it.
 
 use super::couplings::{Coupling, CouplingKind};
 use super::initial_shape::{StartShape, shape};
 use super::scene::{Scene, Spec};
-use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::AgentId;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
@@ -86,18 +85,14 @@ impl Scene {
         }
     }
 
-    /// Every pair of rigid agents that starts at rest, in contact with each other by the ledger.
+    /// Every pair of agents that starts in contact and is solved with all that it touches.
     #[must_use]
-    pub fn resting_pairs(&self) -> Vec<(AgentId, AgentId)> {
-        let still = |id: AgentId| match self.agents.get(id.0 as usize).map(|member| &member.spec) {
-            Some(Spec::Rigid(body)) => body.velocity == DVec3::ZERO && body.spin == DVec3::ZERO,
-            _ => false,
-        };
+    pub fn touching_pairs(&self) -> Vec<(AgentId, AgentId)> {
         let other = self.pairs_by_other_laws();
         let mut pairs = Vec::new();
         self.pairs_within(TOUCH_MAX_M, |one, two, _| {
             let pair = (one.id.min(two.id), one.id.max(two.id));
-            if still(pair.0) && still(pair.1) && !other.contains(&pair) {
+            if !other.contains(&pair) {
                 pairs.push(pair);
             }
         });
@@ -105,7 +100,7 @@ impl Scene {
         pairs
     }
 
-    /// Every pair of rigid agents of equal rate that collides by the ledger and whose bounding spheres overlap.
+    /// Every pair of rigid agents of equal rate whose bounding spheres overlap and that is solved with all that it touches.
     #[must_use]
     pub fn near_pairs(&self) -> Vec<(AgentId, AgentId)> {
         let rate = |id: AgentId| self.agents.get(id.0 as usize).map(|member| member.pace.rate_hz);
@@ -124,7 +119,7 @@ impl Scene {
         pairs
     }
 
-    /// Pairs with a contact law other than the ledger.
+    /// Pairs with a contact law of their own.
     fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
         let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
         self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()

@@ -53,9 +53,7 @@ pub struct Scene {
     pub groups: Vec<Group>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
-    /// Whether all that touch is solved as one problem.
-    pub clusters: bool,
-    /// Joints between rigid agents; the spec of each rigid agent has all of them.
+    /// Joints between rigid agents.
     pub joints: Arc<[Joint]>,
     /// Pairs that interact otherwise than by the default contact.
     pub couplings: Vec<Coupling>,

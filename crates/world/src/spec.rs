@@ -151,7 +151,6 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
         held: held.filter(|(_, end)| tube.clamp[*end] || tube.pin[*end]).map(|(side, _)| side).collect(),
         friction: tube.friction,
         gravity: tube.gravity,
-        obstacles: tube.obstacles.clone(),
         sleep: tube.sleep,
     };
     SoftBody::new(spec.clone()).is_ok().then_some(spec)

@@ -5,7 +5,7 @@
 //! form of a Verlet list). It is not checked earlier. The few earliest checks are stored one by one; all other peers share one, the
 //! earliest of theirs, at which all agents are checked: memory per agent does not grow with the number of agents. Never here: the purpose of the list.
 
-use super::super::fellows::{Fellows, World};
+use super::super::cluster::{Epoch, Membership};
 use super::published_bounds::{MovingBox, ReadBounds};
 use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
@@ -28,8 +28,8 @@ pub(in super::super) struct NeighbourList {
     /// The first log entry that has not been read.
     unread: u64,
     near: Vec<AgentId>,
-    /// The island whose members were skipped last.
-    world: World,
+    /// The epoch of the members that were skipped last.
+    epoch: Epoch,
 }
 
 /// A peer, and when it is checked again.
@@ -74,7 +74,7 @@ impl NeighbourList {
             dt: SimSpan::ZERO,
             unread: 0,
             near: Vec::new(),
-            world: World::default(),
+            epoch: Epoch::default(),
         }
     }
 
@@ -99,17 +99,17 @@ impl NeighbourList {
     }
 
     /// Checks the peers whose next check is due, before a `step`; returns how many were checked. Only peers that it `may_touch` are near;
-    /// members of its own island (`members`) are skipped.
+    /// members of its own cluster (`members`) are skipped.
     pub fn update(
         &mut self,
         broad_phase: &BroadPhase,
         step: PlannedStep,
-        members: &Fellows,
+        members: &Membership,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
         let PlannedStep { start: now, dt } = step;
-        if self.world != members.world() {
-            (self.world, self.common_check) = (members.world(), SimTime::ZERO);
+        if self.epoch != members.epoch() {
+            (self.epoch, self.common_check) = (members.epoch(), SimTime::ZERO);
         }
         self.read_log(broad_phase, members);
         // checks leave time for two steps
@@ -159,7 +159,7 @@ impl NeighbourList {
         &mut self,
         broad_phase: &BroadPhase,
         now: SimTime,
-        members: &Fellows,
+        members: &Membership,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
         let Some(mine) = self.mine else { return 0 };
@@ -205,7 +205,7 @@ impl NeighbourList {
     }
 
     /// Makes the peers that became faster than their published speed due for a check.
-    fn read_log(&mut self, broad_phase: &BroadPhase, members: &Fellows) {
+    fn read_log(&mut self, broad_phase: &BroadPhase, members: &Membership) {
         let Self { me, listed, soonest, common_check, near, .. } = self;
         let most = 2 * (LISTED + near.len());
         let (next, whole) = broad_phase.read_log(self.unread, |id| {

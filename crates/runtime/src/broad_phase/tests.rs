@@ -1,6 +1,6 @@
 //! The broad phase against looking at every pair.
 
-use super::super::fellows::Fellows;
+use super::super::cluster::Membership;
 use super::*;
 use glam::DVec3;
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flye
         lists[at].update(
             &broad_phase,
             PlannedStep { start: flyers[at].time, dt: flyers[at].dt },
-            &Fellows::default(),
+            &Membership::default(),
             |_| true,
         );
         check(at, flyers, &lists[at]);
@@ -131,7 +131,7 @@ fn memory_per_agent_does_not_grow_with_the_number_of_agents() {
                     list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
                 }
                 for list in &mut lists {
-                    list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+                    list.update(&broad_phase, PlannedStep { start: now, dt }, &Membership::default(), |_| true);
                 }
             }
         });
@@ -151,9 +151,9 @@ fn a_longer_step_is_checked_ahead_at_once() {
     broad_phase.publish(AgentId(1), &ball(2.0), SimTime::ZERO);
     // a metre at 2 · 2 m/s: a quarter of a second
     let step = |start_ns, dt_ns| PlannedStep { start: SimTime::from_nanos(start_ns), dt: SimSpan::from_nanos(dt_ns) };
-    list.update(&broad_phase, step(0, 4_000_000), &Fellows::default(), |_| true);
+    list.update(&broad_phase, step(0, 4_000_000), &Membership::default(), |_| true);
     assert!(list.near().is_empty());
-    list.update(&broad_phase, step(4_000_000, 250_000_000), &Fellows::default(), |_| true);
+    list.update(&broad_phase, step(4_000_000, 250_000_000), &Membership::default(), |_| true);
     assert_eq!(list.near(), [AgentId(1)]);
 }
 
@@ -172,7 +172,7 @@ fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     let checks = |lists: &mut [NeighbourList], now: SimTime| -> usize {
         lists
             .iter_mut()
-            .map(|list| list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true))
+            .map(|list| list.update(&broad_phase, PlannedStep { start: now, dt }, &Membership::default(), |_| true))
             .sum()
     };
     assert_eq!(checks(&mut lists, SimTime::ZERO), count * (count - 1), "all agents at first");
@@ -212,7 +212,7 @@ fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
             let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
             let speed_m_s = 2.0 * libm::cos(phase).abs();
             list.publish(&broad_phase, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
-            checks += list.update(&broad_phase, PlannedStep { start: now, dt }, &Fellows::default(), |_| true);
+            checks += list.update(&broad_phase, PlannedStep { start: now, dt }, &Membership::default(), |_| true);
         }
     }
     // each agent once in 33 turns
@@ -228,14 +228,14 @@ fn an_overrun_log_makes_all_agents_be_checked() {
     let dt = SimSpan::from_nanos(1_000_000);
     list.publish(&broad_phase, Some(&at(0.0, 0.0)), SimTime::ZERO);
     broad_phase.publish(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Membership::default(), |_| true);
     assert!(list.near().is_empty());
     broad_phase.publish(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
         broad_phase.publish(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Fellows::default(), |_| true);
+    list.update(&broad_phase, PlannedStep { start: SimTime::ZERO, dt }, &Membership::default(), |_| true);
     assert_eq!(list.near(), [AgentId(1)]);
 }
 

@@ -288,43 +288,6 @@ fn a_governors_demand_is_obeyed_within_the_range() {
 }
 
 #[test]
-fn an_agent_may_step_shorter_than_requested_and_reports_it() {
-    let dummy = Dummy { short: Some((40, SimSpan::from_nanos(2_000_000))), ..Dummy::new(100.0) };
-    let mut run = lockstep(vec![dummy.at(100.0)]);
-    run.wait_until(ms(70));
-    assert_eq!(run.agents()[0].stats().dt, SimSpan::from_nanos(2_000_000));
-    assert_eq!(run.agents()[0].latest().step_s(0.01), 0.002, "and tells others");
-    run.wait_until(ms(200));
-    assert_eq!(run.agents()[0].latest().step_s(0.01), 0.01);
-    let stats = run.shutdown().remove(0);
-    // 40 steps of 2 ms, and 10 ms as before from then on
-    assert_eq!((stats.steps, stats.dt), (40 + 12, SimSpan::from_nanos(10_000_000)));
-    assert_eq!((stats.dropped, stats.misses), (SimSpan::ZERO, 0));
-}
-
-/// Wants steps twice as long as the last one, always.
-struct Doubling;
-
-impl Governor for Doubling {
-    fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
-        Demand { dt: Some(measure.dt + measure.dt), resolution: None }
-    }
-}
-
-#[test]
-fn a_governor_cannot_lengthen_the_steps_of_an_agent_that_wants_short_ones() {
-    let dummy = Dummy { short: Some((40, SimSpan::from_nanos(2_000_000))), ..Dummy::new(100.0) };
-    let mut spawn = dummy.at(250.0);
-    spawn.dt_range.1 = SimSpan::from_nanos(8_000_000);
-    spawn.governor = Some(Box::new(Doubling));
-    let mut run = lockstep(vec![spawn]);
-    run.wait_until(ms(1000));
-    let stats = run.shutdown().remove(0);
-    // 40 steps of 2 ms, one of 4 ms that was demanded meanwhile, the rest of 8 ms
-    assert_eq!((stats.steps, stats.dt), (40 + 1 + 115, SimSpan::from_nanos(8_000_000)));
-}
-
-#[test]
 fn an_invalid_agent_is_refused_with_its_name() {
     let refuse = |change: fn(&mut AgentSpawn)| {
         let mut spawn = Dummy::new(1.0).at(60.0);

@@ -8,8 +8,8 @@
 use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::AgentRunner;
 use super::super::clock::Clock;
+use super::super::cluster::Handover;
 use super::super::handle::AgentHandle;
-use super::super::island::Seating;
 use super::super::sleep::SleepRegistry;
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
@@ -104,7 +104,7 @@ impl PoolState {
 
     /// The agent that has returned from a leader.
     pub fn take_returned(&self, id: AgentId) -> Option<Box<AgentRunner>> {
-        self.handles.get(id.0 as usize)?.shared.seating.as_ref().and_then(Seating::come_home)
+        self.handles.get(id.0 as usize)?.shared.handover.as_ref().and_then(Handover::take_returned)
     }
 
     /// How long worker `at` may sleep from `now` on; `None`: until it is woken.

@@ -3,7 +3,7 @@
 //! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that does not return costs one agent and one
 //! thread: the agent is parked with the reason, and another worker takes the place. Never here: turns.
 
-use super::super::island::{empty_door, empty_rooms};
+use super::super::cluster::{close_remaining, return_arrivals};
 use super::super::priority::Priority;
 use super::shared::PoolState;
 use super::watchdog::{WatchdogWord, WatchedTurn};
@@ -153,7 +153,7 @@ impl Supervisor {
         let PoolState { sleep, handles, .. } = &*self.state;
         sleep.close(id);
         let led = || handles.iter().filter(|agent| sleep.leader(agent.id()) == id);
-        led().for_each(|agent| empty_door(&agent.shared));
+        led().for_each(|agent| return_arrivals(&agent.shared));
         led().for_each(|agent| {
             sleep.close(agent.id());
             agent.shared.gauges.park(reason.to_owned());
@@ -183,6 +183,6 @@ impl Supervisor {
         }
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
         self.state.clear(|mut actor| actor.close_account(&timeline, now));
-        empty_rooms(&self.state.handles, &timeline, now);
+        close_remaining(&self.state.handles, &timeline, now);
     }
 }

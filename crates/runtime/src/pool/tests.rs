@@ -41,8 +41,7 @@ fn a_step_that_never_returns_parks_its_agent_only() {
 #[test]
 fn agents_led_by_a_hung_agent_are_parked_with_it() {
     let log = Log::default();
-    let bonded =
-        |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::bonded(1.0, |_, _, _| true, &log) };
+    let bonded = |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::member(1.0, &log) };
     let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
     let run = pool(spawns, 2, SHORT);

@@ -5,8 +5,8 @@
 
 use super::super::agent_clock::Timeline;
 use super::super::agent_runner::{AgentRunner, Next};
+use super::super::cluster::hand_over;
 use super::super::cpu::CpuShare;
-use super::super::island::move_in;
 use super::shared::PoolState;
 use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
@@ -110,7 +110,7 @@ impl Worker {
         match next {
             Next::Due => Some(actor),
             Next::Rest => self.store_resting(actor, timeline),
-            Next::Join(leader) => move_in(actor, leader).err(),
+            Next::Join(leader) => hand_over(actor, leader).err(),
             Next::Parked => None,
         }
     }
@@ -127,8 +127,8 @@ impl Worker {
 
     fn serve(&self, id: AgentId, timeline: &Timeline) {
         let woken = self.state.take_resting(id).and_then(|actor| self.wake(actor, timeline));
-        let home = self.state.take_returned(id).filter(|actor| !actor.is_parked());
-        woken.into_iter().chain(home).for_each(|actor| self.state.put(self.at, actor, self.now));
+        let returned = self.state.take_returned(id).filter(|actor| !actor.is_parked());
+        woken.into_iter().chain(returned).for_each(|actor| self.state.put(self.at, actor, self.now));
     }
 
     /// Stores `actor` at rest, unless it was woken: then returns it to wait for a turn.

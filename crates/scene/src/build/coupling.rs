@@ -1,4 +1,5 @@
-//! Reads the couplings of a scene file: pairs that act on each other otherwise than by ledger contact, which is the default.
+//! Reads the couplings of a scene file: pairs that act on each other otherwise than as one problem with all they touch, which is the
+//! default.
 //!
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
@@ -43,16 +44,6 @@ pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects
     found
 }
 
-/// Refuses laws of single pairs where all that touch is solved as one problem.
-pub(crate) fn without_laws(c: &mut Checker<'_, '_>, couplings: &[Coupling]) {
-    let own = |coupling: &&Coupling| !matches!(coupling.law, Law::Ledger | Law::Off);
-    if couplings.iter().any(|coupling| own(&coupling)) {
-        let expected = "expected couplings of the laws `ledger` and `off`, or `contacts = \"pairs\"`";
-        let what = "is `clusters`, which solve no pair by a law of its own";
-        c.wrong(&Place::new("world", "of `[world]`"), "contacts", what, expected);
-    }
-}
-
 fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
     let (a, b) = (end(c, place, "a", &file.a, objects), end(c, place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
@@ -66,14 +57,8 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     let before = c.count();
-    let stays = matches!(file.law.unwrap_or_default(), CouplingLaw::Ledger | CouplingLaw::Off);
-    if [a, b].into_iter().any(|end| matches!(end, NamedObject::Soft(_))) && !stays {
-        let what =
-            format!("is `{}`, which sheets, solids and ropes do not support", file.law.unwrap_or_default().name());
-        c.wrong(place, "law", what, "expected `ledger` or `off`");
-    }
+    let law = law(c, place, file)?;
     check_keys(c, place, file);
-    let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
         Kind::Attach => attach(c, place, file, [a, b], objects),
@@ -81,7 +66,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     if c.count() > before {
         return None;
     }
-    Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law: law? })
+    Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law })
 }
 
 /// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
@@ -108,16 +93,14 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
 
 /// Reports keys that have no meaning for this kind and law, and required keys that are missing.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
-    let (kind, law) = (file.kind.unwrap_or_default(), file.law.unwrap_or_default());
-    let attach = kind == Kind::Attach;
-    let spring = attach || !matches!(law, CouplingLaw::Ledger | CouplingLaw::Off);
-    let what = if attach { "an attachment".to_owned() } else { format!("contact by `{}`", law.name()) };
+    let attach = file.kind.unwrap_or_default() == Kind::Attach;
+    let what = if attach { "an attachment" } else { "contact" };
     for (key, given, belongs, needed) in [
         ("at_a", file.at_a.is_some(), attach, attach),
         ("at_b", file.at_b.is_some(), attach, attach),
         ("rest_m", file.rest_m.is_some(), attach, false),
-        ("stiffness_n_m", file.stiffness_n_m.is_some(), spring, spring),
-        ("damping_n_s_m", file.damping_n_s_m.is_some(), spring, false),
+        ("stiffness_n_m", file.stiffness_n_m.is_some(), attach, attach),
+        ("damping_n_s_m", file.damping_n_s_m.is_some(), attach, false),
     ] {
         if given && !belongs {
             c.wrong(place, key, format_args!("does not belong to {what}"), "expected no such key here");
@@ -126,26 +109,23 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
             c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
         }
     }
-    if attach && law == CouplingLaw::Off {
-        c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
-    } else if attach && matches!(law, CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) {
-        let what = format!("is `{}`, a law of contacts", law.name());
-        c.wrong(place, "law", what, "expected `ledger` or `tlm`: no other law attaches");
+    if attach && file.law == Some(CouplingLaw::Off) {
+        c.wrong(place, "law", "is `off`, which attaches nothing", "expected no law, or no such coupling");
     }
 }
 
+/// The law of the pair; refuses those of pairs whose sides keep clocks of their own.
 fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<Law> {
-    let law = file.law.unwrap_or_default();
-    let extrapolate = law == CouplingLaw::PenaltyExtrapolated;
-    let (stiffness_n_m, damping_n_s_m) = match law {
-        CouplingLaw::Ledger => return Some(Law::Ledger),
-        CouplingLaw::Off => return Some(Law::Off),
-        _ => spring(c, place, file)?,
+    let what = match file.law {
+        None => return Some(Law::Ledger),
+        Some(CouplingLaw::Off) => return Some(Law::Off),
+        Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) => {
+            format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name())
+        }
+        Some(law) => format!("is `{}`: pairs that keep clocks of their own are not stepped in clusters", law.name()),
     };
-    Some(match law {
-        CouplingLaw::Tlm => Law::Tlm { stiffness_n_m, damping_n_s_m },
-        _ => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate },
-    })
+    c.wrong(place, "law", what, "expected `off`, or no law: all that touch is solved as one problem");
+    None
 }
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {

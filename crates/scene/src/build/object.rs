@@ -14,7 +14,6 @@ use crate::source::Source;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
 use metachron_geometry::Obstacle;
-use metachron_models::rigid::Joint;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
@@ -48,23 +47,11 @@ pub(crate) struct Objects {
     pub(crate) names: Names,
 }
 
-impl Objects {
-    /// Gives every rigid agent the joints of the scene.
-    pub(crate) fn set_joints(&mut self, joints: &Arc<[Joint]>) {
-        for member in &mut self.agents {
-            if let Spec::Rigid(body) = &mut member.spec {
-                body.joints = Arc::clone(joints);
-            }
-        }
-    }
-}
-
 /// What the reader of a model is given beside the model's own table.
 pub(super) struct ModelContext<'a> {
     pub(super) place: &'a Place,
     pub(super) source: &'a Source,
     pub(super) gravity: DVec3,
-    pub(super) obstacles: &'a Arc<[Obstacle]>,
     pub(super) levels: (u8, u8),
     pub(super) sleep: bool,
 }
@@ -207,7 +194,7 @@ pub(crate) fn read_objects(
     let names = assign_names(c, &entries);
     let (obstacles, obstacle_appearances) = fixed_objects(c, &entries, context.source);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
-    let agents = agents(c, &entries, &names, &AgentContext { scene: context, obstacles: &obstacles });
+    let agents = agents(c, &entries, &names, context);
     let scenery = scenery::read(c, &entries, context.source);
     Objects { agents, obstacles, obstacle_appearances, scenery, names }
 }
@@ -338,13 +325,7 @@ pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: 
     c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
 }
 
-/// What the agents of a scene share.
-struct AgentContext<'a> {
-    scene: &'a SceneContext<'a>,
-    obstacles: &'a Arc<[Obstacle]>,
-}
-
-fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, context: &AgentContext<'_>) -> Vec<Member> {
+fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, context: &SceneContext<'_>) -> Vec<Member> {
     let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
     let count = moving.iter().map(|entry| entry.copies.len()).sum();
     if count > AGENTS_MAX {
@@ -401,19 +382,18 @@ fn member(
     entry: &Entry,
     id: AgentId,
     names: &Names,
-    context: &AgentContext<'_>,
+    context: &SceneContext<'_>,
 ) -> Option<Member> {
     let Entry { place, common, model, .. } = entry;
     let model_context = ModelContext {
         place,
-        source: context.scene.source,
-        gravity: context.scene.gravity,
-        obstacles: context.obstacles,
+        source: context.source,
+        gravity: context.gravity,
         levels: levels(c, place, common),
         sleep: common.sleep.unwrap_or(true),
     };
     let pace = pace(c, place, common);
-    let faults = faults(c, place, common.faults.as_ref(), context.scene.faults);
+    let faults = faults(c, place, common.faults.as_ref(), context.faults);
     let material = match model {
         ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
         ModelFile::Tool(_) => Material::Metal,

@@ -69,8 +69,6 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
         restitution,
         friction,
         gravity: context.gravity,
-        obstacles: Arc::clone(context.obstacles),
-        joints: Arc::new([]),
         sleep: context.sleep,
     })
 }

@@ -10,7 +10,6 @@ use metachron_core::{Anchor, Body};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
-use std::sync::Arc;
 
 const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
 const POISSON: Allowed = allowed(0.0..=0.49, "");
@@ -177,7 +176,6 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         held: shared.held,
         friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
         gravity: context.gravity,
-        obstacles: Arc::clone(context.obstacles),
         sleep: context.sleep,
     }
 }

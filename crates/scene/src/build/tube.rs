@@ -10,7 +10,6 @@ use metachron_models::rod::Integrator;
 use metachron_models::rod::SUBSTEPS_MAX;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec};
-use std::sync::Arc;
 
 /// Most points of a path.
 const PATH_MAX: usize = 100_000;
@@ -69,7 +68,6 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         self_contact: file.self_contact.unwrap_or(true),
         friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
         gravity: context.gravity,
-        obstacles: Arc::clone(context.obstacles),
         sleep: context.sleep,
     };
     BuiltTube { spec, picture }

@@ -35,11 +35,11 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub probe: Vec<ProbeFile>,
-    /// Joints between rigid objects; at most 10000. Objects connected by joints share one clock.
+    /// Joints between rigid objects; at most 10000. Objects connected by joints are of one cluster.
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub joint: Vec<JointFile>,
-    /// Pairs of objects that interact otherwise than by the default ledger contact; at most 10000.
+    /// Pairs of objects that interact otherwise than by the default contact; at most 10000.
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub coupling: Vec<CouplingFile>,
@@ -60,24 +60,24 @@ pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
-    /// `"clusters"` and `"pairs"` also say how contact is solved.
     pub contacts: Option<ContactsFile>,
     /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
 }
 
-/// Whether objects collide, and how contact is solved.
+/// Whether objects collide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum ContactsFile {
     /// Whether moving objects collide with each other.
     Whether(bool),
-    /// They do, solved in this way.
+    /// Refused: contacts are solved in one way.
+    #[schemars(skip)]
     By(ContactPath),
 }
 
-/// How contact is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+/// Former ways to solve contacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ContactPath {
     /// Each pair by one of its two sides.

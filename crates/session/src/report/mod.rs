@@ -162,20 +162,20 @@ pub struct CouplingReport {
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
+    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `grasp` or `attach`.
     pub kind: String,
     /// Contacts, grasps, attachments or joints at the end of the run.
     pub contacts: u64,
     /// Difference between both sides' records of the same impulses, as a share of the impulse exchanged, without impulses in flight;
-    /// `None` where there are no two records, as in an island.
+    /// `None` where there are no two records, as in a cluster.
     pub momentum_error: Option<f64>,
     /// Impulses exchanged, magnitudes summed, newton seconds.
     pub impulse_n_s: f64,
     /// Impulse that one side had given and the other not yet taken in the last states, newton seconds.
     pub in_flight_n_s: f64,
     /// Inverse effective masses of `a` and `b` along the normal at the contact with the greatest load, 1/kg, when they last pressed on
-    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` where the two share one solve (islands), and
-    /// where no contact was solved between them.
+    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` in clusters, and where no contact was solved
+    /// between the two.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// Energy left in the energy tank, joules; `None` where the law has none.
     pub tank_j: Option<f64>,
@@ -256,10 +256,10 @@ pub struct CouplingError {
     pub position_max_m: f64,
     /// Greatest difference of either agent's momentum, newton seconds.
     pub momentum_max_n_s: f64,
-    /// Impulse exchanged in the run, newton seconds; `None` where an island does not report it.
-    pub impulse_n_s: Option<f64>,
+    /// Impulse exchanged in the run, newton seconds.
+    pub impulse_n_s: f64,
     /// Impulse exchanged under the common clock, newton seconds.
-    pub impulse_oracle_n_s: Option<f64>,
+    pub impulse_oracle_n_s: f64,
 }
 
 /// How the frame budget was spent.

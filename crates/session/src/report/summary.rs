@@ -142,7 +142,7 @@ fn reference_table(out: &mut String, oracle: &ReferenceReport) {
         "{:<41} {:>11} {:>11} {:>13} {:>12} {:>12}",
         "coupling", "rms mm", "greatest mm", "momentum N·s", "impulse N·s", "common N·s"
     );
-    let shown = |impulse: Option<f64>| impulse.map_or_else(|| "-".to_owned(), |impulse| format!("{impulse:.5}"));
+    let shown = |impulse: f64| format!("{impulse:.5}");
     for c in oracle.couplings.iter().take(COUPLINGS_SHOWN) {
         let pair = format!("{} · {}", c.a, c.b);
         let _ = writeln!(

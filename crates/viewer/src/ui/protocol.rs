@@ -322,7 +322,7 @@ pub struct AgentRow {
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
-    /// The agent whose clock it follows while it is a member of an island.
+    /// The agent that steps it as a member of its cluster.
     pub led_by: Option<String>,
     /// Present activity.
     pub state: AgentState,

@@ -153,7 +153,7 @@ fn dash() -> String {
 
 fn state_text(row: &AgentRow) -> String {
     match &row.state {
-        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("island of {by}")),
+        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("with {by}")),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
     }

@@ -1,28 +1,28 @@
-//! Who shares a world with an agent in a turn.
+//! Which agents step as one in a turn.
 //!
-//! In: the numbers of all who do. Out: whether one is among them, and in which world: a name that changes when somebody is no
-//! longer among them, so that who looked past them before looks again. Never here: why they share it.
+//! In: their numbers. Out: whether one is among them, and the epoch of the list: it changes when one is no longer among them, so that the
+//! others, which skipped it in the broad phase, search again. Never here: why they step as one.
 
 use metachron_core::AgentId;
 
 /// All that step as one.
 #[derive(Debug, Default)]
-pub(super) struct Fellows {
+pub(in super::super) struct Membership {
     /// By rising numbers.
     ids: Vec<AgentId>,
     /// A bit each, by number.
     bits: Vec<u64>,
-    world: World,
+    epoch: Epoch,
 }
 
-/// The name of a world: who leads it, and how often somebody has left it. An agent that shares none has none.
+/// The leader, and how often a member has left; `None` for an agent that never was a member.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct World(Option<(AgentId, u64)>);
+pub(in super::super) struct Epoch(Option<(AgentId, u64)>);
 
-impl Fellows {
-    /// Takes down who steps with `leader`, itself left out.
-    pub fn gather(&mut self, leader: AgentId, led: impl Iterator<Item = AgentId>) {
-        let (before, departures) = (self.ids.len(), self.world.0.map_or(0, |(_, departures)| departures));
+impl Membership {
+    /// Stores the agents that step with `leader`, itself left out.
+    pub fn set(&mut self, leader: AgentId, led: impl Iterator<Item = AgentId>) {
+        let (before, departures) = (self.ids.len(), self.epoch.0.map_or(0, |(_, departures)| departures));
         let bits = std::mem::take(&mut self.bits);
         self.ids.clear();
         self.ids.push(leader);
@@ -30,7 +30,7 @@ impl Fellows {
         self.ids.sort_unstable();
         let is_old = |id: &&AgentId| bit(&bits, **id);
         let left = self.ids.iter().filter(is_old).count() < before;
-        self.world = World(Some((leader, departures + u64::from(left))));
+        self.epoch = Epoch(Some((leader, departures + u64::from(left))));
         self.mark(bits);
     }
 
@@ -39,9 +39,9 @@ impl Fellows {
         bit(&self.bits, id)
     }
 
-    /// In which world.
-    pub const fn world(&self) -> World {
-        self.world
+    /// The epoch of the list.
+    pub const fn epoch(&self) -> Epoch {
+        self.epoch
     }
 
     /// Sets the bits, in the storage of the old ones.
@@ -62,15 +62,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_world_keeps_its_name_until_somebody_has_left_it() {
-        let mut fellows = Fellows::default();
-        let alone = fellows.world();
-        assert!(fellows.ids.is_empty() && !fellows.has(AgentId(0)));
+    fn an_epoch_lasts_until_a_member_leaves() {
+        let mut membership = Membership::default();
+        let alone = membership.epoch();
+        assert!(membership.ids.is_empty() && !membership.has(AgentId(0)));
         let mut gather = |led: &[u32]| {
-            fellows.gather(AgentId(3), led.iter().copied().map(AgentId));
-            let among: Vec<_> = (0..200).filter(|id| fellows.has(AgentId(*id))).collect();
-            assert_eq!(among, fellows.ids.iter().map(|id| id.0).collect::<Vec<_>>());
-            fellows.world()
+            membership.set(AgentId(3), led.iter().copied().map(AgentId));
+            let among: Vec<_> = (0..200).filter(|id| membership.has(AgentId(*id))).collect();
+            assert_eq!(among, membership.ids.iter().map(|id| id.0).collect::<Vec<_>>());
+            membership.epoch()
         };
         let first = gather(&[130, 64]);
         assert_ne!(first, alone);

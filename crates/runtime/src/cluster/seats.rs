@@ -1,0 +1,300 @@
+//! How agents hand their turns over to a leader and get them back.
+//!
+//! An agent moves whole: its model, its writer, its metrics, its observer. It waits among the arrivals of the agent that is to lead it, and
+//! returns to its own place. The thread that makes a leader's turns looks at the arrivals of all that it leads, so that no agent waits
+//! unseen. An agent that makes no more turns is closed: its arrivals return.
+//! Never here: steps.
+
+use super::super::agent_clock::Timeline;
+use super::super::agent_runner::AgentRunner;
+use super::super::handle::{AgentHandle, Shared};
+use super::membership::Membership;
+use crossbeam::atomic::AtomicCell;
+use metachron_core::{AgentId, DisjointSets, SimTime};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Where agents wait for a leader, and return to.
+#[derive(Default)]
+pub(in super::super) struct Handover {
+    /// Locked without waiting but at the end of a run: an agent that finds it taken tries again after the next turn.
+    arrivals: Mutex<Vec<Arrival>>,
+    returned: AtomicCell<Option<Box<AgentRunner>>>,
+}
+
+impl std::fmt::Debug for Handover {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Handover").finish_non_exhaustive()
+    }
+}
+
+/// An agent that waits to be led, boxed: it is far larger than the word that moves it.
+type Arrival = Box<AgentRunner>;
+
+/// The agents that another one leads.
+#[derive(Default)]
+pub(in super::super) struct Led {
+    /// By rising numbers.
+    seats: Vec<Seat>,
+    /// All that step as one in this turn, the leader among them.
+    membership: Membership,
+}
+
+/// One that is led.
+struct Seat {
+    actor: Box<AgentRunner>,
+    /// Zero while it stays; else it leaves, with those of the same number.
+    group: usize,
+}
+
+impl Handover {
+    /// The agent, if it has returned.
+    pub fn take_returned(&self) -> Option<Box<AgentRunner>> {
+        self.returned.take()
+    }
+
+    fn next_arrival(&self) -> Option<Box<AgentRunner>> {
+        self.arrivals.try_lock().ok()?.pop()
+    }
+
+    /// Adds `actor` to the arrivals; gives it back if another thread looks at them.
+    fn arrive(&self, actor: Box<AgentRunner>) -> Result<(), Box<AgentRunner>> {
+        match self.arrivals.try_lock() {
+            Ok(mut arrivals) => arrivals.push(actor),
+            Err(_) => return Err(actor),
+        }
+        Ok(())
+    }
+
+    /// Removes all arrivals.
+    fn clear(&self) -> Vec<Arrival> {
+        std::mem::take(&mut *self.arrivals.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Led {
+    pub fn is_empty(&self) -> bool {
+        self.seats.is_empty()
+    }
+
+    pub fn len(&self) -> usize {
+        self.seats.len()
+    }
+
+    pub fn ids(&self) -> impl Iterator<Item = AgentId> {
+        self.seats.iter().map(|seat| seat.actor.id())
+    }
+
+    pub fn each(&mut self, mut visit: impl FnMut(&mut AgentRunner)) {
+        self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor));
+    }
+
+    /// All of them, by rising numbers.
+    pub fn all(&self) -> impl Iterator<Item = &AgentRunner> {
+        self.seats.iter().map(|seat| &*seat.actor)
+    }
+
+    /// Those at `time`, by rising numbers.
+    pub fn members_at(&mut self, time: SimTime) -> impl Iterator<Item = &mut AgentRunner> {
+        self.seats.iter_mut().map(|seat| &mut *seat.actor).filter(move |actor| actor.pace.time() == time)
+    }
+
+    /// Visits those at `time`, each with all that step as one.
+    pub fn each_at(&mut self, time: SimTime, mut visit: impl FnMut(&mut AgentRunner, &Membership)) {
+        let Self { seats, membership } = self;
+        let here = seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
+        here.for_each(|seat| visit(&mut seat.actor, membership));
+    }
+
+    /// All that step as one, the leader among them, when that was last noted.
+    pub const fn membership(&self) -> &Membership {
+        &self.membership
+    }
+
+    /// Notes which agents step as one with `leader` at `time`.
+    pub fn note_membership(&mut self, leader: AgentId, time: SimTime) {
+        let Self { seats, membership } = self;
+        membership.set(leader, seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
+    }
+
+    /// Notes which of those at `time` still belong together: the leader is the first of `sets`, they follow by rising numbers.
+    pub fn note_groups(&mut self, time: SimTime, sets: &mut DisjointSets) {
+        let members = self.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
+        members.zip(1..).for_each(|(seat, place)| seat.group = sets.lowest(place));
+    }
+
+    /// Lets those that are parked return.
+    pub fn release_parked(&mut self) {
+        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|seat| seat.actor.return_turns());
+    }
+
+    /// Adds `actor` and all it leads.
+    fn admit(&mut self, mut actor: Box<AgentRunner>) {
+        // where it will be when it makes its own turns again is not known
+        actor.was_near = None;
+        self.seats.append(&mut actor.led.seats);
+        self.seats.push(Seat { actor, group: 0 });
+        self.seats.sort_unstable_by_key(|seat| seat.actor.id());
+    }
+}
+
+impl AgentRunner {
+    /// Leads its arrivals and those of the agents that it leads.
+    pub fn admit_arrivals(&mut self) {
+        let mut at = 0;
+        while let Some(actor) = self.next_arrival() {
+            self.admit(actor);
+        }
+        // an arrival may have arrivals of its own
+        while at < self.led.len() {
+            let arrived = self.led.seats[at].actor.next_arrival();
+            at = if let Some(actor) = arrived {
+                self.admit(actor);
+                0
+            } else {
+                at + 1
+            };
+        }
+    }
+
+    fn next_arrival(&self) -> Option<Box<AgentRunner>> {
+        self.shared.handover.as_ref()?.next_arrival()
+    }
+
+    fn admit(&mut self, actor: Box<AgentRunner>) {
+        let (me, sleep) = (self.id(), Arc::clone(&self.shared.sleep));
+        std::iter::once(actor.id()).chain(actor.led.ids()).for_each(|id| sleep.follow(id, Some(me)));
+        self.led.admit(actor);
+    }
+
+    /// Lets those return that have lost touch with it.
+    pub fn part(&mut self) {
+        if self.led.is_empty() {
+            return;
+        }
+        let leaving = self.led.seats.extract_if(.., |seat| seat.group != 0);
+        let mut leaving: Vec<Seat> = leaving.collect();
+        leaving.sort_unstable_by_key(|seat| (seat.group, seat.actor.id()));
+        return_groups(leaving);
+    }
+
+    /// Shows the last states of those it leads and lets them return: it makes no more turns.
+    pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
+        self.conclude_led(timeline.sim_at(wall), 0.0);
+        self.release_all();
+    }
+
+    /// Lets all it leads return, each by itself: those that belong together find together again.
+    pub fn release_all(&mut self) {
+        self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());
+    }
+
+    /// Admits nobody any more.
+    pub fn close(&self) {
+        self.shared.sleep.close(self.id());
+        return_arrivals(&self.shared);
+    }
+
+    /// Makes its own turns again, and those of all it leads.
+    fn return_turns(mut self: Box<Self>) {
+        let (id, shared) = (self.id(), Arc::clone(&self.shared));
+        self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
+        shared.sleep.follow(id, None);
+        self.settle(1.0);
+        if let Some(handover) = &shared.handover {
+            // its place is free: there is only one of it
+            drop(handover.returned.swap(Some(self)));
+        }
+        shared.sleep.notify(id);
+    }
+
+    /// The agent that should lead it: of the leaders of those that it, or one it leads, is bonded with, the lowest number. An agent at
+    /// another time would make up for that alone, and is not led before the two have come together.
+    pub fn seek_leader(&self) -> Option<AgentId> {
+        self.shared.handover.as_ref()?;
+        let led = self.led.seats.iter().map(|seat| &*seat.actor);
+        let leaders = std::iter::once(self).chain(led).filter_map(AgentRunner::bonded_leader);
+        leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
+    }
+
+    /// The leader with the lowest number of those this agent is bonded with, whichever side says so.
+    fn bonded_leader(&self) -> Option<AgentId> {
+        let (me, sleep) = (self.id(), &self.shared.sleep);
+        let newest = self.shared.slot.latest();
+        let own = newest.bonds.iter().copied();
+        let theirs = self.observer.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
+        let open =
+            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.handover.is_some());
+        own.chain(theirs).map(|id| sleep.leader(id)).filter(open).min()
+    }
+}
+
+/// Lets groups of equal number return, each led by its lowest.
+fn return_groups(leaving: Vec<Seat>) {
+    let mut leaving = leaving.into_iter().peekable();
+    while let Some(Seat { actor: mut leader, group }) = leaving.next() {
+        while let Some(next) = leaving.next_if(|seat| seat.group == group) {
+            leader.led.admit(next.actor);
+        }
+        leader.return_turns();
+    }
+}
+
+/// Hands `actor`, and all it leads, over to `leader`; gives it back if that admits nobody now.
+pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
+    let (id, sleep, peers) = (actor.id(), Arc::clone(&actor.shared.sleep), Arc::clone(&actor.peers));
+    let Some(handover) = peers.get(leader).and_then(|peer| peer.shared.handover.as_ref()) else { return Err(actor) };
+    sleep.follow(id, Some(leader));
+    if let Err(actor) = handover.arrive(actor) {
+        sleep.follow(id, None);
+        return Err(actor);
+    }
+    // the leader may have been closed just before: one of the two sides sees what is left among its arrivals
+    if sleep.is_closed(leader) {
+        handover.clear().into_iter().for_each(AgentRunner::return_turns);
+    }
+    sleep.wake(leader);
+    Ok(())
+}
+
+/// Seats agents that belong `together` before the first step: for each place in the list, the agent that makes turns of its own.
+pub(in super::super) fn assign_leaders(
+    actors: Vec<AgentRunner>,
+    together: &[Option<AgentId>],
+) -> Vec<Option<Box<AgentRunner>>> {
+    let mut sets = DisjointSets::default();
+    sets.reset(together.len());
+    for (at, other) in together.iter().enumerate() {
+        if let Some(other) = other.map(|id| id.0 as usize).filter(|other| *other < together.len()) {
+            sets.join(at, other);
+        }
+    }
+    let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
+    for at in 0..places.len() {
+        let leader = sets.lowest(at);
+        let leads = |place: &Option<Box<AgentRunner>>| place.as_ref().is_some_and(|actor| !actor.is_parked());
+        if at != leader
+            && leads(&places[at])
+            && leads(&places[leader])
+            && let Some(actor) = places[at].take()
+            && let Some(leader) = &mut places[leader]
+        {
+            leader.admit(actor);
+        }
+    }
+    places
+}
+
+/// Lets the arrivals of an agent that makes no more turns return.
+pub(in super::super) fn return_arrivals(shared: &Shared) {
+    shared.handover.iter().flat_map(Handover::clear).for_each(AgentRunner::return_turns);
+}
+
+/// Completes the metrics of those that are among arrivals or have returned when nobody looks any more.
+pub(in super::super) fn close_remaining(handles: &[AgentHandle], timeline: &Timeline, now: Duration) {
+    let handovers = handles.iter().filter_map(|handle| handle.shared.handover.as_ref());
+    for handover in handovers {
+        let left = handover.clear().into_iter().chain(handover.take_returned());
+        left.for_each(|mut actor| actor.close_account(timeline, now));
+    }
+}

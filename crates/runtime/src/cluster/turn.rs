@@ -1,0 +1,122 @@
+//! The turn of a leader: it steps all members of its cluster, and nobody else notices.
+//!
+//! In: agents that hand their turns over ([`super::seats`]). Out: the states, metrics and commands of each as if it made its turns itself.
+//!
+//! admit      agents that want to be led
+//! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
+//! step       all that are at one time as one problem ([`super`]); where that fails they part, to fail alone or not at all
+//! write, conclude    the state of each by its own writer
+//! part       those that have lost touch make their own turns again; several that still belong together are led by the lowest number
+//!
+//! The leader has the lowest number. Never here: which agents touch, threads, events.
+
+use super::super::agent_clock::{Start, Timeline};
+use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
+use super::super::metrics::Entry;
+use super::Span;
+use metachron_core::{DT_MAX_S, SimSpan, SimTime};
+use std::time::Duration;
+
+/// How the time of a leader went on without a step when its turn began.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Leap<'a> {
+    pub start: &'a Start,
+    /// By how much its own time has jumped.
+    pub jumped: SimSpan,
+}
+
+impl AgentRunner {
+    /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that time.
+    pub fn gather(&mut self, timeline: &Timeline, wall: Duration, leap: Leap<'_>) -> u32 {
+        if self.led.is_empty() {
+            return 0;
+        }
+        let (time, clock_offset, mut steps) = (self.pace.time(), self.pace.clock_offset(), 0);
+        self.led.each(|actor| {
+            let caught_up = contained(|| {
+                actor.shared.sleep.clear_wake(actor.id());
+                actor.take_commands();
+                if actor.pace.time() == time - leap.jumped {
+                    actor.pace.drop_time(leap.start.dropped, leap.jumped);
+                    actor.pace.follow_clock_offset(clock_offset);
+                    return Ok(0);
+                }
+                actor.pace.follow_clock_offset(clock_offset);
+                actor.catch_up(time, timeline, wall)
+            });
+            match caught_up {
+                Ok(made) => steps += made,
+                Err(reason) => actor.park(reason),
+            }
+        });
+        self.led.release_parked();
+        steps
+    }
+
+    /// Steps alone up to `time`; how many steps that took.
+    fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
+        let mut steps = 0;
+        while self.pace.time() < time {
+            let span = portion(time.since(self.pace.time()), self.pace.dt());
+            let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span))?;
+            self.write_snapshot(self.pace.time() + dt, false)?;
+            self.pace.advance_by(dt);
+            let work_s = self.shared.gauges.work_s.get();
+            let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
+            self.metrics.write(&self.shared.gauges, &self.pace, entry);
+            steps += 1;
+        }
+        if steps > 0 {
+            // what it has given on the way is settled before the first common step
+            self.publish(timeline.sim_at(wall));
+        }
+        Ok(steps)
+    }
+
+    /// Whether nothing keeps it from resting, nor any of those it leads.
+    pub fn may_rest(&self, now: SimTime) -> bool {
+        let time = self.pace.time();
+        self.is_undisturbed(now) && self.led.all().all(|actor| actor.pace.time() == time && actor.is_undisturbed(now))
+    }
+
+    /// Writes the states of those that have just stepped with it. One that is broken is parked alone.
+    pub fn write_led(&mut self, open: &PendingTurn) {
+        if self.led.is_empty() {
+            return;
+        }
+        let time = self.pace.time();
+        self.led.each(|actor| {
+            if actor.pace.time() != time {
+                return;
+            }
+            actor.pace.shorten(actor.pace.wanted(), open.dt);
+            match contained(|| actor.write_snapshot(time + open.dt, open.rests)) {
+                Ok(()) => {
+                    actor.pace.advance_by(open.dt);
+                    actor.open = Some(*open);
+                }
+                Err(reason) => actor.park(reason),
+            }
+        });
+        self.led.release_parked();
+    }
+
+    /// Accounts for the steps of those that stepped with it and shows their states; whether all can be seen.
+    pub fn conclude_led(&mut self, now: SimTime, work_s: f64) -> bool {
+        let share_s = work_s / (1 + self.led.len()) as f64;
+        let mut published = true;
+        self.led.each(|actor| {
+            if let Some(open) = actor.open.take() {
+                published &= actor.record_step(&open, now, share_s);
+            }
+        });
+        published
+    }
+}
+
+/// How much of what is `left` to catch up one step takes, where steps are `dt` long: no step is a sliver.
+fn portion(left: SimSpan, dt: SimSpan) -> SimSpan {
+    let half_more = SimSpan::from_nanos(dt.as_nanos() / 2);
+    let longest = SimSpan::from_secs_f64(DT_MAX_S).unwrap_or(dt);
+    if left <= dt + half_more { left.min(longest) } else { dt }
+}
