@@ -162,7 +162,7 @@ pub fn carried(owner: &Neighbour, step_s: f64, sum: Impulse, carried: Impulse) -
 /// Whether a link by the ledger joins a neighbour to this body.
 #[must_use]
 pub fn is_linked(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
-    around.links.iter().any(|link| link.other == neighbour.id && link.law == Law::Ledger)
+    around.links.iter().any(|link| link.other == neighbour.id && link.law == Law::Cluster)
 }
 
 /// Whether a neighbour bends: how it moves within a step is known to itself alone.
@@ -174,7 +174,7 @@ pub fn bends(neighbour: &Neighbour) -> bool {
 /// Whether a neighbour bends and gives by the ledger what contact with it gives: who looks does not own that.
 #[must_use]
 pub fn may_press(neighbour: &Neighbour) -> bool {
-    !neighbour.owned && bends(neighbour) && neighbour.form.is_some() && neighbour.law == Law::Ledger
+    !neighbour.owned && bends(neighbour) && neighbour.form.is_some() && neighbour.law == Law::Cluster
 }
 
 /// Whether a neighbour is a tool whose drive has a say in how it moves: to whom is linked to it it is led.
@@ -200,7 +200,7 @@ pub fn has_a_say(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
 #[must_use]
 pub fn may_touch(neighbour: &Neighbour, around: &StepContext<'_>, bounds: &Bounds, dt: f64) -> bool {
     let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
-    neighbour.law == Law::Ledger && !is_let_in(neighbour, around.me) && is_near(neighbour, bounds, (dt, ahead))
+    neighbour.law == Law::Cluster && !is_let_in(neighbour, around.me) && is_near(neighbour, bounds, (dt, ahead))
 }
 
 /// The same where its state is as old as to be `ahead` at the end, seconds; whatever the law, and between open jaws.

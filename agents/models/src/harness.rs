@@ -212,7 +212,7 @@ impl Stage {
         let newest = actor.published.len() - 1 - usize::from(unseen);
         let snapshot = actor.published[newest.saturating_sub(late)].clone();
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
-        let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
+        let law = pair.map_or(Law::Cluster, |(_, _, law)| *law);
         let (mine, its, linked) = (self.standing(me), self.standing(id), self.are_linked(me, id));
         let (owned, in_step) = (owns(mine, its, linked), keep_step(mine, its, linked));
         let step_s = snapshot.step_s(1.0 / actor.rate_hz);
@@ -225,7 +225,7 @@ impl Stage {
     }
 
     fn are_linked(&self, me: AgentId, other: AgentId) -> bool {
-        self.actors[me.0 as usize].links.iter().any(|link| link.other == other && link.law == Law::Ledger)
+        self.actors[me.0 as usize].links.iter().any(|link| link.other == other && link.law == Law::Cluster)
     }
 
     /// Which of two owns their pair.

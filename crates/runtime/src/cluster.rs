@@ -109,7 +109,7 @@ impl ClusterSeat {
     fn bond(&mut self, observer: &Observer, links: &[Link]) {
         self.bonds.clear();
         self.bonds.extend_from_slice(observer.near());
-        let linked = links.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other);
+        let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
         self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
         self.bonds.sort_unstable();
         self.bonds.dedup();
@@ -295,7 +295,7 @@ impl AgentRunner {
         groups.extend(0..ids.len());
         let mut join = |place: usize, actor: &Self| {
             let Some(seat) = &actor.cluster else { return };
-            let tied = actor.links.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other);
+            let tied = actor.links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
             for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
                 if let Ok(other) = ids.binary_search(&other) {
                     let (a, b) = (top(&groups, place), top(&groups, other));

@@ -28,7 +28,7 @@ pub(super) struct Peers {
 pub(super) struct Peer {
     pub shared: Arc<Shared>,
     pub form: Option<Arc<CollisionShape>>,
-    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the peers.
+    /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Vec<(AgentId, Law)>,
 }
 
@@ -68,7 +68,7 @@ impl Peer {
     }
 
     fn law(&self, other: AgentId) -> Law {
-        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Ledger, |at| self.laws[at].1)
+        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Cluster, |at| self.laws[at].1)
     }
 
     /// Whether the two could ever touch.

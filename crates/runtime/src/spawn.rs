@@ -41,7 +41,7 @@ pub struct AgentSpawn {
     pub range: Option<ResolutionRange>,
     /// Agents whose newest states it always sees. Its own number and repeats are ignored.
     pub links: Vec<AgentId>,
-    /// Laws between it and its peers, where not [`Law::Ledger`]. Given by one side; if both give one, that of the lower number counts.
+    /// Laws between it and its peers, where not [`Law::Cluster`]. Given by one side; if both give one, that of the lower number counts.
     pub laws: Vec<(AgentId, Law)>,
     /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
     pub attached: Vec<Link>,
@@ -240,7 +240,7 @@ fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<S
 fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
     let mut linked = Vec::new();
     for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
-        let links = spawn.attached.iter().filter(|link| link.law == Law::Ledger);
+        let links = spawn.attached.iter().filter(|link| link.law == Law::Cluster);
         linked.extend(links.map(|link| [me, link.other]));
     }
     linked.sort_unstable();

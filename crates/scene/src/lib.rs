@@ -121,9 +121,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     let contacts = file.world.as_ref().and_then(|world| world.contacts);
     let clusters = contacts == Some(ContactsFile::By(ContactPath::Clusters));
-    if clusters {
-        build::without_laws(c, &couplings);
-    }
+    let couplings = if clusters { couplings } else { build::of_pairs(couplings) };
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),

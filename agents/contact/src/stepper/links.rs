@@ -21,7 +21,7 @@ impl Ties {
             for (number, link) in (0..).zip(one.context.links) {
                 let other = place_of(all, link.other);
                 let is_mine = other.is_none_or(|other| member < other);
-                if is_mine && matches!(link.law, Law::Ledger) {
+                if is_mine && matches!(link.law, Law::Cluster) {
                     self.link(step, [Some(member), other], link, number);
                 }
             }

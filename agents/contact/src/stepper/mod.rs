@@ -60,7 +60,7 @@ pub struct Participant<'a> {
     pub member: &'a mut dyn ClusterMember,
     /// What it sees at the start of the macro step.
     pub context: StepContext<'a>,
-    /// The laws of its pairs other than [`Law::Ledger`], by rising numbers: a pair with one is not the cluster's.
+    /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
     pub laws: &'a [(AgentId, Law)],
     /// What it remembers of others.
     pub memory: &'a mut ContactMemory,

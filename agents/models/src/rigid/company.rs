@@ -358,7 +358,7 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> bool {
 impl Guest {
     /// Takes in what does not change while the step lasts.
     fn learn(&mut self, neighbour: &Neighbour, mine: &CollisionShape, mover: &MovingShape) {
-        self.touchable = neighbour.owned && neighbour.law == Law::Ledger && neighbour.form.is_some();
+        self.touchable = neighbour.owned && neighbour.law == Law::Cluster && neighbour.form.is_some();
         let Some(form) = &neighbour.form else { return };
         self.friction = (mine.friction * form.friction).sqrt();
         self.restitution = mine.restitution.max(form.restitution);

@@ -151,7 +151,7 @@ impl RigidBody {
     pub fn settle(&mut self, context: &StepContext<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
-        let seen = context.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
+        let seen = context.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Cluster));
         let stood = self.stand.is_some();
         (self.stand, self.tips) = if seen { self.footing() } else { (None, None) };
         self.lately.pass(self.tips.is_some(), dt);

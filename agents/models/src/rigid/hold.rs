@@ -97,7 +97,7 @@ impl RigidBody {
     /// Ends a step of `dt` seconds: others who own contact with the body learn how springs hold it, where only led ones do and
     /// nothing fixed carries it.
     pub(super) fn tell(&mut self, around: &StepContext<'_>, dt: f64) {
-        let owned = |n: &metachron_contact::Neighbour| n.form.is_some() && !n.owned && n.law == Law::Ledger;
+        let owned = |n: &metachron_contact::Neighbour| n.form.is_some() && !n.owned && n.law == Law::Cluster;
         let seen = around.neighbours.iter().any(owned);
         if !seen || self.touching || self.ties.is_empty() || self.ties.all.iter().any(|tie| tie.yields != DMat3::ZERO) {
             return self.hold.forget();

@@ -64,7 +64,7 @@ impl Sided {
                 Law::Tlm { stiffness_n_m, damping_n_s_m } => {
                     self.lean((motion, spread), (company, i), (stiffness_n_m, damping_n_s_m), span);
                 }
-                Law::Ledger | Law::Off => {}
+                Law::Cluster | Law::Ledger | Law::Off => {}
             }
         }
         for link in around.links {

@@ -19,7 +19,7 @@ impl Tube {
         self.ties.clear();
         self.ties.extend(context.anchor_springs().filter_map(|pull| Tie::new(&pull, &self.division)));
         let owned = |link: &&Link| context.neighbours.iter().any(|n| n.id == link.other && n.owned);
-        let links = context.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        let links = context.links.iter().filter(|link| link.law == Law::Cluster).filter(owned);
         self.ties.extend(links.filter_map(|link| Tie::of_link(link, &self.division)));
         self.ties.iter_mut().for_each(|tie| tie.continue_from(&self.ties_before));
     }

@@ -194,6 +194,6 @@ fn keeps_up(owner: &Neighbour, around: &StepContext<'_>, dt: f64) -> bool {
 
 /// Whether a neighbour computes the contacts or links with this tube, and expects it by its factor.
 pub fn owns_it(neighbour: &Neighbour, around: &StepContext<'_>) -> bool {
-    let meets = neighbour.law == Law::Ledger && neighbour.form.is_some();
+    let meets = neighbour.law == Law::Cluster && neighbour.form.is_some();
     bends(neighbour) && !neighbour.owned && (meets || is_linked(neighbour, around))
 }

@@ -66,7 +66,7 @@ impl Company {
                 Law::Tlm { stiffness_n_m, damping_n_s_m } => {
                     sided.lean(self, (neighbour, now), (stiffness_n_m, damping_n_s_m), around);
                 }
-                Law::Ledger | Law::Off => {}
+                Law::Cluster | Law::Ledger | Law::Off => {}
             }
             for link in around.links.iter().filter(|link| link.other == neighbour.id) {
                 sided.draw(self, (neighbour, now), link, around);

@@ -142,7 +142,7 @@ impl SoftBody {
         self.ties.clear();
         self.ties.extend(context.anchor_springs().filter_map(|pull| VertexSpring::of_pull(&pull, count)));
         let owned = |link: &&Link| context.neighbours.iter().any(|n| n.id == link.other && n.owned);
-        let links = context.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        let links = context.links.iter().filter(|link| link.law == Law::Cluster).filter(owned);
         self.ties.extend(links.filter_map(|link| VertexSpring::of_link(link, count)));
     }
 

@@ -176,7 +176,7 @@ impl StepHarness {
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;
         let snapshot = &actor.shown[usize::from(early)];
-        let linked = actor.links.iter().any(|link| link.other == AgentId(me as u32) && link.law == Law::Ledger);
+        let linked = actor.links.iter().any(|link| link.other == AgentId(me as u32) && link.law == Law::Cluster);
         Neighbour {
             id: AgentId(other as u32),
             step_s: snapshot.step_s(1.0 / actor.rate_hz),

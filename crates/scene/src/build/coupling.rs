@@ -1,4 +1,4 @@
-//! Reads the couplings of a scene file: pairs that act on each other otherwise than by ledger contact, which is the default.
+//! Reads the couplings of a scene file: pairs that act on each other otherwise than as one problem, which is the default.
 //!
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
@@ -43,14 +43,10 @@ pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects
     found
 }
 
-/// Refuses laws of single pairs where all that touch is solved as one problem.
-pub(crate) fn without_laws(c: &mut Checker<'_, '_>, couplings: &[Coupling]) {
-    let own = |coupling: &&Coupling| !matches!(coupling.law, Law::Ledger | Law::Off);
-    if couplings.iter().any(|coupling| own(&coupling)) {
-        let expected = "expected couplings of the laws `ledger` and `off`, or `contacts = \"pairs\"`";
-        let what = "is `clusters`, which solve no pair by a law of its own";
-        c.wrong(&Place::new("world", "of `[world]`"), "contacts", what, expected);
-    }
+/// Pairs of a scene without clusters: there contact by ledger is that of every pair.
+pub(crate) fn of_pairs(mut couplings: Vec<Coupling>) -> Vec<Coupling> {
+    couplings.iter_mut().filter(|coupling| coupling.law == Law::Ledger).for_each(|pair| pair.law = Law::Cluster);
+    couplings
 }
 
 fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
@@ -66,11 +62,14 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     let before = c.count();
-    let stays = matches!(file.law.unwrap_or_default(), CouplingLaw::Ledger | CouplingLaw::Off);
-    if [a, b].into_iter().any(|end| matches!(end, NamedObject::Soft(_))) && !stays {
-        let what =
-            format!("is `{}`, which sheets, solids and ropes do not support", file.law.unwrap_or_default().name());
-        c.wrong(place, "law", what, "expected `ledger` or `off`");
+    let soft = [a, b].into_iter().any(|end| matches!(end, NamedObject::Soft(_)));
+    if soft && file.law == Some(CouplingLaw::Tlm) {
+        c.wrong(place, "law", "is `tlm`, which sheets, solids and ropes do not support", "expected `ledger` or `off`");
+    }
+    if let Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) = file.law {
+        let what = format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name());
+        c.wrong(place, "law", what, "expected `ledger`, `tlm` or `off`, or no law: all that touch is one problem");
+        return None;
     }
     check_keys(c, place, file);
     let law = law(c, place, file);
@@ -108,10 +107,13 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
 
 /// Reports keys that have no meaning for this kind and law, and required keys that are missing.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
-    let (kind, law) = (file.kind.unwrap_or_default(), file.law.unwrap_or_default());
-    let attach = kind == Kind::Attach;
-    let spring = attach || !matches!(law, CouplingLaw::Ledger | CouplingLaw::Off);
-    let what = if attach { "an attachment".to_owned() } else { format!("contact by `{}`", law.name()) };
+    let attach = file.kind.unwrap_or_default() == Kind::Attach;
+    let spring = attach || file.law == Some(CouplingLaw::Tlm);
+    let what = match file.law {
+        _ if attach => "an attachment".to_owned(),
+        Some(law) => format!("contact by `{}`", law.name()),
+        None => "contact".to_owned(),
+    };
     for (key, given, belongs, needed) in [
         ("at_a", file.at_a.is_some(), attach, attach),
         ("at_b", file.at_b.is_some(), attach, attach),
@@ -126,26 +128,22 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
             c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
         }
     }
-    if attach && law == CouplingLaw::Off {
+    if attach && file.law == Some(CouplingLaw::Off) {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
-    } else if attach && matches!(law, CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) {
-        let what = format!("is `{}`, a law of contacts", law.name());
-        c.wrong(place, "law", what, "expected `ledger` or `tlm`: no other law attaches");
     }
 }
 
 fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<Law> {
-    let law = file.law.unwrap_or_default();
-    let extrapolate = law == CouplingLaw::PenaltyExtrapolated;
-    let (stiffness_n_m, damping_n_s_m) = match law {
-        CouplingLaw::Ledger => return Some(Law::Ledger),
-        CouplingLaw::Off => return Some(Law::Off),
-        _ => spring(c, place, file)?,
-    };
-    Some(match law {
-        CouplingLaw::Tlm => Law::Tlm { stiffness_n_m, damping_n_s_m },
-        _ => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate },
-    })
+    match file.law {
+        None => Some(Law::Cluster),
+        Some(CouplingLaw::Off) => Some(Law::Off),
+        Some(CouplingLaw::Tlm) => {
+            let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
+            Some(Law::Tlm { stiffness_n_m, damping_n_s_m })
+        }
+        // penalties are refused before
+        Some(CouplingLaw::Ledger | CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) => Some(Law::Ledger),
+    }
 }
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {

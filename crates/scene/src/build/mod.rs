@@ -27,7 +27,7 @@ mod tube;
 use crate::check::{Allowed, allowed};
 
 pub(super) use common::world_faults;
-pub(super) use coupling::{couplings, without_laws};
+pub(super) use coupling::{couplings, of_pairs};
 pub(super) use group::groups;
 pub(super) use joint::joints;
 pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};

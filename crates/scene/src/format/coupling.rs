@@ -14,14 +14,14 @@ pub struct CouplingFile {
     pub b: String,
     /// Kind of the coupling. Default `contact`.
     pub kind: Option<CouplingKind>,
-    /// Law of the coupling. Default `ledger`.
+    /// Law of the coupling. By default the two are solved as one problem with all that they touch.
     pub law: Option<CouplingLaw>,
     /// Point of `a` that an `attach` holds: 0 start … 1 end of a tube's or rope's rest length; or `[x, y, z]`, metres, in the axes of a
     /// rigid object's shape, of a tool's tip, or of a sheet or solid from its middle (the nearest vertex).
     pub at_a: Option<Spot>,
     /// Point of `b` that an `attach` holds, as `at_a`.
     pub at_b: Option<Spot>,
-    /// Stiffness of an `attach`, or of a contact by `penalty` or `tlm`, N/m, 1e-6 … 1e9.
+    /// Stiffness of an `attach`, or of a contact by `tlm`, N/m, 1e-6 … 1e9.
     pub stiffness_n_m: Option<f64>,
     /// Damping of the same spring, N·s/m, 0 … 1e7. Default 0.
     pub damping_n_s_m: Option<f64>,
@@ -41,18 +41,17 @@ pub enum CouplingKind {
 }
 
 /// Law by which two objects interact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingLaw {
-    /// One object of the pair, the owner, computes every impulse; the other reads it from a ledger. Momentum is conserved for any clocks.
-    #[default]
+    /// Asynchronous: the object with the shorter wanted step, at equal steps the first of the file, computes every impulse; the other takes
+    /// it in its next step from a ledger. Momentum is conserved for any clocks.
     Ledger,
-    /// A spring between the newest published states, however old: for comparison. Unstable if it is stiffer than 0.55 μ/τ², μ the reduced
-    /// mass of the pair, τ the age of the states.
+    /// Refused: penalty laws stay in the laboratory.
     Penalty,
-    /// The same spring between states extrapolated to the object's own time: for comparison.
+    /// Refused: penalty laws stay in the laboratory.
     PenaltyExtrapolated,
-    /// Transmission line modelling: passive for any delay, at the cost of a parasitic mass.
+    /// Asynchronous by transmission line modelling: passive for any delay, at the cost of a parasitic mass.
     Tlm,
     /// No interaction: the two pass through each other.
     Off,

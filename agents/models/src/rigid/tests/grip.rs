@@ -91,7 +91,7 @@ impl Grip {
                     stiffness_n_m: SPRING_N_M,
                     damping_n_s_m: 1.0,
                     rest_m: 0.0,
-                    law: Law::Ledger,
+                    law: Law::Cluster,
                 };
                 stage.link(fingers[i], link);
             }

@@ -55,7 +55,7 @@ fn two_bodies_on_a_spring_between_two_clocks_swing_at_its_frequency_and_keep_mom
             stiffness_n_m: stiffness,
             damping_n_s_m: 0.0,
             rest_m: 0.2,
-            law: Law::Ledger,
+            law: Law::Cluster,
         };
         stage.link(first, link);
         let frequency = (stiffness * (1.0 / masses[0] + 1.0 / masses[1])).sqrt();
@@ -102,7 +102,7 @@ fn a_stiff_link_between_clocks_never_blows_up() {
             stiffness_n_m: stiffness,
             damping_n_s_m: 0.0,
             rest_m: 0.0,
-            law: Law::Ledger,
+            law: Law::Cluster,
         };
         stage.link(first, link);
         let mut most = 0.0_f64;

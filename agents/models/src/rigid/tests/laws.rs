@@ -49,7 +49,7 @@ fn a_stiff_penalty_from_stale_states_gains_energy_and_the_ledger_does_not() {
     let penalty = Law::Penalty { stiffness_n_m: 5000.0, damping_n_s_m: 0.0, extrapolate: false };
     let (_, most, _) = collide(penalty, [1000.0, 60.0], Faults::default());
     assert!(most > 1.05, "{most}");
-    let (_, most, _) = collide(Law::Ledger, [1000.0, 60.0], Faults::default());
+    let (_, most, _) = collide(Law::Cluster, [1000.0, 60.0], Faults::default());
     assert!(most < 1.0 + 1e-9, "{most}");
 }
 

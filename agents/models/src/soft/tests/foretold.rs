@@ -60,7 +60,7 @@ fn who_pushes_a_soft_body_is_no_farther_ahead_of_it_than_it_foretells() {
     let other = AgentId(1);
     let here = Anchor::Vertex(0);
     let link =
-        [Link { other, here, there: here, stiffness_n_m: 1.0, damping_n_s_m: 0.0, rest_m: 0.0, law: Law::Ledger }];
+        [Link { other, here, there: here, stiffness_n_m: 1.0, damping_n_s_m: 0.0, rest_m: 0.0, law: Law::Cluster }];
     for (told_s, ahead_s, waits) in
         [(1e-3, 0.9e-3, false), (1e-3, 1.1e-3, true), (0.01, 0.009, false), (0.01, 0.011, true), (0.0, 0.018, false)]
     {

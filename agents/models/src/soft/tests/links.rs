@@ -55,7 +55,7 @@ fn hang(rates: (f64, f64), made: Box<dyn Agent>, places: &[f64]) -> (Vec<f64>, f
         let there = if is_tube { Anchor::Arc(x + 0.15) } else { Anchor::Local(DVec3::X * x) };
         let (here, rest_m) = (Anchor::Vertex(vertex(x)), REST_M);
         let link =
-            Link { other, here, there, stiffness_n_m: STIFFNESS_N_M, damping_n_s_m: 0.2, rest_m, law: Law::Ledger };
+            Link { other, here, there, stiffness_n_m: STIFFNESS_N_M, damping_n_s_m: 0.2, rest_m, law: Law::Cluster };
         stage.link(sheet, link);
     }
     let (mut sums, mut count) = (vec![0.0; places.len()], 0.0);
@@ -141,7 +141,7 @@ fn ball_hangs(rates: Option<(f64, f64)>) -> [f64; 2] {
     let mut stage = Stage::new(Faults::default());
     let [slab, ball] = [stage.add(slab, rates.0), stage.add(ball, rates.1)];
     stage.law(slab, ball, Law::Off);
-    let (here, law) = (Anchor::Vertex(upper as u32), Law::Ledger);
+    let (here, law) = (Anchor::Vertex(upper as u32), Law::Cluster);
     stage.link(slab, Link { other: ball, here, there: anchor, stiffness_n_m, damping_n_s_m, rest_m: 0.0, law });
     stage.run(3.0, |stage| {
         let [Body::Soft(above), Body::Soft(below)] = [slab, ball].map(|id| &stage.newest(id).body) else { return };

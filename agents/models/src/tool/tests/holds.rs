@@ -96,7 +96,7 @@ fn stage(
     stage.law(id, tool, Law::Off); // nothing but the hold
     if held == Held::Brick {
         let [here, there] = [DVec3::Z * 0.05, DVec3::Z * -0.01].map(Anchor::Local);
-        let link = Link { other: tool, here, there, stiffness_n_m, damping_n_s_m, rest_m: 0.0, law: Law::Ledger };
+        let link = Link { other: tool, here, there, stiffness_n_m, damping_n_s_m, rest_m: 0.0, law: Law::Cluster };
         stage.link(id, link);
     }
     (stage, id, tool)

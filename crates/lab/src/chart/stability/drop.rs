@@ -218,7 +218,7 @@ pub(super) fn law(name: &str, stiffness_n_m: f64, damping_ratio: f64) -> Law {
         "penalty" => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: false },
         "penalty-extrapolated" => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: true },
         "tlm" => Law::Tlm { stiffness_n_m, damping_n_s_m },
-        _ => Law::Ledger,
+        _ => Law::Cluster,
     }
 }
 

@@ -50,7 +50,7 @@ fn ring(turn: usize) -> Ring {
     let (stiffness_n_m, rest_m) = SPRING;
     let links = ties.map(|(a, here, b, there)| {
         let other = ids[b];
-        (ids[a], Link { other, here, there, stiffness_n_m, damping_n_s_m: 0.0, rest_m, law: Law::Ledger })
+        (ids[a], Link { other, here, there, stiffness_n_m, damping_n_s_m: 0.0, rest_m, law: Law::Cluster })
     });
     links.iter().for_each(|(of, link)| stage.link(*of, *link));
     Ring { stage, ids, links: links.to_vec(), weight }

@@ -132,7 +132,7 @@ impl Gripper {
                         stiffness_n_m: SPRING_N_M,
                         damping_n_s_m: 1.0,
                         rest_m: 0.0,
-                        law: Law::Ledger,
+                        law: Law::Cluster,
                     },
                 );
             }

@@ -214,7 +214,7 @@ fn a_link_pulls_both_ends_alike_and_brings_them_together() {
             stiffness_n_m: 200.0,
             damping_n_s_m: 1.0,
             rest_m,
-            law: Law::Ledger,
+            law: Law::Cluster,
         };
         stage.link(tube, link);
         let start = stage.momentum();
