@@ -129,6 +129,8 @@ pub struct Neighbour {
     pub law: Law,
     /// Whether the agent that looks owns the pair ([`crate::owns`]).
     pub owned: bool,
+    /// Whether, of an asynchronous pair, the agent that looks computes it ([`crate::asynchronous::computes`]).
+    pub computed_here: bool,
     /// Whether the two keep step ([`crate::keep_step`]).
     pub in_step: bool,
     /// Its usual step length, seconds; zero where that does not matter.
@@ -139,7 +141,7 @@ impl Neighbour {
     /// A neighbour that is only looked at: neither in contact nor owned.
     #[must_use]
     pub const fn observed(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Cluster, owned: false, in_step: false, step_s: 0.0 }
+        Self { id, snapshot, form: None, law: Law::Cluster, owned: false, computed_here: false, in_step: false, step_s: 0.0 }
     }
 }
 

@@ -24,8 +24,6 @@ const PUSHED_STEPS: f64 = 0.5;
 /// And by this at least, seconds: clocks are looked at again no sooner. What pulls at a link, or bends, is waited for after one of its
 /// steps and this: a gut of 240 Hz flew off its sheet that let it fall 28 ms behind.
 const PUSHED_LEAST_S: f64 = 2e-3;
-/// Whose time goes back by more than this calls it another now; less is a message that came late, seconds.
-pub(super) const MEETS_S: f64 = 0.1;
 /// An owner who has not been heard of for so many steps, its own or a body's, gives nothing any more.
 pub(super) const SILENT_STEPS: f64 = 3.0;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.

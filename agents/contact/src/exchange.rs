@@ -6,6 +6,7 @@
 
 use super::beside::carried;
 use super::taken::Taken;
+use crate::asynchronous::acknowledged;
 use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, SimTime, Snapshot};
@@ -236,12 +237,6 @@ impl Owned {
         let weaker = wary && before.linear.length_squared() < now.linear.length_squared();
         self.ledger.force = if weaker { before } else { now };
     }
-}
-
-/// The copy that `other` keeps of what `me` has given it.
-#[must_use]
-pub fn acknowledged(other: &Neighbour, me: AgentId) -> Option<&Ledger> {
-    other.snapshot.taken.iter().find(|ledger| ledger.with == me)
 }
 
 /// Copies ledgers into storage that is there already.

@@ -21,6 +21,7 @@
 //! ```
 
 pub mod agent;
+pub mod asynchronous;
 pub mod audit;
 pub mod beside;
 pub mod cluster;
@@ -43,7 +44,8 @@ pub mod tank;
 
 pub use agent::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
 pub use contact::{Contact, PUSH_OUT_SHARE};
-pub use exchange::{Exchange, acknowledged};
+pub use asynchronous::acknowledged;
+pub use exchange::Exchange;
 pub use knock::Knock;
 pub use lasting::smooth;
 pub use law::{Law, Link, OwnershipTraits, keep_step, owns};

@@ -25,6 +25,7 @@ pub mod foot;
 pub mod id;
 pub mod impulse_response;
 pub mod jacobian;
+mod local_model;
 pub mod ledger;
 pub mod pair;
 pub mod rebound;
@@ -47,7 +48,9 @@ pub use foot::{Carried, Foot, Lies, Stance};
 pub use id::AgentId;
 pub use impulse_response::{CurveResponse, ImpulseResponse};
 pub use jacobian::ContactJacobian;
+
 pub use ledger::{Ahead, Entry, Impulse, Ledger, Page, Scheduled, Site};
+pub use local_model::{LocalBlock, LocalModel, LocalPartner};
 pub use pair::{PairKind, PairState};
 pub use rebound::Rebound;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};

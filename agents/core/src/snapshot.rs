@@ -13,7 +13,7 @@ pub use stand::{Footprint, STANDING_M_S};
 pub use tips::Tips;
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, ImpulseResponse, Resolution, ReusableOption, SimSpan, SimTime};
-use crate::{Ledger, Mat6, PairState, Rebound, Sprung};
+use crate::{Ledger, LocalModel, Mat6, PairState, Rebound, Sprung};
 use glam::{DMat3, DQuat, DVec3};
 use std::any::Any;
 
@@ -76,6 +76,8 @@ pub struct Snapshot {
     pub given: Vec<Ledger>,
     /// Impulses taken from others, in couplings that they own.
     pub taken: Vec<Ledger>,
+    /// How it answers the partners of its asynchronous pairs; no blocks where it has none near.
+    pub local_model: LocalModel,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
     /// Its part in a contact cluster; `None` where it steps by itself.
@@ -168,6 +170,7 @@ impl Snapshot {
             && self.tips.get().is_none_or(Tips::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
+            && self.local_model.is_finite()
     }
 
     /// Folds every bit of the state into `hash` (FNV-1a, 64 bits): equal hashes mean bit-identical runs.

@@ -9,6 +9,7 @@ use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
+use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, OwnershipTraits, acknowledged, keep_step, owns};
 use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -67,6 +68,10 @@ impl Peer {
         OwnershipTraits::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
     }
 
+    fn clock(&self) -> PairClock {
+        PairClock { id: self.shared.id, step_s: self.shared.wanted_hz.recip() }
+    }
+
     fn law(&self, other: AgentId) -> Law {
         self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Cluster, |at| self.laws[at].1)
     }
@@ -90,6 +95,7 @@ impl Peer {
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
             owned: owns(mine, its, linked),
+            computed_here: computes(self.clock(), other.clock()),
             in_step: keep_step(mine, its, linked),
         }
     }

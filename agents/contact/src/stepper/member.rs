@@ -57,6 +57,22 @@ pub trait ClusterMember: Send {
     /// The material point `anchor`; `None` for one that the body does not have.
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint>;
 
+    /// How the matter at the material point `anchor` turns with the body's blocks; `None` where no block is a spin there.
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        let _ = anchor;
+        None
+    }
+
+    /// The block as its published state counts it ([`metachron_core::LocalBlock::slot`]).
+    fn slot_of(&self, block: usize) -> u32 {
+        block as u32
+    }
+
+    /// Whether it stands for a partner of an asynchronous pair that is stepped elsewhere.
+    fn is_remote(&self) -> bool {
+        false
+    }
+
     /// Where it is once it has moved for `t_s` seconds with the velocities `v`; `None` for a body that does not move as a whole.
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let _ = (v, t_s);

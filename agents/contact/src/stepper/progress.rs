@@ -21,6 +21,8 @@ pub(super) struct Progress {
     pub start: Vec<DVec3>,
     /// What its step would have changed them by without contact.
     pub gain: Vec<DVec3>,
+    /// The part of that which known impulses from outside make; empty for none.
+    pub pushed: Vec<DVec3>,
     /// What the impulses since have changed them by.
     pub given: Vec<DVec3>,
     /// v(p − 1): by which its place has moved so far.
@@ -57,6 +59,14 @@ impl Progress {
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
         self.touched = false;
+    }
+
+    /// Adds what known impulses change its velocities by within its step; none where there are none.
+    pub fn push(&mut self, change: &[DVec3]) {
+        self.pushed.clear();
+        self.pushed.extend_from_slice(change);
+        self.gain.iter_mut().zip(change).for_each(|(gain, change)| *gain += *change);
+        self.touched |= !change.is_empty();
     }
 
     /// Finds v̄(p) and û of the fine step that begins (eq. 24).

@@ -126,6 +126,7 @@ impl Search {
         };
         self.place_boxes(all, speed);
         find_pairs(&self.boxes, NEAR_STEPS * h_s, &mut self.near);
+        self.near.retain(|&[a, b]| all[a].may_touch(&all[b]));
         let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
         let near = std::mem::take(&mut self.near);
         for &pair in &near {

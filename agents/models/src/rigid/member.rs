@@ -117,6 +117,10 @@ impl ClusterMember for RigidBody {
         Some(MaterialPoint::new(self.motion.position + arm, Side::rigid(0, arm)))
     }
 
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        matches!(anchor, Anchor::Local(_)).then(|| Side::node(0, SPIN))
+    }
+
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
         let Motion { position, rotation, .. } = motion;

@@ -113,6 +113,11 @@ impl ClusterMember for SoftBody {
         Some(MaterialPoint::new(position, self.shared_side([vertex; 3], [1.0, 0.0, 0.0])))
     }
 
+    fn slot_of(&self, block: usize) -> u32 {
+        let mut rows = self.system.rows().iter();
+        rows.position(|row| *row == Some(block as u32)).unwrap_or_default() as u32
+    }
+
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let rows = self.system.rows();
         let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);

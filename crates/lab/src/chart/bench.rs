@@ -184,6 +184,7 @@ impl StepHarness {
             form: actor.form.clone(),
             law: self.law,
             owned: owns(standing(me), standing(other), linked),
+            computed_here: false,
             in_step: keep_step(standing(me), standing(other), linked),
         }
     }

@@ -1,0 +1,528 @@
+//! A partner of an asynchronous pair as a member of the problem that computes the pair: foretold from its snapshot, it answers impulses by
+//! the local model that it has published.
+//!
+//! In: a snapshot, what is on its way to the partner. Out: a skin, blocks and velocities as any member has them. Never here: the ledger,
+//! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
+
+use super::member::{ClusterMember, MaterialPoint, Role};
+use crate::Neighbour;
+use crate::cluster::{Block, Side, SideTerm};
+use glam::{DMat3, DQuat, DVec3};
+use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
+use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose};
+use std::sync::Arc;
+
+/// No partner is foretold by more than this many of its steps.
+const FORETOLD_STEPS: f64 = 2.0;
+/// The share of its largest compliance that every direction has at least: what its contacts hold does not make its matrix singular.
+const YIELD_SHARE: f64 = 1e-9;
+
+/// The matter of another agent, where it is as far as it is known.
+#[derive(Debug, Clone, Default)]
+pub struct Matter {
+    /// Centre of mass or tip, of a body that moves as a whole.
+    centre: DVec3,
+    rotation: DQuat,
+    jaw: Option<f64>,
+    /// Nodes or vertices, and how they move without a block, m/s.
+    points: Vec<DVec3>,
+    drift: Vec<DVec3>,
+    radii_m: Vec<f64>,
+    arc_m: Vec<f64>,
+}
+
+/// A partner that is stepped elsewhere.
+#[derive(Debug, Default)]
+pub struct RemoteMember {
+    form: Option<Arc<CollisionShape>>,
+    /// The participants that compute their pairs with it.
+    partners: Vec<AgentId>,
+    matter: Matter,
+    model: LocalModel,
+    blocks: Vec<Block>,
+    /// Velocities of the blocks now, at the end of a step without impulses, and how they change a second.
+    now: Vec<DVec3>,
+    free: Vec<DVec3>,
+    gain_m_s2: Vec<DVec3>,
+    /// What deviates from the model's own forecast, N·s for each block.
+    deviation: Vec<DVec3>,
+    /// The time of the snapshot that the matrix was made for.
+    seen: Option<SimTime>,
+    kept: (Matter, Vec<DVec3>),
+    matrix: Vec<f64>,
+}
+
+/// What a participant knows of its pair with a partner.
+pub struct RemoteView<'a> {
+    /// The participant.
+    pub id: AgentId,
+    /// The partner's newest state.
+    pub neighbour: &'a Neighbour,
+    /// The participant's own time.
+    pub time: SimTime,
+}
+
+impl RemoteMember {
+    /// Takes in the newest state of a partner; whether it can be met: it has a local model, or moves as a whole.
+    pub fn see(&mut self, neighbour: &Neighbour) -> bool {
+        self.form.clone_from(&neighbour.form);
+        self.partners.clear();
+        let snapshot = &neighbour.snapshot;
+        let known = self.matter.take(&snapshot.body);
+        if self.seen != Some(snapshot.time) || self.blocks.is_empty() {
+            self.seen = Some(snapshot.time);
+            if snapshot.local_model.blocks.is_empty() {
+                lone(&snapshot.inertia, &snapshot.body, neighbour.step_s, &mut self.model);
+            } else {
+                self.model.copy_from(&snapshot.local_model);
+            }
+            self.set_matrix();
+        }
+        self.deviation.clear();
+        self.deviation.resize(self.model.blocks.len(), DVec3::ZERO);
+        self.gain_m_s2.clear();
+        self.gain_m_s2.extend(self.model.blocks.iter().map(|block| block.acceleration));
+        known && !self.blocks.is_empty()
+    }
+
+    /// Adds a participant that computes its pair with the partner, to which it has `given` what is on its way (eq. 5).
+    pub fn add_partner(&mut self, view: &RemoteView<'_>, given: impl FnOnce(&mut dyn FnMut(Site, Impulse))) {
+        self.partners.push(view.id);
+        let model = &self.model;
+        let since_s = view.time.secs_after(view.neighbour.snapshot.time);
+        let partner = model.partners.iter().find(|partner| partner.id == view.id);
+        let age_s = partner.map_or(0.0, |partner| view.time.secs_after(partner.read).max(0.0));
+        // what was given before the partner's step began acts evenly through it, what was given since is foretold to act
+        let before = if since_s > 0.0 && age_s > 0.0 { (1.0 - since_s / age_s).max(0.0) } else { 0.0 };
+        let begun = (since_s / model.step_s).clamp(0.0, 1.0);
+        let acts = before * begun + (1.0 - before);
+        let matter = &self.matter;
+        let deviation = &mut self.deviation;
+        given(&mut |site, impulse| {
+            matter.visit_blocks(site, impulse, |slot, impulse| {
+                if let Some(place) = place_of_slot(model, slot) {
+                    deviation[place] += impulse * acts;
+                }
+            });
+        });
+        let Some(partner) = partner else { return };
+        for (at, force) in partner.forces.iter().enumerate().take(self.deviation.len()) {
+            self.deviation[at] -= *force * (acts * age_s);
+            // it goes on only as far as it is given
+            for row in 0..self.deviation.len() {
+                self.gain_m_s2[row] -= self.model.compliance[row * self.deviation.len() + at] * *force;
+            }
+        }
+    }
+
+    /// Brings it to `time` (eq. 5, 6).
+    pub fn foretell(&mut self, neighbour: &Neighbour, time: SimTime) {
+        let size = self.model.blocks.len();
+        let step_s = self.model.step_s;
+        let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
+        let reads = self.model.partners.iter().filter(|partner| self.partners.contains(&partner.id));
+        let read = reads.map(|partner| partner.read).max().unwrap_or(SimTime::ZERO);
+        // how long what deviates has moved it
+        let moved_s = if since_s > 0.0 { since_s } else { time.secs_after(read).max(0.0) }.min(step_s);
+        self.now.clear();
+        let Self { model, matter, now, deviation, .. } = self;
+        matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * since_s);
+        for (at, block) in model.blocks.iter().enumerate() {
+            let row = &model.compliance[at * size..(at + 1) * size];
+            let changed: DVec3 = row.iter().zip(&*deviation).map(|(w, impulse)| *w * *impulse).sum();
+            now.push(block.velocity + block.acceleration * since_s + changed);
+            let way = block.acceleration * (0.5 * since_s * since_s) + changed * moved_s;
+            matter.shift(block, way, since_s);
+        }
+    }
+
+    /// A = W⁻¹ of the local model; none where W is not positive definite.
+    fn set_matrix(&mut self) {
+        let Self { model, blocks, matrix, .. } = self;
+        blocks.clear();
+        if invert(model, matrix) {
+            let size = 3 * model.blocks.len();
+            for row in 0..model.blocks.len() {
+                for column in 0..=row {
+                    let entry = |i: usize, j: usize| matrix[(3 * row + i) * size + 3 * column + j];
+                    let value = DMat3::from_cols(
+                        DVec3::new(entry(0, 0), entry(1, 0), entry(2, 0)),
+                        DVec3::new(entry(0, 1), entry(1, 1), entry(2, 1)),
+                        DVec3::new(entry(0, 2), entry(1, 2), entry(2, 2)),
+                    );
+                    blocks.push(Block { row, column, value });
+                }
+            }
+        }
+    }
+
+    /// A side of points of the partner with shares; what has no block leaves its share to the others.
+    fn shared(&self, points: &[(u32, f64)], spin: Option<(u32, DVec3)>) -> Side {
+        let mut terms = [SideTerm::weighted(0, 0.0); 4];
+        let mut count = 0;
+        let mut sum = 0.0;
+        for &(slot, share) in points {
+            if let (Some(place), true) = (place_of_slot(&self.model, slot), share != 0.0) {
+                terms[count] = SideTerm::weighted(place, share);
+                count += 1;
+                sum += share;
+            }
+        }
+        if count == 0 {
+            let nearest = points.first().and_then(|(slot, _)| self.nearest(*slot));
+            let Some(place) = nearest else { return Side::FIXED };
+            terms[0] = SideTerm::weighted(place, 1.0);
+            return Side::new(0, &terms[..1]).unwrap_or(Side::FIXED);
+        }
+        terms[..count].iter_mut().for_each(|term| term.map *= 1.0 / sum);
+        if let Some((slot, arm)) = spin
+            && let Some(place) = place_of_slot(&self.model, slot)
+        {
+            terms[count] = SideTerm::spin(place, arm);
+            count += 1;
+        }
+        Side::new(0, &terms[..count]).unwrap_or(Side::FIXED)
+    }
+
+    /// The block of a point that is nearest to another point.
+    fn nearest(&self, slot: u32) -> Option<usize> {
+        let matter = &self.matter;
+        let from = matter.point(slot)?;
+        let apart = |block: &LocalBlock| matter.point(block.slot).map(|at| at.distance_squared(from));
+        let near = self.model.blocks.iter().enumerate().filter_map(|(place, block)| Some((place, apart(block)?)));
+        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place)
+    }
+
+    fn whole(&self, arm: DVec3) -> Side {
+        let spin = place_of_slot(&self.model, 1).map(|place| SideTerm::spin(place, arm));
+        let Some(centre) = place_of_slot(&self.model, 0) else { return Side::FIXED };
+        let terms = [SideTerm::weighted(centre, 1.0), spin.unwrap_or(SideTerm::weighted(centre, 0.0))];
+        Side::new(0, if spin.is_some() { &terms } else { &terms[..1] }).unwrap_or(Side::FIXED)
+    }
+}
+
+impl ClusterMember for RemoteMember {
+    fn role(&self) -> Role {
+        Role::Rigid
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        self.free.clear();
+        self.free.extend(self.now.iter().zip(&self.gain_m_s2).map(|(now, gain)| *now + *gain * h_s));
+        Ok(())
+    }
+
+    fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    fn free(&self) -> &[DVec3] {
+        &self.free
+    }
+
+    fn velocities(&self) -> &[DVec3] {
+        &self.now
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        self.matter.placed(self.form.as_deref()?)
+    }
+
+    fn side(&self, place: &Place, contact: ContactSide) -> Side {
+        match *place {
+            Place::Point(point) => self.whole(point - self.matter.centre),
+            Place::Surface { vertices: [a, b, c], shares } => {
+                self.shared(&[(a, shares[0]), (b, shares[1]), (c, shares[2])], None)
+            }
+            Place::Chain { segment, share, radius_m } => {
+                let spin = (2 * segment + 1, contact.outward * radius_m);
+                self.shared(&[(2 * segment, 1.0 - share), (2 * segment + 2, share)], Some(spin))
+            }
+        }
+    }
+
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let matter = &self.matter;
+        match anchor {
+            Anchor::Local(local) if matter.points.is_empty() => {
+                let arm = matter.rotation * local;
+                Some(MaterialPoint::new(matter.centre + arm, self.whole(arm)))
+            }
+            Anchor::Vertex(vertex) if matter.arc_m.is_empty() => {
+                let position = *matter.points.get(vertex as usize)?;
+                Some(MaterialPoint::new(position, self.shared(&[(vertex, 1.0)], None)))
+            }
+            Anchor::Arc(arc_m) => {
+                let (segment, share) = matter.locate(arc_m)?;
+                let position = matter.points.get(segment)?.lerp(*matter.points.get(segment + 1)?, share);
+                let slot = 2 * segment as u32;
+                Some(MaterialPoint::new(position, self.shared(&[(slot, 1.0 - share), (slot + 2, share)], None)))
+            }
+            _ => None,
+        }
+    }
+
+    // its own cluster knows what static solids do to it
+    fn is_led(&self) -> bool {
+        true
+    }
+
+    fn is_remote(&self) -> bool {
+        true
+    }
+
+    fn slot_of(&self, block: usize) -> u32 {
+        self.model.blocks[block].slot
+    }
+
+    fn spares(&self, other: AgentId) -> bool {
+        !self.partners.contains(&other)
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let radius_m = match self.form.as_deref().map(|form| &form.kind) {
+            Some(ShapeKind::Solid(solid)) => solid.radius_m,
+            _ => 0.0,
+        };
+        let is_spin = |block: &LocalBlock| self.matter.point(block.slot).is_none() && block.slot % 2 == 1;
+        let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
+        let blocks = self.model.blocks.iter().zip(v).map(of);
+        if self.matter.points.is_empty() { blocks.sum() } else { blocks.chain(self.matter.fastest()).fold(0.0, f64::max) }
+    }
+
+    fn keep(&mut self) {
+        let Self { matter, now, kept, .. } = self;
+        kept.0.clone_from(matter);
+        kept.1.clone_from(now);
+    }
+
+    fn go_back(&mut self) {
+        let Self { matter, now, kept, .. } = self;
+        matter.clone_from(&kept.0);
+        now.clone_from(&kept.1);
+    }
+
+    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
+        // its steps are the shortest of its cluster: it is never within one
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        let Self { matter, model, now, .. } = self;
+        matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * h_s);
+        for (block, v) in model.blocks.iter_mut().zip(v) {
+            let at = LocalBlock { velocity: *v, ..*block };
+            matter.shift(&at, DVec3::ZERO, h_s);
+        }
+        now.copy_from_slice(v);
+        Ok(())
+    }
+
+    fn is_calm(&self) -> bool {
+        true
+    }
+
+    fn rest(&mut self) {}
+
+    fn work(&self) -> f64 {
+        0.0
+    }
+}
+
+impl Matter {
+    /// Takes in a published body, `since_s` seconds later as its velocities lead it; whether it has matter.
+    pub fn bring(&mut self, body: &Body, since_s: f64) -> bool {
+        let known = self.take(body);
+        self.drift.iter().zip(&mut self.points).for_each(|(v, x)| *x += *v * since_s);
+        let whole = match body {
+            Body::Rigid(rigid) => [rigid.velocity, rigid.spin],
+            Body::Tool(tool) => [tool.velocity, tool.spin],
+            _ => return known,
+        };
+        for (slot, velocity) in (0..).zip(whole) {
+            self.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, since_s);
+        }
+        known
+    }
+
+    /// The velocity of a point of its skin, as published, m/s.
+    #[must_use]
+    pub fn velocity(&self, body: &Body, place: &Place) -> DVec3 {
+        let of = |point: u32| self.drift.get(point as usize).copied().unwrap_or(DVec3::ZERO);
+        match (*place, body) {
+            (Place::Point(point), Body::Rigid(rigid)) => rigid.velocity + rigid.spin.cross(point - self.centre),
+            (Place::Point(point), Body::Tool(tool)) => tool.velocity + tool.spin.cross(point - self.centre),
+            (Place::Point(_), _) => DVec3::ZERO,
+            (Place::Chain { segment, share, .. }, _) => of(segment).lerp(of(segment + 1), share),
+            (Place::Surface { vertices, shares }, _) => {
+                vertices.into_iter().zip(shares).map(|(vertex, share)| of(vertex) * share).sum()
+            }
+        }
+    }
+
+    /// Takes in a published body; whether it has matter.
+    fn take(&mut self, body: &Body) -> bool {
+        self.points.clear();
+        self.drift.clear();
+        self.arc_m.clear();
+        self.jaw = None;
+        match body {
+            Body::Nothing => return false,
+            Body::Rigid(rigid) => (self.centre, self.rotation) = (rigid.position, rigid.rotation),
+            Body::Tool(tool) => (self.centre, self.rotation, self.jaw) = (tool.tip, tool.rotation, Some(tool.jaw)),
+            Body::Curve(curve) => {
+                self.points.extend_from_slice(&curve.positions);
+                self.drift.extend_from_slice(&curve.velocities);
+                self.radii_m.clone_from(&curve.radii_m);
+                self.arc_m.extend_from_slice(&curve.arc_m);
+            }
+            Body::Soft(soft) => {
+                self.points.extend_from_slice(&soft.positions);
+                self.drift.extend_from_slice(&soft.velocities);
+            }
+        }
+        true
+    }
+
+    /// The body's skin there.
+    #[must_use]
+    pub fn placed<'a>(&'a self, form: &'a CollisionShape) -> Option<PlacedShape<'a>> {
+        let Self { centre: position, rotation, points, radii_m, .. } = self;
+        let view = match &form.kind {
+            ShapeKind::Solid(_) => ShapePose::Solid { position: *position, rotation: *rotation },
+            ShapeKind::Tool(_) => ShapePose::Tool { tip: *position, rotation: *rotation, jaw: self.jaw? },
+            ShapeKind::Chain { .. } => ShapePose::Chain { positions: points, radii_m },
+            ShapeKind::Surface(_) => ShapePose::Surface(points),
+        };
+        Some(PlacedShape { form, view })
+    }
+
+    /// The place of the point that a slot is about; `None` of a spin, and of a body that moves as a whole.
+    fn point_of(&self, slot: u32) -> Option<usize> {
+        let place = if self.arc_m.is_empty() { Some(slot) } else { (slot % 2 == 0).then_some(slot / 2) };
+        place.map(|place| place as usize).filter(|place| *place < self.points.len())
+    }
+
+    fn point(&self, slot: u32) -> Option<DVec3> {
+        self.point_of(slot).map(|place| self.points[place])
+    }
+
+    fn fastest(&self) -> impl Iterator<Item = f64> + '_ {
+        self.drift.iter().map(|v| v.length())
+    }
+
+    fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
+        let last = self.arc_m.len().checked_sub(2)?;
+        let segment = self.arc_m.partition_point(|&s| s < arc_m).saturating_sub(1).min(last);
+        let length = self.arc_m[segment + 1] - self.arc_m[segment];
+        Some((segment, if length > 0.0 { ((arc_m - self.arc_m[segment]) / length).clamp(0.0, 1.0) } else { 0.0 }))
+    }
+
+    /// Moves what a block is about by its velocity for some seconds, and by `way` besides; points have moved by their drift already.
+    fn shift(&mut self, block: &LocalBlock, way: DVec3, for_s: f64) {
+        match (self.point_of(block.slot), self.points.is_empty(), block.slot) {
+            (Some(place), ..) => self.points[place] += (block.velocity - self.drift[place]) * for_s + way,
+            (None, true, 0) => self.centre += block.velocity * for_s + way,
+            (None, true, _) => {
+                let turn = block.velocity * for_s + way;
+                if turn != DVec3::ZERO {
+                    self.rotation = (DQuat::from_scaled_axis(turn) * self.rotation).normalize();
+                }
+            }
+            // a tube's segments turn with their nodes
+            (None, false, _) => {}
+        }
+    }
+
+    /// What an impulse at a site gives to slots.
+    fn visit_blocks(&self, site: Site, impulse: Impulse, mut visit: impl FnMut(u32, DVec3)) {
+        match site {
+            Site::Whole => {
+                visit(0, impulse.linear);
+                visit(1, impulse.angular);
+            }
+            Site::Vertex(vertex) => visit(vertex, impulse.linear),
+            Site::Arc(arc_m) => {
+                let Some((segment, share)) = self.locate(arc_m) else { return };
+                let slot = 2 * segment as u32;
+                visit(slot, impulse.linear * (1.0 - share));
+                visit(slot + 1, impulse.angular);
+                visit(slot + 2, impulse.linear * share);
+            }
+        }
+    }
+}
+
+fn place_of_slot(model: &LocalModel, slot: u32) -> Option<usize> {
+    model.blocks.iter().position(|block| block.slot == slot)
+}
+
+/// The local model of a body that has published none yet: it moves as a whole and nothing holds it.
+fn lone(inertia: &Inertia, body: &Body, step_s: f64, into: &mut LocalModel) {
+    into.blocks.clear();
+    into.compliance.clear();
+    into.partners.clear();
+    into.step_s = step_s;
+    if let (Inertia::Rigid { inverse_mass, inverse_inertia }, Body::Rigid(state)) = (inertia, body) {
+        let blocks = [(0, state.velocity), (1, state.spin)];
+        into.blocks.extend(blocks.map(|(slot, velocity)| LocalBlock { slot, velocity, acceleration: DVec3::ZERO }));
+        let linear = DMat3::from_diagonal(DVec3::splat(*inverse_mass));
+        into.compliance.extend([linear, DMat3::ZERO, DMat3::ZERO, *inverse_inertia]);
+    }
+}
+
+/// The inverse of a model's compliance into `out`, row by row; `false` where it is not positive definite.
+fn invert(model: &LocalModel, out: &mut Vec<f64>) -> bool {
+    let (blocks, size) = (model.blocks.len(), 3 * model.blocks.len());
+    if blocks == 0 || model.compliance.len() != blocks * blocks {
+        return false;
+    }
+    // the lower half of the symmetric part, twice: the second becomes the inverse
+    out.clear();
+    out.resize(2 * size * size, 0.0);
+    let entry = |i: usize, j: usize| model.compliance[(i / 3) * blocks + j / 3].col(j % 3)[i % 3];
+    // blocks of points and of spins have units of their own
+    for i in 0..size {
+        let largest = (0..size).filter(|j| same_kind(model, i, *j)).map(|j| entry(j, j)).fold(0.0, f64::max);
+        for j in 0..=i {
+            out[i * size + j] = 0.5 * (entry(i, j) + entry(j, i));
+        }
+        out[i * size + i] += YIELD_SHARE * largest;
+    }
+    factor_and_invert(out, size)
+}
+
+fn same_kind(model: &LocalModel, i: usize, j: usize) -> bool {
+    let kind = |at: usize| model.blocks[at / 3].slot == 1 && model.blocks.len() == 2;
+    kind(i) == kind(j)
+}
+
+/// Cholesky's factor of the lower half in the first square of `out`, then the whole inverse in its place.
+fn factor_and_invert(out: &mut [f64], size: usize) -> bool {
+    let (l, inverse) = out.split_at_mut(size * size);
+    for i in 0..size {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| l[i * size + k] * l[j * size + k]).sum();
+            let rest = l[i * size + j] - dot;
+            if i == j {
+                if !(rest > 0.0 && rest.is_finite()) {
+                    return false;
+                }
+                l[i * size + i] = rest.sqrt();
+            } else {
+                l[i * size + j] = rest / l[j * size + j];
+            }
+        }
+    }
+    for column in 0..size {
+        for i in 0..size {
+            let dot: f64 = (0..i).map(|k| l[i * size + k] * inverse[k * size + column]).sum();
+            inverse[i * size + column] = (f64::from(u8::from(i == column)) - dot) / l[i * size + i];
+        }
+        for i in (0..size).rev() {
+            let dot: f64 = (i + 1..size).map(|k| l[k * size + i] * inverse[k * size + column]).sum();
+            inverse[i * size + column] = (inverse[i * size + column] - dot) / l[i * size + i];
+        }
+    }
+    l.copy_from_slice(inverse);
+    true
+}

@@ -1,0 +1,4 @@
+//! Pairs whose sides keep clocks of their own: momentum, rest, links, who computes, devices.
+
+mod clocks;
+mod ledger;
