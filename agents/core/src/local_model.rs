@@ -34,6 +34,8 @@ pub struct LocalPartner {
 pub struct LocalModel {
     /// The body's step, in which it gives evenly what it takes, seconds, > 0.
     pub step_s: f64,
+    /// Whether contacts or springs of its cluster held it in the last step: it then forgets an impulse within a step, and what is free keeps it.
+    pub held: bool,
     /// The blocks that may move under the partners' impulses.
     pub blocks: Vec<LocalBlock>,
     /// W of these blocks, row by row, with the contacts of the body's cluster held: velocities per impulse, 1/kg and 1/(kg·m²).
@@ -45,7 +47,7 @@ pub struct LocalModel {
 impl LocalModel {
     /// Takes over `from`, in the storage that is there.
     pub fn copy_from(&mut self, from: &Self) {
-        self.step_s = from.step_s;
+        (self.step_s, self.held) = (from.step_s, from.held);
         self.blocks.clone_from(&from.blocks);
         self.compliance.clone_from(&from.compliance);
         self.partners.truncate(from.partners.len());

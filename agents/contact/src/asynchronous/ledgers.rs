@@ -43,6 +43,8 @@ pub struct TakenImpulse {
     pub site: Site,
     /// N·s and N·m·s.
     pub impulse: Impulse,
+    /// The part of it that is a blow, times the seconds since it acted, N·s² and N·m·s².
+    pub carried: Impulse,
 }
 
 impl Ledgers {
@@ -73,9 +75,16 @@ impl Ledgers {
                 continue;
             }
             let Taken { copy, forces, .. } = taken;
-            ledger.beyond(Some(copy), context.time, |site, impulse, _| {
-                force_at(forces, site).now = impulse * dt_s.recip();
-                apply(TakenImpulse { site, impulse });
+            ledger.beyond(Some(copy), context.time, |site, impulse, way| {
+                let force = force_at(forces, site);
+                force.now = impulse * dt_s.recip();
+                let blow = |now: DVec3, lasting: DVec3| 1.0 - lasting.length() / now.length().max(f64::MIN_POSITIVE);
+                let lasting = force.lasting();
+                let carried = Impulse {
+                    linear: way.linear * blow(force.now.linear, lasting.linear),
+                    angular: way.angular * blow(force.now.angular, lasting.angular),
+                };
+                apply(TakenImpulse { site, impulse, carried });
             });
             copy.copy_from(ledger);
             (copy.with, copy.ahead) = (neighbour.id, None);
@@ -95,10 +104,11 @@ impl Ledgers {
         self.given[place].give(at.site, at.time, at.after_s, impulse);
     }
 
-    /// What `other` has been given and had not taken in the snapshot that is seen: J − J_ack.
-    pub fn in_flight(&self, me: AgentId, other: &Neighbour, mut visit: impl FnMut(Site, Impulse)) {
+    /// What `other` has been given and had not taken in the snapshot that is seen, J − J_ack, and that times the seconds since it acted:
+    /// (J − J_ack) t − (S − S_ack) at the time `at`.
+    pub fn in_flight(&self, me: AgentId, other: &Neighbour, at: SimTime, visit: impl FnMut(Site, Impulse, Impulse)) {
         if let Ok(place) = self.given.binary_search_by_key(&other.id, |ledger| ledger.with) {
-            self.given[place].beyond(acknowledged(other, me), SimTime::ZERO, |site, impulse, _| visit(site, impulse));
+            self.given[place].beyond(acknowledged(other, me), at, visit);
         }
     }
 
@@ -106,21 +116,18 @@ impl Ledgers {
     #[must_use]
     pub fn in_flight_n_s(&self, me: AgentId, other: &Neighbour) -> f64 {
         let mut sum = DVec3::ZERO;
-        self.in_flight(me, other, |_, impulse| sum += impulse.linear);
+        self.in_flight(me, other, SimTime::ZERO, |_, impulse, _| sum += impulse.linear);
         sum.length()
     }
 
-    /// What `from` is expected to go on giving, N and N·m.
-    pub fn forces(&self, from: AgentId, mut visit: impl FnMut(Site, Impulse)) {
+    /// What `from` gave a second in the last step, N and N·m: what is expected to go on, and the blows beyond that. A body that is `held`
+    /// forgets blows, so that all goes on.
+    pub fn forces(&self, from: AgentId, held: bool, mut visit: impl FnMut(Site, [Impulse; 2])) {
         if let Ok(place) = self.taken.binary_search_by_key(&from, |taken| taken.copy.with) {
-            self.taken[place].forces.iter().for_each(|force| visit(force.site, force.lasting()));
-        }
-    }
-
-    /// What `from` gave in the last step beyond that, N and N·m.
-    pub fn blows(&self, from: AgentId, mut visit: impl FnMut(Site, Impulse)) {
-        if let Ok(place) = self.taken.binary_search_by_key(&from, |taken| taken.copy.with) {
-            self.taken[place].forces.iter().for_each(|force| visit(force.site, force.now - force.lasting()));
+            for force in &self.taken[place].forces {
+                let lasting = if held { force.now } else { force.lasting() };
+                visit(force.site, [lasting, force.now - lasting]);
+            }
         }
     }
 

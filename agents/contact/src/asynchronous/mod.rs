@@ -15,7 +15,7 @@ mod lines;
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 
 use crate::stepper::{
-    ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView,
+    ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView, Role,
 };
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
@@ -48,6 +48,8 @@ pub struct Pairs {
     lines: Lines,
     states: Vec<PairState>,
     model: LocalModel,
+    /// Whether contacts or springs of its cluster held the agent in its last step.
+    held: bool,
     scratch: Scratch,
 }
 
@@ -57,6 +59,7 @@ struct Scratch {
     blocks: Vec<usize>,
     lasting: Vec<DVec3>,
     blows: Vec<DVec3>,
+    carried: Vec<DVec3>,
     matter: Matter,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
@@ -106,7 +109,7 @@ impl Remotes {
         stepper.outside().clear();
         self.all.iter_mut().for_each(|remote| remote.met = false);
         let Some(time) = locals.first().map(|first| first.context.time) else { return };
-        for (place, (one, pairs)) in locals.iter().zip(&mut *pairs).enumerate() {
+        for (place, (one, pairs)) in locals.iter_mut().zip(&mut *pairs).enumerate() {
             let Some(pairs) = pairs else { continue };
             pairs.take(place, one, stepper, step.dt_s);
             pairs.lines.lay_out(place, one, stepper, step.dt_s);
@@ -137,7 +140,7 @@ impl Remotes {
         if remote.met {
             let Remote { seen, member, .. } = remote;
             let view = RemoteView { id: context.me, neighbour: seen, time: context.time };
-            member.add_partner(&view, |visit| ledgers.in_flight(context.me, seen, visit));
+            member.add_partner(&view, |visit| ledgers.in_flight(context.me, seen, context.time, visit));
         }
     }
 }
@@ -148,6 +151,7 @@ pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: 
     let locals = all.partition_point(|one| !one.member.is_remote());
     for (place, pairs) in pairs.iter_mut().enumerate().take(locals) {
         let Some(pairs) = pairs else { continue };
+        pairs.held = stepper.is_held(place);
         pairs.book(place, all, stepper, dt_s);
         pairs.lines.answer(place, stepper, &mut pairs.states, dt_s);
         pairs.publish(place, all, stepper);
@@ -155,15 +159,28 @@ pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: 
 }
 
 impl Pairs {
-    /// Takes what partners gave as impulses that act evenly over the step.
-    fn take(&mut self, place: usize, one: &Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
+    /// Takes what partners gave as impulses that act evenly over the step. What nothing holds goes to where blows would have carried it,
+    /// had they come when they acted (eq. 4).
+    fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.ledgers.open(&one.context);
         let known = &mut stepper.outside().known;
+        let carried = &mut self.scratch.carried;
+        carried.clear();
+        let is_free = !self.held && one.member.role() != Role::Kinematic;
         self.ledgers.take(&one.context, dt_s, |taken| {
             blocks::visit_sides(&*one.member, taken.site, taken.impulse, |side, impulse| {
                 known.push(KnownImpulse { member: place, side, impulse });
             });
+            if is_free {
+                carried.resize(one.member.velocities().len(), DVec3::ZERO);
+                blocks::visit_sides(&*one.member, taken.site, taken.carried, |side, impulse| {
+                    side.terms().iter().for_each(|term| carried[term.block] += term.map.transpose() * impulse);
+                });
+            }
         });
+        if carried.iter().any(|impulse| *impulse != DVec3::ZERO) {
+            one.member.carry(carried);
+        }
     }
 
     /// Books what this agent gave remote members.
@@ -178,7 +195,7 @@ impl Pairs {
             let Some(other) = context.neighbours.iter().find(|other| other.id == remote.id) else { continue };
             let slot = remote.member.slot_of(given.block);
             let Some((site, impulse)) = site_of(&other.snapshot.body, slot, given.impulse) else { continue };
-            let at = GivenAt { site, time: context.time, after_s: 0.5 * dt_s };
+            let at = GivenAt { site, time: context.time, after_s: given.after_s };
             ledgers.give(remote.id, at, impulse);
             let state = state_of(states, remote.id, PairKind::Ledger);
             state.force_n += impulse.linear.length() / dt_s;
@@ -218,7 +235,7 @@ impl Pairs {
             model.partners.clear();
             return;
         }
-        let Scratch { blocks, lasting, blows, .. } = scratch;
+        let (Scratch { blocks, lasting, blows, .. }, held) = (scratch, stepper.is_held(place));
         for list in [&mut *lasting, &mut *blows] {
             list.clear();
             list.resize(blocks.len(), DVec3::ZERO);
@@ -235,8 +252,10 @@ impl Pairs {
                     }
                 });
             };
-            ledgers.forces(partner.id, |site, force| add(site, force, &mut partner.forces));
-            ledgers.blows(partner.id, |site, force| add(site, force, blows));
+            ledgers.forces(partner.id, held, |site, [lasting, blow]| {
+                add(site, lasting, &mut partner.forces);
+                add(site, blow, blows);
+            });
             lasting.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
         }
         let query = LocalQuery { place, blocks, lasting, blows };

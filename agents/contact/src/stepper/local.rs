@@ -22,12 +22,18 @@ pub struct LocalQuery<'a> {
 }
 
 impl ClusterStepper {
+    /// Whether contacts or rows touched a participant in the last fine step.
+    #[must_use]
+    pub fn is_held(&self, place: usize) -> bool {
+        self.progress[place].place.is_some()
+    }
+
     /// Fills blocks, compliance and step of a local model from the macro step that was made last.
     pub fn local_model(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
         let LocalQuery { place, blocks, .. } = *query;
         let member = &*all[place].member;
         let (share, solved) = (f64::from(self.progress[place].share), self.progress[place].place);
-        into.step_s = self.macro_s;
+        (into.step_s, into.held) = (self.macro_s, solved.is_some());
         let held = solved.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance));
         if held {
             into.compliance.iter_mut().for_each(|w| *w *= share.recip());

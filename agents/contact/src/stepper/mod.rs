@@ -288,6 +288,7 @@ impl ClusterStepper {
         self.rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
         self.fine_s = h_s;
         for fine in 0..parts {
+            self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s)?;
             self.search.find(scene, all, &self.progress, h_s);
             self.rebounds.choose(&mut self.search, &self.progress);

@@ -47,6 +47,8 @@ pub struct RemoteImpulse {
     pub remote: usize,
     /// Its block.
     pub block: usize,
+    /// When the fine step began in which it acts, seconds from the start of the macro step.
+    pub after_s: f64,
     /// N·s, or N·m·s of a spin.
     pub impulse: DVec3,
 }
@@ -62,6 +64,8 @@ pub struct Outside {
     pub line_impulses: Vec<DVec3>,
     /// What remote members were given in the last macro step.
     pub given: Vec<RemoteImpulse>,
+    /// When the present fine step begins, seconds from the start of the macro step.
+    pub(super) after_s: f64,
     scratch: Vec<DVec3>,
     residual: Vec<DVec3>,
 }
@@ -103,11 +107,14 @@ impl Outside {
         }
         for term in side.terms() {
             let (remote, block) = (side.member, term.block);
-            let same = |given: &&mut RemoteImpulse| (given.member, given.remote, given.block) == (by, remote, block);
+            let after_s = self.after_s;
+            let same = |given: &&mut RemoteImpulse| {
+                (given.member, given.remote, given.block) == (by, remote, block) && given.after_s == after_s
+            };
             let part = term.map.transpose() * impulse;
             match self.given.iter_mut().find(same) {
                 Some(given) => given.impulse += part,
-                None => self.given.push(RemoteImpulse { member: by, remote, block, impulse: part }),
+                None => self.given.push(RemoteImpulse { member: by, remote, block, after_s, impulse: part }),
             }
         }
     }

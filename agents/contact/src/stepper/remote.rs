@@ -46,6 +46,8 @@ pub struct RemoteMember {
     gain_m_s2: Vec<DVec3>,
     /// What deviates from the model's own forecast, N·s for each block.
     deviation: Vec<DVec3>,
+    /// How far that has moved it, N·s² for each block.
+    carried: Vec<DVec3>,
     /// The time of the snapshot that the matrix was made for.
     seen: Option<SimTime>,
     kept: (Matter, Vec<DVec3>),
@@ -78,36 +80,46 @@ impl RemoteMember {
             }
             self.set_matrix();
         }
-        self.deviation.clear();
-        self.deviation.resize(self.model.blocks.len(), DVec3::ZERO);
+        for list in [&mut self.deviation, &mut self.carried] {
+            list.clear();
+            list.resize(self.model.blocks.len(), DVec3::ZERO);
+        }
         self.gain_m_s2.clear();
         self.gain_m_s2.extend(self.model.blocks.iter().map(|block| block.acceleration));
         known && !self.blocks.is_empty()
     }
 
     /// Adds a participant that computes its pair with the partner, to which it has `given` what is on its way (eq. 5).
-    pub fn add_partner(&mut self, view: &RemoteView<'_>, given: impl FnOnce(&mut dyn FnMut(Site, Impulse))) {
+    pub fn add_partner(&mut self, view: &RemoteView<'_>, given: impl FnOnce(&mut dyn FnMut(Site, Impulse, Impulse))) {
         self.partners.push(view.id);
         let model = &self.model;
         let since_s = view.time.secs_after(view.neighbour.snapshot.time);
         let partner = model.partners.iter().find(|partner| partner.id == view.id);
         let age_s = partner.map_or(0.0, |partner| view.time.secs_after(partner.read).max(0.0));
-        // what was given before the partner's step began acts evenly through it, what was given since is foretold to act
+        // what was given before its step began acts on what is held evenly through it; what was given since is foretold to act
         let before = if since_s > 0.0 && age_s > 0.0 { (1.0 - since_s / age_s).max(0.0) } else { 0.0 };
         let begun = (since_s / model.step_s).clamp(0.0, 1.0);
-        let acts = before * begun + (1.0 - before);
-        let matter = &self.matter;
-        let deviation = &mut self.deviation;
-        given(&mut |site, impulse| {
+        let acts = if model.held { before * begun + (1.0 - before) } else { 1.0 };
+        // how long what deviates has moved what is held: not through more than its step
+        let moved_s = if since_s > 0.0 { since_s } else { age_s }.min(model.step_s);
+        let Self { matter, deviation, carried, .. } = self;
+        given(&mut |site, impulse, way| {
             matter.visit_blocks(site, impulse, |slot, impulse| {
                 if let Some(place) = place_of_slot(model, slot) {
                     deviation[place] += impulse * acts;
+                    carried[place] += impulse * if model.held { acts * moved_s } else { 0.0 };
                 }
             });
+            if !model.held {
+                matter.visit_blocks(site, way, |slot, way| {
+                    place_of_slot(model, slot).into_iter().for_each(|place| carried[place] += way);
+                });
+            }
         });
         let Some(partner) = partner else { return };
         for (at, force) in partner.forces.iter().enumerate().take(self.deviation.len()) {
             self.deviation[at] -= *force * (acts * age_s);
+            self.carried[at] -= *force * (acts * age_s * if model.held { moved_s } else { 0.5 * age_s });
             // it goes on only as far as it is given
             for row in 0..self.deviation.len() {
                 self.gain_m_s2[row] -= self.model.compliance[row * self.deviation.len() + at] * *force;
@@ -120,18 +132,15 @@ impl RemoteMember {
         let size = self.model.blocks.len();
         let step_s = self.model.step_s;
         let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
-        let reads = self.model.partners.iter().filter(|partner| self.partners.contains(&partner.id));
-        let read = reads.map(|partner| partner.read).max().unwrap_or(SimTime::ZERO);
-        // how long what deviates has moved it
-        let moved_s = if since_s > 0.0 { since_s } else { time.secs_after(read).max(0.0) }.min(step_s);
         self.now.clear();
-        let Self { model, matter, now, deviation, .. } = self;
+        let Self { model, matter, now, deviation, carried, .. } = self;
         matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * since_s);
         for (at, block) in model.blocks.iter().enumerate() {
             let row = &model.compliance[at * size..(at + 1) * size];
-            let changed: DVec3 = row.iter().zip(&*deviation).map(|(w, impulse)| *w * *impulse).sum();
+            let of = |list: &[DVec3]| row.iter().zip(list).map(|(w, impulse)| *w * *impulse).sum::<DVec3>();
+            let changed = of(deviation);
             now.push(block.velocity + block.acceleration * since_s + changed);
-            let way = block.acceleration * (0.5 * since_s * since_s) + changed * moved_s;
+            let way = block.acceleration * (0.5 * since_s * since_s) + of(carried);
             matter.shift(block, way, since_s);
         }
     }

@@ -133,6 +133,15 @@ impl ClusterMember for RigidBody {
         v[0].length() + v[1].length() * self.world.mover.radius_m
     }
 
+    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
+        self.motion.position += impulses_n_s2[0] / self.spread.mass_kg;
+        let turn = self.inertia().inverse() * impulses_n_s2[SPIN];
+        if turn != DVec3::ZERO {
+            self.motion.rotation = (glam::DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
+        }
+        self.world.moved();
+    }
+
     fn keep(&mut self) {
         let Self { motion, calm_s, at_rest, steps, .. } = *self;
         self.unknowns.kept = Some(Kept { motion, calm_s, at_rest, steps });

@@ -11,6 +11,9 @@ use std::sync::Arc;
 /// Gravity, m/s².
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
+/// Changes a state that an agent is about to publish.
+pub type Tamper = fn(&mut dyn Agent, &mut Snapshot);
+
 /// An agent with its clock.
 pub struct Clocked {
     pub agent: Box<dyn Agent>,
@@ -37,8 +40,8 @@ pub struct Clocks {
     scene: ClusterScene,
     /// Whether a state is seen only when its time has come, as where a step takes as long as the time that it covers.
     pub due: bool,
-    /// What the partner of a published local model is told instead, for comparison.
-    pub tamper: Option<fn(&mut Snapshot)>,
+    /// What partners are told instead of a state, for comparison.
+    pub tamper: Option<Tamper>,
 }
 
 impl Clocks {
@@ -126,10 +129,10 @@ impl Clocks {
         pairs.write(own);
         own.time = *time;
         let mut shown = own.clone();
-        if let Some(tamper) = self.tamper {
-            tamper(&mut shown);
-        }
         let one = &mut all[me];
+        if let Some(tamper) = self.tamper {
+            tamper(one.agent.as_mut(), &mut shown);
+        }
         one.shown.swap(0, 1);
         one.shown[0] = Arc::new(shown);
         me

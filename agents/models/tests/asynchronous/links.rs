@@ -1,0 +1,1 @@
+//! Attachments between clocks, by ledger and by transmission lines.
