@@ -7,9 +7,6 @@ use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, Impulse, Ledger, SimTime, Site, Snapshot};
 
-/// A force that grows by more than this factor from one step to the next is a blow: it does not go on as strongly.
-const GROWS_MOST: f64 = 2.0;
-
 /// The ledgers of one agent.
 #[derive(Debug, Clone, Default)]
 pub struct Ledgers {
@@ -28,12 +25,11 @@ struct Taken {
     forces: Vec<SiteForce>,
 }
 
-/// What a partner gave a site a second in the last two steps, N and N·m.
+/// What a partner gave a site a second in the last step, N and N·m.
 #[derive(Debug, Clone, Copy)]
 struct SiteForce {
     site: Site,
-    now: Impulse,
-    before: Impulse,
+    force: Impulse,
 }
 
 /// An impulse that a partner gave.
@@ -43,7 +39,7 @@ pub struct TakenImpulse {
     pub site: Site,
     /// N·s and N·m·s.
     pub impulse: Impulse,
-    /// The part of it that is a blow, times the seconds since it acted, N·s² and N·m·s².
+    /// The same times the seconds since it acted, dJ t − dS, N·s² and N·m·s².
     pub carried: Impulse,
 }
 
@@ -58,11 +54,7 @@ impl Ledgers {
 
     /// Takes all that is new, each impulse once (eq. 2): it will act evenly over the step of `dt_s` seconds that begins (eq. 4c).
     pub fn take(&mut self, context: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(TakenImpulse)) {
-        for taken in &mut self.taken {
-            for force in &mut taken.forces {
-                (force.before, force.now) = (force.now, Impulse::ZERO);
-            }
-        }
+        self.taken.iter_mut().for_each(|taken| taken.forces.clear());
         for neighbour in context.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else { continue };
             if !ledger.is_finite() {
@@ -75,23 +67,13 @@ impl Ledgers {
                 continue;
             }
             let Taken { copy, forces, .. } = taken;
-            ledger.beyond(Some(copy), context.time, |site, impulse, way| {
-                let force = force_at(forces, site);
-                force.now = impulse * dt_s.recip();
-                let blow = |now: DVec3, lasting: DVec3| 1.0 - lasting.length() / now.length().max(f64::MIN_POSITIVE);
-                let lasting = force.lasting();
-                let carried = Impulse {
-                    linear: way.linear * blow(force.now.linear, lasting.linear),
-                    angular: way.angular * blow(force.now.angular, lasting.angular),
-                };
+            ledger.beyond(Some(copy), context.time, |site, impulse, carried| {
+                forces.push(SiteForce { site, force: impulse * dt_s.recip() });
                 apply(TakenImpulse { site, impulse, carried });
             });
             copy.copy_from(ledger);
             (copy.with, copy.ahead) = (neighbour.id, None);
             copy.coming.clear();
-        }
-        for taken in &mut self.taken {
-            taken.forces.retain(|force| force.now != Impulse::ZERO || force.before != Impulse::ZERO);
         }
     }
 
@@ -120,14 +102,10 @@ impl Ledgers {
         sum.length()
     }
 
-    /// What `from` gave a second in the last step, N and N·m: what is expected to go on, and the blows beyond that. A body that is `held`
-    /// forgets blows, so that all goes on.
-    pub fn forces(&self, from: AgentId, held: bool, mut visit: impl FnMut(Site, [Impulse; 2])) {
+    /// What `from` gave a second in the last step, N and N·m.
+    pub fn forces(&self, from: AgentId, mut visit: impl FnMut(Site, Impulse)) {
         if let Ok(place) = self.taken.binary_search_by_key(&from, |taken| taken.copy.with) {
-            for force in &self.taken[place].forces {
-                let lasting = if held { force.now } else { force.lasting() };
-                visit(force.site, [lasting, force.now - lasting]);
-            }
+            self.taken[place].forces.iter().for_each(|at| visit(at.site, at.force));
         }
     }
 
@@ -163,29 +141,6 @@ pub struct GivenAt {
     pub time: SimTime,
     /// Seconds after that.
     pub after_s: f64,
-}
-
-impl SiteForce {
-    /// The force that goes on: that of the last step, at most twice that of the step before.
-    fn lasting(&self) -> Impulse {
-        let lasts = |now: DVec3, before: DVec3| {
-            let most = GROWS_MOST * before.length();
-            if now.dot(before) <= 0.0 { DVec3::ZERO } else { now.clamp_length_max(most) }
-        };
-        Impulse {
-            linear: lasts(self.now.linear, self.before.linear),
-            angular: lasts(self.now.angular, self.before.angular),
-        }
-    }
-}
-
-/// The force at a site, made where it is new.
-fn force_at(forces: &mut Vec<SiteForce>, site: Site) -> &mut SiteForce {
-    let place = forces.iter().position(|force| force.site == site).unwrap_or_else(|| {
-        forces.push(SiteForce { site, now: Impulse::ZERO, before: Impulse::ZERO });
-        forces.len() - 1
-    });
-    &mut forces[place]
 }
 
 /// The copy that `other` keeps of what `me` has given it.

@@ -15,8 +15,9 @@ mod lines;
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 
 use crate::stepper::{
-    ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView, Role,
+    ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView,
 };
+use crate::cluster::Side;
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
 use lines::Lines;
@@ -48,8 +49,9 @@ pub struct Pairs {
     lines: Lines,
     states: Vec<PairState>,
     model: LocalModel,
-    /// Whether contacts or springs of its cluster held the agent in its last step.
-    held: bool,
+    /// For each block of a body that nothing of its cluster held in its last step the force that would hold it still, N or N·m; empty of
+    /// one that was held.
+    weight: Vec<DVec3>,
     scratch: Scratch,
 }
 
@@ -151,7 +153,7 @@ pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: 
     let locals = all.partition_point(|one| !one.member.is_remote());
     for (place, pairs) in pairs.iter_mut().enumerate().take(locals) {
         let Some(pairs) = pairs else { continue };
-        pairs.held = stepper.is_held(place);
+        stepper.weight(all, place, &mut pairs.weight);
         pairs.book(place, all, stepper, dt_s);
         pairs.lines.answer(place, stepper, &mut pairs.states, dt_s);
         pairs.publish(place, all, stepper);
@@ -164,21 +166,27 @@ impl Pairs {
     fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.ledgers.open(&one.context);
         let known = &mut stepper.outside().known;
-        let carried = &mut self.scratch.carried;
-        carried.clear();
-        let is_free = !self.held && one.member.role() != Role::Kinematic;
+        let Self { weight, scratch: Scratch { carried, lasting: sums, .. }, .. } = self;
+        for list in [&mut *carried, &mut *sums] {
+            list.clear();
+            list.resize(weight.len(), DVec3::ZERO);
+        }
         self.ledgers.take(&one.context, dt_s, |taken| {
+            let add = |list: &mut [DVec3], side: &Side, impulse: DVec3| {
+                for term in side.terms() {
+                    list.get_mut(term.block).into_iter().for_each(|sum| *sum += term.map.transpose() * impulse);
+                }
+            };
             blocks::visit_sides(&*one.member, taken.site, taken.impulse, |side, impulse| {
                 known.push(KnownImpulse { member: place, side, impulse });
+                add(sums, &side, impulse);
             });
-            if is_free {
-                carried.resize(one.member.velocities().len(), DVec3::ZERO);
-                blocks::visit_sides(&*one.member, taken.site, taken.carried, |side, impulse| {
-                    side.terms().iter().for_each(|term| carried[term.block] += term.map.transpose() * impulse);
-                });
-            }
+            blocks::visit_sides(&*one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
         });
-        if carried.iter().any(|impulse| *impulse != DVec3::ZERO) {
+        for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
+            *way *= 1.0 - lasting_share(*sum / dt_s, *weight);
+        }
+        if carried.iter().any(|way| *way != DVec3::ZERO) {
             one.member.carry(carried);
         }
     }
@@ -217,7 +225,7 @@ impl Pairs {
 
     /// Makes the local model for partners that compute their pairs with this agent.
     fn publish(&mut self, place: usize, all: &[Participant<'_>], stepper: &mut ClusterStepper) {
-        let Self { ledgers, model, scratch, .. } = self;
+        let Self { ledgers, model, weight, scratch, .. } = self;
         let one = &all[place];
         let context = one.context;
         scratch.blocks.clear();
@@ -235,7 +243,7 @@ impl Pairs {
             model.partners.clear();
             return;
         }
-        let (Scratch { blocks, lasting, blows, .. }, held) = (scratch, stepper.is_held(place));
+        let Scratch { blocks, lasting, blows, .. } = scratch;
         for list in [&mut *lasting, &mut *blows] {
             list.clear();
             list.resize(blocks.len(), DVec3::ZERO);
@@ -252,11 +260,13 @@ impl Pairs {
                     }
                 });
             };
-            ledgers.forces(partner.id, held, |site, [lasting, blow]| {
-                add(site, lasting, &mut partner.forces);
-                add(site, blow, blows);
-            });
-            lasting.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
+            ledgers.forces(partner.id, |site, force| add(site, force, &mut partner.forces));
+            blows.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
+        }
+        for (at, (lasting, blow)) in lasting.iter_mut().zip(&mut *blows).enumerate() {
+            let share = weight.get(blocks[at]).map_or(1.0, |weight| lasting_share(*blow, *weight));
+            model.partners.iter_mut().for_each(|partner| partner.forces[at] *= share);
+            (*lasting, *blow) = (*blow * share, *blow * (1.0 - share));
         }
         let query = LocalQuery { place, blocks, lasting, blows };
         stepper.local_model(all, &query, model);
@@ -280,6 +290,12 @@ impl std::fmt::Debug for Pairs {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Pairs").field("states", &self.states).finish_non_exhaustive()
     }
+}
+
+/// The share of a force on a block that goes on: as much as the block's weight bears against. The rest is a blow.
+fn lasting_share(force: DVec3, weight: DVec3) -> f64 {
+    let square = force.length_squared();
+    if square > 0.0 { (weight.dot(force) / square).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// The partner at a place of a model, in the storage that is there.

@@ -22,10 +22,24 @@ pub struct LocalQuery<'a> {
 }
 
 impl ClusterStepper {
-    /// Whether contacts or rows touched a participant in the last fine step.
-    #[must_use]
-    pub fn is_held(&self, place: usize) -> bool {
-        self.progress[place].place.is_some()
+    /// The forces that would have held the blocks of a participant still in its last step, N or N·m; none where contacts or rows touched it.
+    pub fn weight(&self, all: &[Participant<'_>], place: usize, into: &mut Vec<DVec3>) {
+        into.clear();
+        let state = &self.progress[place];
+        if state.held {
+            return;
+        }
+        into.resize(state.gain.len(), DVec3::ZERO);
+        let own_s = self.fine_s * f64::from(state.share);
+        let free = |block: usize| {
+            (state.gain[block] - state.pushed.get(block).copied().unwrap_or(DVec3::ZERO)) * (-1.0 / own_s)
+        };
+        for block in all[place].member.blocks().iter().filter(|block| block.row < state.gain.len()) {
+            into[block.row] += block.value * free(block.column);
+            if block.row != block.column {
+                into[block.column] += block.value.transpose() * free(block.row);
+            }
+        }
     }
 
     /// Fills blocks, compliance and step of a local model from the macro step that was made last.
@@ -33,8 +47,8 @@ impl ClusterStepper {
         let LocalQuery { place, blocks, .. } = *query;
         let member = &*all[place].member;
         let (share, solved) = (f64::from(self.progress[place].share), self.progress[place].place);
-        (into.step_s, into.held) = (self.macro_s, solved.is_some());
-        let held = solved.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance));
+        (into.step_s, into.held) = (self.macro_s, self.progress[place].held);
+        let held = self.progress[place].held && solved.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance));
         if held {
             into.compliance.iter_mut().for_each(|w| *w *= share.recip());
         } else {

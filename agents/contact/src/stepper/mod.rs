@@ -484,13 +484,13 @@ impl ClusterStepper {
         for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
             if lasting(both) {
                 let owner = &search.owners[k];
-                progress[owner.member].touched = true;
-                owner.other.into_iter().for_each(|other| progress[other].touched = true);
+                progress[owner.member].hold();
+                owner.other.into_iter().for_each(|other| progress[other].hold());
             }
         }
         for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| **impulse != DVec3::ZERO) {
-            progress[owner.member].touched = true;
-            owner.other.into_iter().for_each(|other| progress[other].touched = true);
+            progress[owner.member].hold();
+            owner.other.into_iter().for_each(|other| progress[other].hold());
         }
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);

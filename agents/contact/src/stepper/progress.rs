@@ -35,8 +35,9 @@ pub(super) struct Progress {
     pub solved: Vec<DVec3>,
     /// Its place in the problem; `None` where no row touches it.
     pub place: Option<usize>,
-    /// Whether anything has acted on it for a while since its step began.
+    /// Whether anything has acted on it for a while since its step began, and whether a contact or row of the problem has.
     pub touched: bool,
+    pub held: bool,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
 }
@@ -58,7 +59,12 @@ impl Progress {
         self.given.clear();
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
-        self.touched = false;
+        (self.touched, self.held) = (false, false);
+    }
+
+    /// Notes that a contact or row of the problem acts on it.
+    pub fn hold(&mut self) {
+        (self.touched, self.held) = (true, true);
     }
 
     /// Adds what known impulses change its velocities by within its step; none where there are none.
