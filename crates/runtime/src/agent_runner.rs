@@ -285,7 +285,7 @@ impl AgentRunner {
         let (StepOutcome { report, dt }, led) = if self.cluster.is_some() {
             let stretched = wanted.as_secs_f64() / self.pace.wanted().as_secs_f64();
             let led = self.company.seats_at(self.pace.time()).count() as u32;
-            match self.step_cluster(Span::Wanted(stretched.max(1.0))) {
+            match self.step_cluster(Span::Wanted(stretched)) {
                 Ok(outcome) => (outcome, led),
                 Err(reason) if led == 0 => return Err(reason),
                 // they part: one of them will fail alone, the others find together again

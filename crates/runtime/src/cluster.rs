@@ -9,6 +9,7 @@ use super::observation::Observer;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
 };
+use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::{Law, Link, Neighbour, StepContext};
 use metachron_core::{
     AgentId, Body, ClusterSolves, ClusterState, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport,
@@ -35,8 +36,13 @@ pub(super) struct ClusterSeat {
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
+    /// Its pairs whose other sides keep clocks of their own; `None` where its scene declares none.
+    asynchronous: Option<Box<Pairs>>,
+    /// The partners of such pairs as the members that it leads meet them.
+    remotes: Option<Box<Remotes>>,
     /// Storage, empty between turns.
     participants: Vec<Participant<'static>>,
+    sides: Vec<Option<&'static mut Pairs>>,
     wishes: Vec<Wish>,
     groups: Vec<usize>,
     ids: Vec<AgentId>,
@@ -60,7 +66,7 @@ pub(super) struct MemberCost {
 /// How long the step of a cluster may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Span {
-    /// As its members want, stretched by this factor, ≥ 1.
+    /// As its members want, stretched by this factor; below 1 where faults are injected.
     Wanted(f64),
     /// No longer than this, to come to a given time.
     AtMost(SimSpan),
@@ -76,9 +82,12 @@ impl std::fmt::Debug for ClusterSeat {
 }
 
 impl ClusterSeat {
-    /// A seat in the clusters of `scene`.
-    pub fn new(scene: Arc<ClusterScene>) -> Self {
+    /// A seat in the clusters of `scene`; `asynchronous` of an agent that has pairs with clocks of their own.
+    pub fn new(scene: Arc<ClusterScene>, asynchronous: bool) -> Self {
         Self {
+            asynchronous: asynchronous.then(Box::default),
+            remotes: None,
+            sides: Vec::new(),
             scene,
             stepper: None,
             memory: ContactMemory::default(),
@@ -103,12 +112,19 @@ impl ClusterSeat {
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
         into.cluster = self.state;
+        if let Some(pairs) = &self.asynchronous {
+            pairs.write(into);
+        }
     }
 
-    /// Notes with whom it belongs into one cluster.
-    fn bond(&mut self, observer: &Observer, links: &[Link]) {
+    /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
+    fn bond(&mut self, observer: &Observer, links: &[Link], laws: &[(AgentId, Law)]) {
+        let is_apart = |id: AgentId| {
+            let law = laws.binary_search_by_key(&id, |(other, _)| *other).ok().map(|at| laws[at].1);
+            law.is_some_and(Law::is_asynchronous)
+        };
         self.bonds.clear();
-        self.bonds.extend_from_slice(observer.near());
+        self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
         let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
         self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
         self.bonds.sort_unstable();
@@ -150,18 +166,34 @@ impl AgentRunner {
         self.look(time, dt);
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
         let mut list = emptied(std::mem::take(&mut seat.participants));
+        let mut sides = without_sides(std::mem::take(&mut seat.sides));
+        let mut remotes = seat.remotes.take();
         let mut stepper = seat.stepper.take().unwrap_or_default();
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
         let mut company = std::mem::take(&mut self.company);
         let all = std::iter::once(&mut *self).chain(company.seats_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
-        list.extend(all.zip(parts).filter_map(|(actor, parts)| actor.participant(time, parts)));
+        for (actor, parts) in all.zip(parts) {
+            if let Some((participant, pairs)) = actor.participant(time, parts) {
+                list.push(participant);
+                sides.push(pairs);
+            }
+        }
+        let meets = sides.iter().any(Option::is_some);
+        if meets {
+            let step = MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts };
+            remotes.get_or_insert_default().join(&mut list, &mut sides, &mut stepper, step);
+        }
         let outcome = stepper.step(&scene, &mut list, dt);
+        if let (true, Ok(report)) = (meets, &outcome) {
+            part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
+        }
         let at_rest = list.iter().all(|one| one.member.is_calm());
-        let list = emptied(list);
+        let (list, sides) = (emptied(list), without_sides(sides));
         self.company = company;
         if let Some(seat) = &mut self.cluster {
-            (seat.participants, seat.wishes) = (list, wishes);
+            (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
+            seat.remotes = remotes;
         }
         let report = outcome.map_err(|error| error.to_string())?;
         let dt = report.dt;
@@ -201,14 +233,15 @@ impl AgentRunner {
         Ok((plan, dt.unwrap_or(self.pace.wanted())))
     }
 
-    /// What it brings into a step from `time`, of which it makes so many parts.
-    fn participant(&mut self, time: SimTime, parts: u32) -> Option<Participant<'_>> {
+    /// What it brings into a step from `time`, of which it makes so many parts, and its asynchronous pairs.
+    fn participant(&mut self, time: SimTime, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { agent, observer, hands, links, peers, cluster, .. } = self;
-        let ClusterSeat { memory, grips, .. } = &mut **cluster.as_mut()?;
+        let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
         let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, links };
         let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
-        Some(Participant { id, member: agent.member()?, context, laws, memory, parts, grips })
+        let participant = Participant { id, member: agent.member()?, context, laws, memory, parts, grips };
+        Some((participant, asynchronous.as_deref_mut()))
     }
 
     fn wish(&mut self) -> Option<Wish> {
@@ -221,14 +254,15 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
         let Self { observer, company, peers, writer, links, cluster, .. } = self;
         observer.update(peers, writer, step, company.all_fellows());
+        let laws = |observer: &Observer| peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws);
         if let Some(seat) = cluster {
-            seat.bond(observer, links);
+            seat.bond(observer, links, laws(observer));
         }
         company.each_at(time, |actor, fellows| {
             let Self { observer, peers, writer, links, cluster, .. } = actor;
             observer.update(peers, writer, step, fellows);
             if let Some(seat) = cluster {
-                seat.bond(observer, links);
+                seat.bond(observer, links, laws(observer));
             }
         });
     }
@@ -269,7 +303,10 @@ impl AgentRunner {
                 seat.memory.near(now).any(|id| id == pair.with)
             });
             for total in stepper.totals().iter().filter(|total| total.member == me) {
-                if let Partner::Agent(with) = total.partner {
+                let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
+                if let Partner::Agent(with) = total.partner
+                    && !apart(with)
+                {
                     seat.note_pair(total, with, dt_s);
                 }
             }
@@ -336,6 +373,12 @@ fn top(groups: &[usize], mut at: usize) -> usize {
         at = groups[at];
     }
     at
+}
+
+/// The storage of `sides` for other ones.
+fn without_sides<'b>(mut sides: Vec<Option<&mut Pairs>>) -> Vec<Option<&'b mut Pairs>> {
+    sides.clear();
+    sides.into_iter().map(|_| unreachable!("cleared above")).collect()
 }
 
 /// The storage of `participants` for other ones.

@@ -49,7 +49,7 @@ pub struct AgentSpawn {
     pub together: Option<AgentId>,
     /// The surroundings in whose contact clusters it is stepped; `None` for an agent that steps by itself.
     pub clusters: Option<Arc<ClusterScene>>,
-    /// Faults injected on purpose.
+    /// Faults injected on purpose; in clusters only into agents that have asynchronous pairs.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
     pub watches: Vec<WatchedPoint>,
@@ -298,7 +298,11 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         }
     }
     let scene = spawn.clusters.filter(|_| spawn.agent.member().is_some());
-    let cluster = scene.map(|scene| Box::new(ClusterSeat::new(scene)));
+    let asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
+    let asynchronous = asynchronous.fold(false, |any, law| any || law.is_asynchronous());
+    let cluster = scene.map(|scene| Box::new(ClusterSeat::new(scene, asynchronous)));
+    // within a cluster there are no messages to lose, and no clock of its own to disturb
+    let faults = if cluster.is_none() || asynchronous { spawn.faults } else { Faults::default() };
     AgentRunner {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
@@ -307,7 +311,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         dt_range: spawn.dt_range,
         range: spawn.range,
         governor: spawn.governor,
-        faults: spawn.faults,
+        faults,
         writer,
         observer: peers.observer(id, &links),
         links: spawn.attached,

@@ -279,10 +279,10 @@ impl Pairs {
         into.pairs.extend_from_slice(&self.states);
     }
 
-    /// Whether its pair with `other` is asynchronous and has acted.
+    /// Whether it gave `other` something in the last step, as to a partner outside its cluster.
     #[must_use]
-    pub fn has(&self, other: AgentId) -> bool {
-        self.states.iter().any(|state| state.with == other)
+    pub fn meets(&self, other: AgentId) -> bool {
+        self.states.iter().any(|state| state.with == other && state.contacts > 0)
     }
 }
 

@@ -48,10 +48,18 @@ pub struct RemoteMember {
     deviation: Vec<DVec3>,
     /// How far that has moved it, N·s² for each block.
     carried: Vec<DVec3>,
+    flight: Vec<InFlight>,
     /// The time of the snapshot that the matrix was made for.
     seen: Option<SimTime>,
     kept: (Matter, Vec<DVec3>),
     matrix: Vec<f64>,
+}
+
+/// What is on its way to a block: an impulse, and that times the seconds since it acted.
+#[derive(Debug, Clone, Copy, Default)]
+struct InFlight {
+    impulse: DVec3,
+    way: DVec3,
 }
 
 /// What a participant knows of its pair with a partner.
@@ -100,29 +108,29 @@ impl RemoteMember {
         let before = if since_s > 0.0 && age_s > 0.0 { (1.0 - since_s / age_s).max(0.0) } else { 0.0 };
         let begun = (since_s / model.step_s).clamp(0.0, 1.0);
         let acts = if model.held { before * begun + (1.0 - before) } else { 1.0 };
-        // how long what deviates has moved what is held: not through more than its step
-        let moved_s = if since_s > 0.0 { since_s } else { age_s }.min(model.step_s);
-        let Self { matter, deviation, carried, .. } = self;
+        let Self { matter, deviation, carried, flight, .. } = self;
+        flight.clear();
+        flight.resize(deviation.len(), InFlight::default());
         given(&mut |site, impulse, way| {
-            matter.visit_blocks(site, impulse, |slot, impulse| {
-                if let Some(place) = place_of_slot(model, slot) {
-                    deviation[place] += impulse * acts;
-                    carried[place] += impulse * if model.held { acts * moved_s } else { 0.0 };
-                }
-            });
-            if !model.held {
-                matter.visit_blocks(site, way, |slot, way| {
-                    place_of_slot(model, slot).into_iter().for_each(|place| carried[place] += way);
+            let mut add = |value: Impulse, to: fn(&mut InFlight) -> &mut DVec3| {
+                matter.visit_blocks(site, value, |slot, part| {
+                    place_of_slot(model, slot).into_iter().for_each(|place| *to(&mut flight[place]) += part);
                 });
-            }
+            };
+            add(impulse, |flight| &mut flight.impulse);
+            add(way, |flight| &mut flight.way);
         });
-        let Some(partner) = partner else { return };
-        for (at, force) in partner.forces.iter().enumerate().take(self.deviation.len()) {
-            self.deviation[at] -= *force * (acts * age_s);
-            self.carried[at] -= *force * (acts * age_s * if model.held { moved_s } else { 0.5 * age_s });
+        // what deviates has moved what is held for no longer than its step
+        let moved_s = if since_s > 0.0 { since_s } else { age_s }.min(model.step_s);
+        for (at, InFlight { impulse, way }) in flight.iter().enumerate() {
+            let force = partner.and_then(|partner| partner.forces.get(at)).copied().unwrap_or(DVec3::ZERO);
+            let lasting = force * age_s;
+            let new = (*impulse - lasting) * acts;
+            deviation[at] += new;
+            carried[at] += if model.held { new * moved_s } else { *way * (1.0 - share_of(lasting, *impulse)) };
             // it goes on only as far as it is given
-            for row in 0..self.deviation.len() {
-                self.gain_m_s2[row] -= self.model.compliance[row * self.deviation.len() + at] * *force;
+            for (row, gain) in self.gain_m_s2.iter_mut().enumerate() {
+                *gain -= model.compliance[row * deviation.len() + at] * force;
             }
         }
     }
@@ -459,6 +467,12 @@ impl Matter {
             }
         }
     }
+}
+
+/// The share of `whole` that `part` along it makes up, 0 … 1.
+fn share_of(part: DVec3, whole: DVec3) -> f64 {
+    let square = whole.length_squared();
+    if square > 0.0 { (part.dot(whole) / square).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 fn place_of_slot(model: &LocalModel, slot: u32) -> Option<usize> {
