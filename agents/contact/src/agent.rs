@@ -141,7 +141,16 @@ impl Neighbour {
     /// A neighbour that is only looked at: neither in contact nor owned.
     #[must_use]
     pub const fn observed(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Cluster, owned: false, computed_here: false, in_step: false, step_s: 0.0 }
+        Self {
+            id,
+            snapshot,
+            form: None,
+            law: Law::Cluster,
+            owned: false,
+            computed_here: false,
+            in_step: false,
+            step_s: 0.0,
+        }
     }
 }
 

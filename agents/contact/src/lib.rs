@@ -43,8 +43,8 @@ pub mod taken;
 pub mod tank;
 
 pub use agent::{Agent, AnchorSpring, IslandMember, Neighbour, StepContext};
-pub use contact::{Contact, PUSH_OUT_SHARE};
 pub use asynchronous::acknowledged;
+pub use contact::{Contact, PUSH_OUT_SHARE};
 pub use exchange::Exchange;
 pub use knock::Knock;
 pub use lasting::smooth;

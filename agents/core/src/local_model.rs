@@ -69,6 +69,7 @@ impl LocalModel {
         let forces = self.partners.iter().flat_map(|partner| &partner.forces);
         self.step_s.is_finite()
             && forces.into_iter().all(|force| force.is_finite())
-            && self.blocks.iter().all(of) && self.compliance.iter().all(|w| w.is_finite())
+            && self.blocks.iter().all(of)
+            && self.compliance.iter().all(|w| w.is_finite())
     }
 }

@@ -6,10 +6,10 @@
 use super::agent_runner::{AgentRunner, StepOutcome};
 use super::broad_phase::PlannedStep;
 use super::observation::Observer;
+use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
 };
-use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::{Law, Link, Neighbour, StepContext};
 use metachron_core::{
     AgentId, Body, ClusterSolves, ClusterState, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport,

@@ -56,7 +56,9 @@ impl Ledgers {
     pub fn take(&mut self, context: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(TakenImpulse)) {
         self.taken.iter_mut().for_each(|taken| taken.forces.clear());
         for neighbour in context.neighbours {
-            let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else { continue };
+            let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else {
+                continue;
+            };
             if !ledger.is_finite() {
                 continue;
             }

@@ -14,10 +14,10 @@ mod lines;
 
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 
+use crate::cluster::Side;
 use crate::stepper::{
     ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView,
 };
-use crate::cluster::Side;
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
 use lines::Lines;
@@ -60,7 +60,6 @@ pub struct Pairs {
 struct Scratch {
     blocks: Vec<usize>,
     lasting: Vec<DVec3>,
-    blows: Vec<DVec3>,
     carried: Vec<DVec3>,
     matter: Matter,
     narrow: NarrowPhaseScratch,
@@ -243,11 +242,9 @@ impl Pairs {
             model.partners.clear();
             return;
         }
-        let Scratch { blocks, lasting, blows, .. } = scratch;
-        for list in [&mut *lasting, &mut *blows] {
-            list.clear();
-            list.resize(blocks.len(), DVec3::ZERO);
-        }
+        let Scratch { blocks, lasting, .. } = scratch;
+        lasting.clear();
+        lasting.resize(blocks.len(), DVec3::ZERO);
         for partner in &mut model.partners {
             partner.forces.clear();
             partner.forces.resize(blocks.len(), DVec3::ZERO);
@@ -261,14 +258,14 @@ impl Pairs {
                 });
             };
             ledgers.forces(partner.id, |site, force| add(site, force, &mut partner.forces));
-            blows.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
+            lasting.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
         }
-        for (at, (lasting, blow)) in lasting.iter_mut().zip(&mut *blows).enumerate() {
-            let share = weight.get(blocks[at]).map_or(1.0, |weight| lasting_share(*blow, *weight));
+        for (at, all) in lasting.iter_mut().enumerate() {
+            let share = weight.get(blocks[at]).map_or(1.0, |weight| lasting_share(*all, *weight));
             model.partners.iter_mut().for_each(|partner| partner.forces[at] *= share);
-            (*lasting, *blow) = (*blow * share, *blow * (1.0 - share));
+            *all *= share;
         }
-        let query = LocalQuery { place, blocks, lasting, blows };
+        let query = LocalQuery { place, blocks, lasting };
         stepper.local_model(all, &query, model);
     }
 
@@ -344,4 +341,3 @@ fn anchor_of(site: Site) -> Anchor {
         Site::Vertex(vertex) => Anchor::Vertex(vertex),
     }
 }
-

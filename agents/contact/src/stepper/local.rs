@@ -17,8 +17,6 @@ pub struct LocalQuery<'a> {
     pub blocks: &'a [usize],
     /// What all partners go on giving each block, N or N·m.
     pub lasting: &'a [DVec3],
-    /// What they gave each block in the last step beyond that, N or N·m.
-    pub blows: &'a [DVec3],
 }
 
 impl ClusterStepper {
@@ -46,10 +44,10 @@ impl ClusterStepper {
     pub fn local_model(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
         let LocalQuery { place, blocks, .. } = *query;
         let member = &*all[place].member;
-        let (share, solved) = (f64::from(self.progress[place].share), self.progress[place].place);
-        (into.step_s, into.held) = (self.macro_s, self.progress[place].held);
-        let held = self.progress[place].held && solved.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance));
-        if held {
+        let (share, held) = (f64::from(self.progress[place].share), self.progress[place].held);
+        (into.step_s, into.held) = (self.macro_s, held);
+        let in_problem = self.progress[place].place.filter(|_| held);
+        if in_problem.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance)) {
             into.compliance.iter_mut().for_each(|w| *w *= share.recip());
         } else {
             self.own_compliance(all, query, into);
@@ -60,16 +58,10 @@ impl ClusterStepper {
         for (at, &block) in blocks.iter().enumerate() {
             let pushed = state.pushed.get(block).copied().unwrap_or(DVec3::ZERO);
             let free = (state.gain[block] - pushed) / own_s;
-            let made = (state.before[block] - state.start[block]) / own_s;
             let row = &into.compliance[at * blocks.len()..(at + 1) * blocks.len()];
-            let of = |forces: &[DVec3]| row.iter().zip(forces).map(|(w, force)| *w * *force).sum::<DVec3>();
-            let acceleration = if !held {
-                free + of(query.lasting)
-            } else {
-                // what is held falls no faster than free: what does was struck, and no blow goes on
-                let smooth = made - of(query.blows);
-                if smooth.length_squared() <= free.length_squared() { smooth } else { DVec3::ZERO }
-            };
+            let pushed: DVec3 = row.iter().zip(query.lasting).map(|(w, force)| *w * *force).sum();
+            // what is held goes on as it does: its contacts take what its forces would change
+            let acceleration = if held { DVec3::ZERO } else { free + pushed };
             into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.before[block], acceleration });
         }
     }

@@ -304,7 +304,11 @@ impl ClusterMember for RemoteMember {
         let is_spin = |block: &LocalBlock| self.matter.point(block.slot).is_none() && block.slot % 2 == 1;
         let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
         let blocks = self.model.blocks.iter().zip(v).map(of);
-        if self.matter.points.is_empty() { blocks.sum() } else { blocks.chain(self.matter.fastest()).fold(0.0, f64::max) }
+        if self.matter.points.is_empty() {
+            blocks.sum()
+        } else {
+            blocks.chain(self.matter.fastest()).fold(0.0, f64::max)
+        }
     }
 
     fn keep(&mut self) {

@@ -103,8 +103,21 @@ impl Clocks {
         let laws: Vec<_> =
             (0..self.all.len()).filter(|at| *at != me).map(|at| (AgentId(at as u32), self.law)).collect();
         let Self { all, scene, .. } = self;
-        let Clocked { agent, rate_hz, hands, links, time, own, memory, grips, pairs, remotes, stepper, allocations, .. } =
-            &mut all[me];
+        let Clocked {
+            agent,
+            rate_hz,
+            hands,
+            links,
+            time,
+            own,
+            memory,
+            grips,
+            pairs,
+            remotes,
+            stepper,
+            allocations,
+            ..
+        } = &mut all[me];
         let id = AgentId(me as u32);
         let dt = SimSpan::from_secs_f64(1.0 / *rate_hz).unwrap();
         let context = StepContext { me: id, time: *time, neighbours: &neighbours, hands, links };
