@@ -216,7 +216,7 @@ impl Stage {
         let (mine, its, linked) = (self.standing(me), self.standing(id), self.are_linked(me, id));
         let (owned, in_step) = (owns(mine, its, linked), keep_step(mine, its, linked));
         let step_s = snapshot.step_s(1.0 / actor.rate_hz);
-        Neighbour { id, snapshot, form: actor.agent.form(), law, owned, in_step, step_s }
+        Neighbour { id, snapshot, form: actor.agent.form(), law, owned, computed_here: false, in_step, step_s }
     }
 
     fn standing(&self, id: AgentId) -> OwnershipTraits {

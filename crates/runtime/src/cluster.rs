@@ -188,7 +188,8 @@ impl AgentRunner {
         if let (true, Ok(report)) = (meets, &outcome) {
             part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
         }
-        let at_rest = list.iter().all(|one| one.member.is_calm());
+        let calm = list.iter().all(|one| one.member.is_calm());
+        let at_rest = calm && !sides.iter().flatten().any(|pairs| pairs.is_active());
         let (list, sides) = (emptied(list), without_sides(sides));
         self.company = company;
         if let Some(seat) = &mut self.cluster {

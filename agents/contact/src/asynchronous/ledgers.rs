@@ -111,6 +111,12 @@ impl Ledgers {
         }
     }
 
+    /// Whether anything was taken in the last step.
+    #[must_use]
+    pub fn has_taken(&self) -> bool {
+        self.taken.iter().any(|taken| !taken.forces.is_empty())
+    }
+
     /// The own time of `from` in the last reading; `None` where nothing of it was ever read.
     #[must_use]
     pub fn read_of(&self, from: AgentId) -> Option<SimTime> {

@@ -27,6 +27,9 @@ use metachron_core::{
 use metachron_geometry::Touch;
 use metachron_geometry::narrow_phase::NarrowPhaseScratch;
 
+/// The share of its weight from which on a force counts as bearing a body.
+const BEARS_SHARE: f64 = 0.5;
+
 /// Whether `me` computes an asynchronous pair: the side with the shorter wanted step does, at equal steps the lower number.
 #[must_use]
 pub fn computes(me: PairClock, other: PairClock) -> bool {
@@ -59,7 +62,7 @@ pub struct Pairs {
 #[derive(Default)]
 struct Scratch {
     blocks: Vec<usize>,
-    lasting: Vec<DVec3>,
+    goes_on: Vec<DVec3>,
     carried: Vec<DVec3>,
     matter: Matter,
     narrow: NarrowPhaseScratch,
@@ -165,7 +168,7 @@ impl Pairs {
     fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.ledgers.open(&one.context);
         let known = &mut stepper.outside().known;
-        let Self { weight, scratch: Scratch { carried, lasting: sums, .. }, .. } = self;
+        let Self { weight, scratch: Scratch { carried, goes_on: sums, .. }, .. } = self;
         for list in [&mut *carried, &mut *sums] {
             list.clear();
             list.resize(weight.len(), DVec3::ZERO);
@@ -183,7 +186,9 @@ impl Pairs {
             blocks::visit_sides(&*one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
         });
         for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
-            *way *= 1.0 - lasting_share(*sum / dt_s, *weight);
+            let force = *sum / dt_s;
+            let lasts = lasting(force, *weight).dot(force) / force.length_squared().max(f64::MIN_POSITIVE);
+            *way *= 1.0 - lasts.clamp(0.0, 1.0);
         }
         if carried.iter().any(|way| *way != DVec3::ZERO) {
             one.member.carry(carried);
@@ -242,9 +247,9 @@ impl Pairs {
             model.partners.clear();
             return;
         }
-        let Scratch { blocks, lasting, .. } = scratch;
-        lasting.clear();
-        lasting.resize(blocks.len(), DVec3::ZERO);
+        let Scratch { blocks, goes_on, .. } = scratch;
+        goes_on.clear();
+        goes_on.resize(blocks.len(), DVec3::ZERO);
         for partner in &mut model.partners {
             partner.forces.clear();
             partner.forces.resize(blocks.len(), DVec3::ZERO);
@@ -258,14 +263,19 @@ impl Pairs {
                 });
             };
             ledgers.forces(partner.id, |site, force| add(site, force, &mut partner.forces));
-            lasting.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
+            goes_on.iter_mut().zip(&partner.forces).for_each(|(all, force)| *all += *force);
         }
-        for (at, all) in lasting.iter_mut().enumerate() {
-            let share = weight.get(blocks[at]).map_or(1.0, |weight| lasting_share(*all, *weight));
-            model.partners.iter_mut().for_each(|partner| partner.forces[at] *= share);
-            *all *= share;
+        for (at, all) in goes_on.iter_mut().enumerate() {
+            let Some(weight) = weight.get(blocks[at]) else { continue };
+            // what goes on is shared as it was given
+            let (lasts, whole) = (lasting(*all, *weight), all.dot(*weight));
+            for partner in &mut model.partners {
+                let share = if whole > 0.0 { partner.forces[at].dot(*weight) / whole } else { 0.0 };
+                partner.forces[at] = lasts * share;
+            }
+            *all = lasts;
         }
-        let query = LocalQuery { place, blocks, lasting };
+        let query = LocalQuery { place, blocks, lasting: goes_on };
         stepper.local_model(all, &query, model);
     }
 
@@ -274,6 +284,12 @@ impl Pairs {
         self.ledgers.write(into);
         into.local_model.copy_from(&self.model);
         into.pairs.extend_from_slice(&self.states);
+    }
+
+    /// Whether anything acts between it and a partner: then it must not rest, as who rests gives nothing and takes nothing.
+    #[must_use]
+    pub fn is_active(&self) -> bool {
+        self.ledgers.has_taken() || self.states.iter().any(|state| state.force_n > 0.0 || state.in_flight_n_s > 0.0)
     }
 
     /// Whether it gave `other` something in the last step, as to a partner outside its cluster.
@@ -289,10 +305,11 @@ impl std::fmt::Debug for Pairs {
     }
 }
 
-/// The share of a force on a block that goes on: as much as the block's weight bears against. The rest is a blow.
-fn lasting_share(force: DVec3, weight: DVec3) -> f64 {
-    let square = force.length_squared();
-    if square > 0.0 { (weight.dot(force) / square).clamp(0.0, 1.0) } else { 1.0 }
+/// What of a force on a free block goes on: the block's weight where the force bears it, and no blow (eq. 6b). A force of half the weight
+/// bears it already: a body that hops a little is not let fall.
+fn lasting(force: DVec3, weight: DVec3) -> DVec3 {
+    let square = weight.length_squared();
+    if square > 0.0 { weight * (force.dot(weight) / (BEARS_SHARE * square)).clamp(0.0, 1.0) } else { DVec3::ZERO }
 }
 
 /// The partner at a place of a model, in the storage that is there.
@@ -325,7 +342,7 @@ fn site_of(body: &Body, slot: u32, impulse: DVec3) -> Option<(Site, Impulse)> {
         Body::Curve(curve) => {
             let at = slot as usize / 2;
             let here = *curve.arc_m.get(at)?;
-            if slot % 2 == 0 {
+            if slot.is_multiple_of(2) {
                 return Some((Site::Arc(here), linear));
             }
             Some((Site::Arc(0.5 * (here + curve.arc_m.get(at + 1)?)), angular))

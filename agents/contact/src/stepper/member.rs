@@ -68,6 +68,11 @@ pub trait ClusterMember: Send {
         block as u32
     }
 
+    /// How long what is given to it takes to show, seconds: of one that is stepped elsewhere a step of its own, and nothing of all others.
+    fn answers_after_s(&self) -> f64 {
+        0.0
+    }
+
     /// Whether it stands for a partner of an asynchronous pair that is stepped elsewhere.
     fn is_remote(&self) -> bool {
         false

@@ -7,13 +7,16 @@
 use super::member::{ClusterMember, MaterialPoint, Role};
 use crate::Neighbour;
 use crate::cluster::{Block, Side, SideTerm};
+use crate::contact::push_out_m_s;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
-use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose};
+use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Touch};
 use std::sync::Arc;
 
 /// No partner is foretold by more than this many of its steps.
 const FORETOLD_STEPS: f64 = 2.0;
+/// How deep contacts rest, metres: docs/theory/clusters.md, eq. 5.
+const RESTS_M: f64 = 20e-6;
 /// The share of its largest compliance that every direction has at least: what its contacts hold does not make its matrix singular.
 const YIELD_SHARE: f64 = 1e-9;
 
@@ -53,6 +56,16 @@ pub struct RemoteMember {
     seen: Option<SimTime>,
     kept: (Matter, Vec<DVec3>),
     matrix: Vec<f64>,
+}
+
+/// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: what is deeper than contacts
+/// rest is pushed out once in that time, and not in each step of `h_s` until it shows (eq. 8).
+pub(super) fn slower_push_out(touch: &Touch, h_s: f64, late_s: f64) -> DVec3 {
+    if touch.gap_m >= -RESTS_M || late_s <= h_s {
+        return DVec3::ZERO;
+    }
+    let slow = push_out_m_s(-RESTS_M, h_s) + push_out_m_s(touch.gap_m + RESTS_M, late_s);
+    touch.normal * (push_out_m_s(touch.gap_m, h_s) - slow).min(0.0)
 }
 
 /// What is on its way to a block: an impulse, and that times the seconds since it acted.
@@ -288,6 +301,10 @@ impl ClusterMember for RemoteMember {
         true
     }
 
+    fn answers_after_s(&self) -> f64 {
+        self.model.step_s
+    }
+
     fn slot_of(&self, block: usize) -> u32 {
         self.model.blocks[block].slot
     }
@@ -419,7 +436,7 @@ impl Matter {
 
     /// The place of the point that a slot is about; `None` of a spin, and of a body that moves as a whole.
     fn point_of(&self, slot: u32) -> Option<usize> {
-        let place = if self.arc_m.is_empty() { Some(slot) } else { (slot % 2 == 0).then_some(slot / 2) };
+        let place = if self.arc_m.is_empty() { Some(slot) } else { (slot.is_multiple_of(2)).then_some(slot / 2) };
         place.map(|place| place as usize).filter(|place| *place < self.points.len())
     }
 

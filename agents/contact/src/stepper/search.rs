@@ -4,6 +4,7 @@
 //! Theory: docs/theory/clusters.md, section 9.
 
 use super::memory::Partner;
+use super::remote;
 use super::scene::ClusterScene;
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
@@ -263,7 +264,10 @@ impl Search {
             };
             if taken {
                 owners.push(owner);
-                contacts.push(contact(touch, &facing, skins, round.progress));
+                let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
+                let surface_m_s = remote::slower_push_out(touch, round.h_s, late_s);
+                let found = contact(touch, &facing, skins, round.progress);
+                contacts.push(Contact { surface_m_s: found.surface_m_s + surface_m_s, ..found });
             } else {
                 clear_m = clear_m.min(touch.gap_m);
             }

@@ -16,7 +16,7 @@ const TIP_M: f64 = 0.01;
 const SPRING_N_M: f64 = 2000.0;
 const PRESS_M: f64 = 0.005;
 
-fn floor() -> Obstacle {
+pub fn floor() -> Obstacle {
     let (name, solid, position, rotation) = ("floor".into(), Solid::Plane, DVec3::ZERO, DQuat::IDENTITY);
     Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0 }
 }
@@ -101,29 +101,30 @@ fn own(agent: &mut dyn Agent, shown: &mut Snapshot) {
 }
 
 #[test]
-fn a_device_on_a_local_model_is_steady_and_hammers_on_the_bodys_own_w() {
-    // soft: the tip's spring is three times as stiff as the column; 2.4 ± 1.2 N in the model of one dimension
-    for (young_pa, wanted_n, most) in [(1e4, 1.6, 0.4), (1e5, 7.4, 0.2), (1e6, 9.6, 0.2)] {
+fn a_device_on_a_local_model_is_steady() {
+    for young_pa in [1e4, 1e5, 1e6] {
+        // both springs share what the tip is pressed by: at rest no clock matters
+        let wanted_n = press(young_pa, 1000.0, false, None).mean_n;
         for rate_hz in [60.0, 30.0] {
-            let [held, free] = [None, Some(own as Tamper)].map(|tamper| press(young_pa, rate_hz, false, tamper));
-            let case = format!("{young_pa:e} Pa, {rate_hz} Hz: {held:.2?}, own W {free:.2?}");
+            let felt = press(young_pa, rate_hz, false, None);
+            let case = format!("{young_pa:e} Pa, {rate_hz} Hz: {felt:.3?}");
             println!("{case}");
-            assert!((held.mean_n - wanted_n).abs() < 0.05 * wanted_n, "{case}");
-            assert!(held.spread_n < most * held.mean_n && held.most_n < 4.0 * wanted_n + 5.0, "{case}");
-            if young_pa > 1e4 {
-                assert!(held.least_n > 0.5 * wanted_n && free.least_n < 0.1 * wanted_n, "{case}");
-                assert!(free.spread_n > 3.0 * held.spread_n, "{case}");
-            }
+            assert!((felt.mean_n - wanted_n).abs() < 0.05 * wanted_n, "{case}");
+            assert!(felt.spread_n < 0.2 * felt.mean_n && felt.most_n < 2.0 * wanted_n, "{case}");
         }
     }
 }
 
+/// The whole of a step late, as where it takes as long as the time that it covers: the limit of what a device may see.
 #[test]
 fn a_device_that_sees_states_at_their_time_diverges_on_the_bodys_own_w() {
     for rate_hz in [60.0, 30.0] {
         let [held, free] = [None, Some(own as Tamper)].map(|tamper| press(1e6, rate_hz, true, tamper));
         println!("{rate_hz} Hz: {held:.2?}, own W {free:.2?}");
-        assert!(held.spread_n < 0.25 * held.mean_n, "{rate_hz} Hz: {held:?}");
-        assert!(free.most_n > 10.0 * 9.6, "{rate_hz} Hz: {free:?}");
+        assert!(held.spread_n < 0.25 * held.mean_n && held.least_n > 5.0, "{rate_hz} Hz: {held:?}");
+        assert!(
+            free.spread_n > 0.8 * 9.63 && free.least_n == 0.0 && free.most_n > 5.0 * 9.63,
+            "{rate_hz} Hz: {free:?}"
+        );
     }
 }
