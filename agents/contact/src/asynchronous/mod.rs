@@ -305,7 +305,7 @@ impl std::fmt::Debug for Pairs {
     }
 }
 
-/// What of a force on a free block goes on: the block's weight where the force bears it, and no blow (eq. 6b). A force of half the weight
+/// What of a force on a free block goes on: the block's weight where the force bears it, and no blow (docs/theory/coupling.md, section 3). A force of half the weight
 /// bears it already: a body that hops a little is not let fall.
 fn lasting(force: DVec3, weight: DVec3) -> DVec3 {
     let square = weight.length_squared();

@@ -4,35 +4,21 @@
 //! In: a snapshot, what is on its way to the partner. Out: a skin, blocks and velocities as any member has them. Never here: the ledger,
 //! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
 
+use super::matter::Matter;
 use super::member::{ClusterMember, MaterialPoint, Role};
+use super::weighing::invert;
 use crate::Neighbour;
 use crate::cluster::{Block, Side, SideTerm};
 use crate::contact::push_out_m_s;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
-use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Touch};
+use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, Touch};
 use std::sync::Arc;
 
 /// No partner is foretold by more than this many of its steps.
 const FORETOLD_STEPS: f64 = 2.0;
 /// How deep contacts rest, metres: docs/theory/clusters.md, eq. 5.
 const RESTS_M: f64 = 20e-6;
-/// The share of its largest compliance that every direction has at least: what its contacts hold does not make its matrix singular.
-const YIELD_SHARE: f64 = 1e-9;
-
-/// The matter of another agent, where it is as far as it is known.
-#[derive(Debug, Clone, Default)]
-pub struct Matter {
-    /// Centre of mass or tip, of a body that moves as a whole.
-    centre: DVec3,
-    rotation: DQuat,
-    jaw: Option<f64>,
-    /// Nodes or vertices, and how they move without a block, m/s.
-    points: Vec<DVec3>,
-    drift: Vec<DVec3>,
-    radii_m: Vec<f64>,
-    arc_m: Vec<f64>,
-}
 
 /// A partner that is stepped elsewhere.
 #[derive(Debug, Default)]
@@ -366,130 +352,6 @@ impl ClusterMember for RemoteMember {
     }
 }
 
-impl Matter {
-    /// Takes in a published body, `since_s` seconds later as its velocities lead it; whether it has matter.
-    pub fn bring(&mut self, body: &Body, since_s: f64) -> bool {
-        let known = self.take(body);
-        self.drift.iter().zip(&mut self.points).for_each(|(v, x)| *x += *v * since_s);
-        let whole = match body {
-            Body::Rigid(rigid) => [rigid.velocity, rigid.spin],
-            Body::Tool(tool) => [tool.velocity, tool.spin],
-            _ => return known,
-        };
-        for (slot, velocity) in (0..).zip(whole) {
-            self.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, since_s);
-        }
-        known
-    }
-
-    /// The velocity of a point of its skin, as published, m/s.
-    #[must_use]
-    pub fn velocity(&self, body: &Body, place: &Place) -> DVec3 {
-        let of = |point: u32| self.drift.get(point as usize).copied().unwrap_or(DVec3::ZERO);
-        match (*place, body) {
-            (Place::Point(point), Body::Rigid(rigid)) => rigid.velocity + rigid.spin.cross(point - self.centre),
-            (Place::Point(point), Body::Tool(tool)) => tool.velocity + tool.spin.cross(point - self.centre),
-            (Place::Point(_), _) => DVec3::ZERO,
-            (Place::Chain { segment, share, .. }, _) => of(segment).lerp(of(segment + 1), share),
-            (Place::Surface { vertices, shares }, _) => {
-                vertices.into_iter().zip(shares).map(|(vertex, share)| of(vertex) * share).sum()
-            }
-        }
-    }
-
-    /// Takes in a published body; whether it has matter.
-    fn take(&mut self, body: &Body) -> bool {
-        self.points.clear();
-        self.drift.clear();
-        self.arc_m.clear();
-        self.jaw = None;
-        match body {
-            Body::Nothing => return false,
-            Body::Rigid(rigid) => (self.centre, self.rotation) = (rigid.position, rigid.rotation),
-            Body::Tool(tool) => (self.centre, self.rotation, self.jaw) = (tool.tip, tool.rotation, Some(tool.jaw)),
-            Body::Curve(curve) => {
-                self.points.extend_from_slice(&curve.positions);
-                self.drift.extend_from_slice(&curve.velocities);
-                self.radii_m.clone_from(&curve.radii_m);
-                self.arc_m.extend_from_slice(&curve.arc_m);
-            }
-            Body::Soft(soft) => {
-                self.points.extend_from_slice(&soft.positions);
-                self.drift.extend_from_slice(&soft.velocities);
-            }
-        }
-        true
-    }
-
-    /// The body's skin there.
-    #[must_use]
-    pub fn placed<'a>(&'a self, form: &'a CollisionShape) -> Option<PlacedShape<'a>> {
-        let Self { centre: position, rotation, points, radii_m, .. } = self;
-        let view = match &form.kind {
-            ShapeKind::Solid(_) => ShapePose::Solid { position: *position, rotation: *rotation },
-            ShapeKind::Tool(_) => ShapePose::Tool { tip: *position, rotation: *rotation, jaw: self.jaw? },
-            ShapeKind::Chain { .. } => ShapePose::Chain { positions: points, radii_m },
-            ShapeKind::Surface(_) => ShapePose::Surface(points),
-        };
-        Some(PlacedShape { form, view })
-    }
-
-    /// The place of the point that a slot is about; `None` of a spin, and of a body that moves as a whole.
-    fn point_of(&self, slot: u32) -> Option<usize> {
-        let place = if self.arc_m.is_empty() { Some(slot) } else { (slot.is_multiple_of(2)).then_some(slot / 2) };
-        place.map(|place| place as usize).filter(|place| *place < self.points.len())
-    }
-
-    fn point(&self, slot: u32) -> Option<DVec3> {
-        self.point_of(slot).map(|place| self.points[place])
-    }
-
-    fn fastest(&self) -> impl Iterator<Item = f64> + '_ {
-        self.drift.iter().map(|v| v.length())
-    }
-
-    fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
-        let last = self.arc_m.len().checked_sub(2)?;
-        let segment = self.arc_m.partition_point(|&s| s < arc_m).saturating_sub(1).min(last);
-        let length = self.arc_m[segment + 1] - self.arc_m[segment];
-        Some((segment, if length > 0.0 { ((arc_m - self.arc_m[segment]) / length).clamp(0.0, 1.0) } else { 0.0 }))
-    }
-
-    /// Moves what a block is about by its velocity for some seconds, and by `way` besides; points have moved by their drift already.
-    fn shift(&mut self, block: &LocalBlock, way: DVec3, for_s: f64) {
-        match (self.point_of(block.slot), self.points.is_empty(), block.slot) {
-            (Some(place), ..) => self.points[place] += (block.velocity - self.drift[place]) * for_s + way,
-            (None, true, 0) => self.centre += block.velocity * for_s + way,
-            (None, true, _) => {
-                let turn = block.velocity * for_s + way;
-                if turn != DVec3::ZERO {
-                    self.rotation = (DQuat::from_scaled_axis(turn) * self.rotation).normalize();
-                }
-            }
-            // a tube's segments turn with their nodes
-            (None, false, _) => {}
-        }
-    }
-
-    /// What an impulse at a site gives to slots.
-    fn visit_blocks(&self, site: Site, impulse: Impulse, mut visit: impl FnMut(u32, DVec3)) {
-        match site {
-            Site::Whole => {
-                visit(0, impulse.linear);
-                visit(1, impulse.angular);
-            }
-            Site::Vertex(vertex) => visit(vertex, impulse.linear),
-            Site::Arc(arc_m) => {
-                let Some((segment, share)) = self.locate(arc_m) else { return };
-                let slot = 2 * segment as u32;
-                visit(slot, impulse.linear * (1.0 - share));
-                visit(slot + 1, impulse.angular);
-                visit(slot + 2, impulse.linear * share);
-            }
-        }
-    }
-}
-
 /// The share of `whole` that `part` along it makes up, 0 … 1.
 fn share_of(part: DVec3, whole: DVec3) -> f64 {
     let square = whole.length_squared();
@@ -512,61 +374,4 @@ fn lone(inertia: &Inertia, body: &Body, step_s: f64, into: &mut LocalModel) {
         let linear = DMat3::from_diagonal(DVec3::splat(*inverse_mass));
         into.compliance.extend([linear, DMat3::ZERO, DMat3::ZERO, *inverse_inertia]);
     }
-}
-
-/// The inverse of a model's compliance into `out`, row by row; `false` where it is not positive definite.
-fn invert(model: &LocalModel, out: &mut Vec<f64>) -> bool {
-    let (blocks, size) = (model.blocks.len(), 3 * model.blocks.len());
-    if blocks == 0 || model.compliance.len() != blocks * blocks {
-        return false;
-    }
-    // the lower half of the symmetric part, twice: the second becomes the inverse
-    out.clear();
-    out.resize(2 * size * size, 0.0);
-    let entry = |i: usize, j: usize| model.compliance[(i / 3) * blocks + j / 3].col(j % 3)[i % 3];
-    // blocks of points and of spins have units of their own
-    for i in 0..size {
-        let largest = (0..size).filter(|j| same_kind(model, i, *j)).map(|j| entry(j, j)).fold(0.0, f64::max);
-        for j in 0..=i {
-            out[i * size + j] = 0.5 * (entry(i, j) + entry(j, i));
-        }
-        out[i * size + i] += YIELD_SHARE * largest;
-    }
-    factor_and_invert(out, size)
-}
-
-fn same_kind(model: &LocalModel, i: usize, j: usize) -> bool {
-    let kind = |at: usize| model.blocks[at / 3].slot == 1 && model.blocks.len() == 2;
-    kind(i) == kind(j)
-}
-
-/// Cholesky's factor of the lower half in the first square of `out`, then the whole inverse in its place.
-fn factor_and_invert(out: &mut [f64], size: usize) -> bool {
-    let (l, inverse) = out.split_at_mut(size * size);
-    for i in 0..size {
-        for j in 0..=i {
-            let dot: f64 = (0..j).map(|k| l[i * size + k] * l[j * size + k]).sum();
-            let rest = l[i * size + j] - dot;
-            if i == j {
-                if !(rest > 0.0 && rest.is_finite()) {
-                    return false;
-                }
-                l[i * size + i] = rest.sqrt();
-            } else {
-                l[i * size + j] = rest / l[j * size + j];
-            }
-        }
-    }
-    for column in 0..size {
-        for i in 0..size {
-            let dot: f64 = (0..i).map(|k| l[i * size + k] * inverse[k * size + column]).sum();
-            inverse[i * size + column] = (f64::from(u8::from(i == column)) - dot) / l[i * size + i];
-        }
-        for i in (0..size).rev() {
-            let dot: f64 = (i + 1..size).map(|k| l[k * size + i] * inverse[k * size + column]).sum();
-            inverse[i * size + column] = (inverse[i * size + column] - dot) / l[i * size + i];
-        }
-    }
-    l.copy_from_slice(inverse);
-    true
 }
