@@ -2,19 +2,14 @@
 //!
 //! In: the snapshot that each agent published last, and the masses of tubes. Out: the sums, with every impulse that was given and not
 //! yet taken applied as its receiver will apply it: v + W dJ, x + W (t dJ − dS) at the receiver's own time
-//! (docs/theory/coupling.md, eq. 3). After that rigid bodies fly to the common time; an impulse that presses a body on the ground that
-//! supports it goes into the ground. Never here: how agents step. Plain addition of the energies of two clocks would count the half
-//! of an impact that its owner has felt, but not the half that the peer has still to receive.
+//! (docs/theory/coupling.md, eq. 3, 4). After that rigid bodies fly to the common time. Never here: how agents step.
+//! Plain addition of the energies of two clocks would count the half of an impact that one side has felt, but not the half that the
+//! other has still to receive.
 //!
-//! Exact for rigid bodies whose acceleration is constant in between. For tubes the state counts as published, with the
-//! change of velocities: the effect of a shift of positions on the elastic energy is left out; it is of second order in the impulse.
+//! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of what is on its way.
 
-mod acted;
-
-use super::other::turned;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::foot::is_borne;
-use metachron_core::{AgentId, Body, CurveState, Inertia, InverseMass, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 
 /// An agent as the audit sees it.
@@ -81,48 +76,26 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     else {
         return None;
     };
-    let h = at.secs_after(member.snapshot.time);
-    if let Some(sprung) = member.snapshot.sprung.get() {
-        let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
-        let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
-        let [displacement, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
-        (state.position, state.rotation) = (state.position + displacement[0], turned(state.rotation, displacement[1]));
-        [state.velocity, state.spin] = velocity;
-        return Some(state);
-    }
     let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
     in_flight(member, members, |_, _, dj, way| {
         given += dj;
         carried += way;
     });
-    if let Some(rebound) = member.snapshot.rebound.get() {
-        let by_then = Impulse { linear: carried.linear + given.linear * h, angular: DVec3::ZERO };
-        let [back, way] = rebound.part(rebound.spared_by([given, by_then], at, (*inverse_mass, *inverse_inertia)), at);
-        // both are brought to the common time by the velocity
-        (given, carried) = (given - back, carried - way + back * h);
-    }
-    let stand = member.snapshot.stand;
-    if let Some(stand) = stand.filter(|stand| stand.bears(state.position, given)) {
-        (given, carried) = (stand.leaves(given), stand.leaves(carried));
-    }
-    let tips = member.snapshot.tips.get();
-    if let Some(tips) = tips {
-        (given, carried) = [given, carried].map(|all| tips.hold((*inverse_mass, *inverse_inertia), all)).into();
-    }
-    let all = [given.linear, carried.linear].map(|impulse| impulse * *inverse_mass);
-    let since_s = all[1].length() / all[0].length().max(f64::MIN_POSITIVE);
-    let [change, way] = stand.map_or(all, |stand| stand.lifted(all, since_s));
-    state.velocity += change;
-    state.position += way;
+    let h = at.secs_after(member.snapshot.time);
+    state.velocity += given.linear * *inverse_mass;
+    state.position += carried.linear * *inverse_mass;
     state.spin += *inverse_inertia * given.angular;
     state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
     let a = member.snapshot.acceleration;
     state.position += state.velocity * h + a * (0.5 * h * h);
     state.velocity += a * h;
-    let turning = tips.map_or(DVec3::ZERO, |tips| tips.turning);
-    state.rotation = turned(state.rotation, state.spin * h + turning * (0.5 * h * h));
-    state.spin += turning * h;
+    state.rotation = turned(state.rotation, state.spin * h);
     Some(state)
+}
+
+/// A rotation turned further by a rotation vector in world axes.
+fn turned(rotation: DQuat, by: DVec3) -> DQuat {
+    if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
 }
 
 impl Audit {
@@ -153,41 +126,30 @@ fn rigid(
 
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
     let response = member.snapshot.inertia.response();
-    let curve = response.and_then(|response| Some((response, response.curve()?.spins())));
-    let Some((inertia, spins)) = curve else { return without_impulses(sum, member, state) };
-    let mut pushed = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
-    let (mut carried, mut delivered) = (pushed.clone(), DVec3::ZERO);
-    in_flight(member, members, |_, site, dj, moved| {
+    let spins = response.and_then(|response| response.curve()).map_or(&[][..], |curve| curve.spins());
+    let motion = Motion::of(member, state, |k| state.velocities[k], |k| spins.get(k).copied().unwrap_or_default());
+    motion.add(sum, member.snapshot.energy_j, motion.kinetic_j);
+    // what is on its way is taken as its local model answers it: J·v + ½ J·W J
+    let model = &member.snapshot.local_model;
+    let mut pushed = vec![DVec3::ZERO; model.blocks.len()];
+    in_flight(member, members, |_, site, dj, _| {
         sum.add_in_flight(dj);
+        sum.momentum += dj.linear;
         let Site::Arc(arc_m) = site else { return };
         let Some((segment, share)) = state.locate(arc_m) else { return };
-        delivered += dj.linear;
-        for (list, impulse) in [(&mut pushed, dj), (&mut carried, moved)] {
-            list[2 * segment] += impulse.linear * (1.0 - share);
-            list[2 * segment + 2] += impulse.linear * share;
-            list[2 * segment + 1] += impulse.angular;
+        let at = state.positions[segment].lerp(state.positions[segment + 1], share);
+        sum.angular += at.cross(dj.linear) + dj.angular;
+        let slot = 2 * segment as u32;
+        let parts = [(slot, dj.linear * (1.0 - share)), (slot + 1, dj.angular), (slot + 2, dj.linear * share)];
+        for (slot, part) in parts {
+            let place = model.blocks.iter().position(|block| block.slot == slot);
+            place.into_iter().for_each(|place| pushed[place] += part);
         }
     });
-    if inertia.slots() == pushed.len() {
-        let supported = is_borne(inertia.supports(), pushed.iter().step_by(2).sum());
-        inertia.respond(&mut pushed, supported);
-        inertia.respond(&mut carried, supported);
+    for (row, block) in model.blocks.iter().enumerate() {
+        let answers = model.compliance[row * pushed.len()..].iter().zip(&pushed).map(|(w, j)| *w * *j);
+        sum.energy_j += pushed[row].dot(block.velocity + answers.sum::<DVec3>() * 0.5);
     }
-    let before = Motion::of(member, state, |k| state.velocities[k], |k| spins.get(k).copied().unwrap_or_default());
-    let shifted = |k: usize| state.positions[k] + carried[2 * k];
-    let velocity = |k: usize| state.velocities[k] + pushed[2 * k];
-    let spin = |k: usize| spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
-    let moved = CurveState { positions: (0..state.positions.len()).map(shifted).collect(), ..state.clone() };
-    // the part that a spring of the tube takes belongs to the body at its far end: the sum over all bodies is that of the given impulses
-    let momentum = before.momentum + delivered;
-    let after = Motion { momentum, ..Motion::of(member, &moved, velocity, spin) };
-    after.add(sum, member.snapshot.energy_j, before.kinetic_j);
-}
-
-/// Adds a tube that has not stepped yet, or that no agent could have touched: no impulse is in flight to it.
-fn without_impulses(sum: &mut Audit, member: &Member<'_>, state: &CurveState) {
-    let motion = Motion::of(member, state, |k| state.velocities[k], |_| DVec3::ZERO);
-    motion.add(sum, member.snapshot.energy_j, motion.kinetic_j);
 }
 
 /// Kinetic energy and momenta of a tube with its consistent mass (docs/theory/rod.md, eq. 10).

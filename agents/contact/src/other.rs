@@ -23,7 +23,6 @@ use metachron_core::Twist;
 use metachron_core::sprung::SprungPrediction;
 use metachron_core::{AgentId, Body, ImpulseResponse, Inertia, ToolState};
 use metachron_geometry::CollisionShape;
-pub(super) use motion::turned;
 use std::sync::Arc;
 
 /// A neighbour at one's own time.

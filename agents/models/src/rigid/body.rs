@@ -177,6 +177,7 @@ impl RigidBody {
             drift_m: 0.0,
             unknowns: Unknowns::default(),
         };
+        body.unknowns.start([body.motion.velocity, body.motion.spin(&body.spread)]);
         body.publish_initial_support();
         Ok(body)
     }

@@ -40,6 +40,13 @@ impl Default for Unknowns {
     }
 }
 
+impl Unknowns {
+    /// Takes the velocities that a body begins with.
+    pub(super) fn start(&mut self, now: [DVec3; 2]) {
+        self.now = now;
+    }
+}
+
 impl RigidBody {
     /// The inertia tensor in world axes, kg·m².
     fn inertia(&self) -> DMat3 {
@@ -164,6 +171,7 @@ impl ClusterMember for RigidBody {
             self.motion = before;
             return Err(self.diverged(h_s, "the body left the coordinate range"));
         }
+        self.unknowns.now = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.steps += 1;
         self.at_rest = false;
         self.count_calm(&before, h_s, touched);
@@ -178,6 +186,7 @@ impl ClusterMember for RigidBody {
     fn rest(&mut self) {
         self.at_rest = true;
         (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
+        self.unknowns.now = [DVec3::ZERO; 2];
         self.world.moved();
     }
 }

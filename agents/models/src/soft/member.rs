@@ -158,6 +158,7 @@ impl ClusterMember for SoftBody {
             .iter()
             .zip(&unknowns.now)
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
+        unknowns.now.copy_from_slice(v);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;
         self.steps += 1;
