@@ -298,8 +298,8 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         }
     }
     let scene = spawn.clusters.filter(|_| spawn.agent.member().is_some());
-    let asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
-    let asynchronous = asynchronous.fold(false, |any, law| any || law.is_asynchronous());
+    let mut asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
+    let asynchronous = asynchronous.any(Law::is_asynchronous);
     let cluster = scene.map(|scene| Box::new(ClusterSeat::new(scene, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if cluster.is_none() || asynchronous { spawn.faults } else { Faults::default() };
