@@ -208,12 +208,12 @@ fn joints_of_one_pair_must_leave_something_free_together() {
 fn couplings_name_laws_and_points_of_both_objects() {
     let scene = with(
         r#"coupling = [
-        { a = "left", b = "right", law = "penalty-extrapolated", stiffness_n_m = 50, damping_n_s_m = 2 },
+        { a = "left", b = "right", law = "tlm", stiffness_n_m = 50, damping_n_s_m = 2 },
         { a = "hose", b = "right", kind = "attach", at_a = 0.25, at_b = [0, 0, 0.5], stiffness_n_m = 10, rest_m = 0.5 },
         { a = "tool", b = "hose", law = "off" },
     ]"#,
     );
-    assert_eq!(scene.couplings[0].law, Law::Penalty { stiffness_n_m: 50.0, damping_n_s_m: 2.0, extrapolate: true });
+    assert_eq!(scene.couplings[0].law, Law::Tlm { stiffness_n_m: 50.0, damping_n_s_m: 2.0 });
     let CouplingKind::Attach { at_a: Anchor::Arc(arc_m), at_b: Anchor::Local(local), rest_m, .. } =
         scene.couplings[1].kind
     else {
@@ -221,7 +221,7 @@ fn couplings_name_laws_and_points_of_both_objects() {
     };
     // a quarter of two metres; a straight skeleton is measured to rounding
     assert!((arc_m - 0.5).abs() < 1e-9 && local == DVec3::new(0.0, 0.0, 0.5) && rest_m == 0.5, "{arc_m} {local}");
-    assert_eq!((scene.couplings[1].law, scene.couplings[2].law), (Law::Ledger, Law::Off));
+    assert_eq!((scene.couplings[1].law, scene.couplings[2].law), (Law::Cluster, Law::Off));
 }
 
 #[test]
@@ -233,7 +233,13 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(r#"a = "left", b = "post""#, "\"post\"", &["which is fixed"]);
     coupling_refused(r#"a = "ghost", b = "left""#, "\"ghost\"", &["without a body"]);
     coupling_refused(&format!(r#"{pair}, law = "spring""#), "\"spring\"", &["`ledger`", "`tlm`"]);
-    coupling_refused(&format!(r#"{pair}, stiffness_n_m = 5"#), "5", &["does not belong to contact by `ledger`"]);
+    coupling_refused(&format!(r#"{pair}, stiffness_n_m = 5"#), "5", &["does not belong to contact"]);
+    let ledger = format!(r#"{pair}, law = "ledger""#);
+    coupling_refused(&format!("{ledger}, stiffness_n_m = 5"), "5", &["does not belong to contact by `ledger`"]);
+    for law in ["penalty", "penalty-extrapolated"] {
+        let penalty = format!(r#"{pair}, law = "{law}", stiffness_n_m = 5"#);
+        coupling_refused(&penalty, &format!("\"{law}\""), &["stay in the laboratory"]);
+    }
     coupling_refused(&format!(r#"{pair}, law = "tlm", stiffness_n_m = -5"#), "-5", &["`stiffness_n_m`", "N/m"]);
     coupling_refused(&format!(r#"{pair}, at_a = 0.5"#), "0.5", &["`at_a`", "does not belong"]);
     let attach = r#"a = "hose", b = "left", kind = "attach", stiffness_n_m = 5"#;
@@ -242,11 +248,6 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(&format!("{attach}, at_a = 0.5, at_b = 0.5"), "0.5", &["[x, y, z]"]);
     coupling_refused(&format!("{attach}, at_a = \"end\", at_b = [0, 0, 0]"), "\"end\"", &["a number from 0 to 1"]);
     coupling_refused(&format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"off\""), "\"off\"", &["attaches nothing"]);
-    coupling_refused(
-        &format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"penalty\""),
-        "\"penalty\"",
-        &["a law of contacts"],
-    );
     let tlm = format!(r#"{pair}, law = "tlm""#);
     coupling_refused(&tlm, &format!("{{ {tlm} }}"), &["`stiffness_n_m`", "is missing"]);
     let twice = format!("coupling = [\n{{ {pair}, law = \"off\" }},\n{{ a = \"right\", b = \"left\" }},\n]");

@@ -60,7 +60,7 @@ fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
 fn a_coupling_by_a_law_that_soft_bodies_do_not_know_is_refused() {
     let ball =
         "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
-    let couple = "[[coupling]]\na = \"s\"\nb = \"b\"\nlaw = \"penalty\"\nstiffness_n_m = 10\n";
+    let couple = "[[coupling]]\na = \"s\"\nb = \"b\"\nlaw = \"tlm\"\nstiffness_n_m = 10\n";
     let error = read(&format!("[[object]]\n{SHEET}young_pa = 1e5\n{ball}{couple}")).expect_err("no such law");
     assert!(error.problems[0].message.contains("sheets, solids and ropes do not support"), "{:?}", error.problems);
 }

@@ -84,6 +84,8 @@ pub struct Neighbour {
     pub form: Option<Arc<CollisionShape>>,
     /// How the two act on each other in contact.
     pub law: Law,
+    /// Whether, of an asynchronous pair, the agent that looks computes it ([`crate::asynchronous::computes`]).
+    pub computed_here: bool,
     /// Its usual step length, seconds; zero where that does not matter.
     pub step_s: f64,
 }
@@ -92,7 +94,7 @@ impl Neighbour {
     /// A neighbour that is only looked at: not in contact.
     #[must_use]
     pub const fn observed(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Ledger, step_s: 0.0 }
+        Self { id, snapshot, form: None, law: Law::Cluster, computed_here: false, step_s: 0.0 }
     }
 }
 

@@ -2,15 +2,14 @@
 //!
 //! In: the snapshot that each agent published last, and the masses of tubes. Out: the sums, with every impulse that was given and not
 //! yet taken applied as its receiver will apply it: v + W dJ, x + W (t dJ − dS) at the receiver's own time
-//! (docs/theory/coupling.md, eq. 3). After that rigid bodies fly to the common time. Never here: how agents step. Plain addition of the energies of two clocks would count the half
-//! of an impact that its owner has felt, but not the half that the peer has still to receive.
+//! (docs/theory/coupling.md, eq. 3, 4). After that rigid bodies fly to the common time. Never here: how agents step.
+//! Plain addition of the energies of two clocks would count the half of an impact that one side has felt, but not the half that the
+//! other has still to receive.
 //!
-//! Exact for rigid bodies whose acceleration is constant in between. For tubes the state counts as published.
-
-mod acted;
+//! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of what is on its way.
 
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Body, CurveState, Inertia, InverseMass, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
 use metachron_core::{Impulse, Ledger, Site};
 
 /// An agent as the audit sees it.
@@ -75,23 +74,14 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     else {
         return None;
     };
-    let h = at.secs_after(member.snapshot.time);
-    if let Some(sprung) = member.snapshot.sprung.get() {
-        let inertia = InverseMass { linear_per_kg: *inverse_mass, angular_per_kg_m2: *inverse_inertia };
-        let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
-        let [displacement, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
-        (state.position, state.rotation) = (state.position + displacement[0], turned(state.rotation, displacement[1]));
-        [state.velocity, state.spin] = velocity;
-        return Some(state);
-    }
     let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
     in_flight(member, members, |_, _, dj, way| {
         given += dj;
         carried += way;
     });
-    let all = [given.linear, carried.linear].map(|impulse| impulse * *inverse_mass);
-    state.velocity += all[0];
-    state.position += all[1];
+    let h = at.secs_after(member.snapshot.time);
+    state.velocity += given.linear * *inverse_mass;
+    state.position += carried.linear * *inverse_mass;
     state.spin += *inverse_inertia * given.angular;
     state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
     let a = member.snapshot.acceleration;
@@ -101,7 +91,7 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     Some(state)
 }
 
-/// A rotation turned on by a rotation vector in world axes.
+/// A rotation turned further by a rotation vector in world axes.
 fn turned(rotation: DQuat, by: DVec3) -> DQuat {
     if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
 }
@@ -134,11 +124,31 @@ fn rigid(
 
 /// Adds a tube as it published itself: what is in flight to it counts as in flight alone.
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
-    in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
     let motion = Motion::of(member, state);
     sum.energy_j += member.snapshot.energy_j;
     sum.momentum += motion.momentum;
     sum.angular += motion.angular;
+    // what is on its way is taken as its local model answers it: J·v + ½ J·W J
+    let model = &member.snapshot.local_model;
+    let mut pushed = vec![DVec3::ZERO; model.blocks.len()];
+    in_flight(member, members, |_, site, dj, _| {
+        sum.add_in_flight(dj);
+        sum.momentum += dj.linear;
+        let Site::Arc(arc_m) = site else { return };
+        let Some((segment, share)) = state.locate(arc_m) else { return };
+        let at = state.positions[segment].lerp(state.positions[segment + 1], share);
+        sum.angular += at.cross(dj.linear) + dj.angular;
+        let slot = 2 * segment as u32;
+        let parts = [(slot, dj.linear * (1.0 - share)), (slot + 1, dj.angular), (slot + 2, dj.linear * share)];
+        for (slot, part) in parts {
+            let place = model.blocks.iter().position(|block| block.slot == slot);
+            place.into_iter().for_each(|place| pushed[place] += part);
+        }
+    });
+    for (row, block) in model.blocks.iter().enumerate() {
+        let answers = model.compliance[row * pushed.len()..].iter().zip(&pushed).map(|(w, j)| *w * *j);
+        sum.energy_j += pushed[row].dot(block.velocity + answers.sum::<DVec3>() * 0.5);
+    }
 }
 
 /// Momenta of a tube with its consistent mass, as far as its nodes carry them (docs/theory/rod.md, eq. 10).

@@ -5,8 +5,10 @@ use metachron_core::{AgentId, Anchor};
 /// How two agents act on each other where they touch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Law {
-    /// Impulses by the owner, booked in a ledger: the default.
+    /// Both are solved in one problem by the contact cluster that steps them: the default.
     #[default]
+    Cluster,
+    /// Asynchronous: one side computes the impulses and books them in a ledger, the other takes them in its next step.
     Ledger,
     /// Each side pushes itself off the other's last known state, as most engines do: for comparison.
     Penalty {
@@ -28,6 +30,14 @@ pub enum Law {
     Off,
 }
 
+impl Law {
+    /// Whether the two sides keep clocks of their own, each seeing the other's newest published state.
+    #[must_use]
+    pub const fn is_asynchronous(self) -> bool {
+        matches!(self, Self::Ledger | Self::Tlm { .. })
+    }
+}
+
 /// A lasting bilateral coupling between a point of this agent and one of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Link {
@@ -43,6 +53,6 @@ pub struct Link {
     pub damping_n_s_m: f64,
     /// The distance at which it exerts no force, metres, ≥ 0.
     pub rest_m: f64,
-    /// [`Law::Ledger`] or [`Law::Tlm`].
+    /// [`Law::Cluster`], [`Law::Ledger`] or [`Law::Tlm`].
     pub law: Law,
 }

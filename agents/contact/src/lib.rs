@@ -43,18 +43,17 @@
 //! ```
 
 pub mod agent;
+pub mod asynchronous;
 pub mod audit;
 pub mod cluster;
-pub mod exchange;
 pub mod joint;
 pub mod law;
 pub mod laws;
 pub mod push_out;
 pub mod stepper;
-pub mod taken;
 pub mod tank;
 
 pub use agent::{Agent, AnchorSpring, Neighbour, StepContext};
-pub use exchange::{Exchange, acknowledged};
+pub use asynchronous::acknowledged;
 pub use law::{Law, Link};
 pub use push_out::PUSH_OUT_SHARE;

@@ -3,8 +3,8 @@
 //! In: an agent writes itself into a [`Snapshot`] that is reused (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
-use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, ReusableOption, SimSpan, SimTime};
-use crate::{Ledger, PairState, Sprung};
+use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
+use crate::{Ledger, LocalModel, PairState};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -36,14 +36,14 @@ pub struct Snapshot {
     pub acceleration: DVec3,
     /// Its response to impulses.
     pub inertia: Inertia,
-    /// Forces and stiffness of the springs from driven points on it; none without such springs, or where no other agent needs them.
-    pub sprung: ReusableOption<Sprung>,
     /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// Impulses given to others, in couplings that it owns.
     pub given: Vec<Ledger>,
     /// Impulses taken from others, in couplings that they own.
     pub taken: Vec<Ledger>,
+    /// How it answers the partners of its asynchronous pairs; no blocks where it has none near.
+    pub local_model: LocalModel,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
     /// Its part in a contact cluster; `None` where it steps by itself.
@@ -75,7 +75,6 @@ impl Snapshot {
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
         self.drift_m = 0.0;
-        self.sprung.set(None);
         self.pairs.clear();
         self.cluster = None;
         self.bonds.clear();
@@ -92,9 +91,9 @@ impl Snapshot {
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()
             && self.acceleration.is_finite()
-            && self.sprung.get().is_none_or(Sprung::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
+            && self.local_model.is_finite()
     }
 
     /// Folds every bit of the state into `hash` (FNV-1a, 64 bits): equal hashes mean bit-identical runs.

@@ -18,6 +18,7 @@ pub(super) use turn::Leap;
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
 use super::observation::Observer;
+use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
     StepDoubling,
@@ -58,8 +59,13 @@ pub(super) struct ClusterSeat {
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
+    /// Its pairs whose other sides keep clocks of their own; `None` where its scene declares none.
+    asynchronous: Option<Box<Pairs>>,
+    /// The partners of such pairs as the members that it leads meet them.
+    remotes: Option<Box<Remotes>>,
     /// Storage, empty between turns.
     participants: Vec<Participant<'static>>,
+    sides: Vec<Option<&'static mut Pairs>>,
     wishes: Vec<Wish>,
     groups: DisjointSets,
     ids: Vec<AgentId>,
@@ -99,9 +105,12 @@ impl std::fmt::Debug for ClusterSeat {
 }
 
 impl ClusterSeat {
-    /// A seat in the clusters of `scene`.
-    pub fn new(scene: Arc<ClusterScene>) -> Self {
+    /// A seat in the clusters of `scene`; `asynchronous` of an agent that has pairs with clocks of their own.
+    pub fn new(scene: Arc<ClusterScene>, asynchronous: bool) -> Self {
         Self {
+            asynchronous: asynchronous.then(Box::default),
+            remotes: None,
+            sides: Vec::new(),
             scene,
             stepper: None,
             memory: ContactMemory::default(),
@@ -133,6 +142,9 @@ impl ClusterSeat {
         into.cluster = self.state;
         into.drift_m += self.drift_m;
         into.residual_m += self.drift_m;
+        if let Some(pairs) = &self.asynchronous {
+            pairs.write(into);
+        }
     }
 
     /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
@@ -143,11 +155,15 @@ impl ClusterSeat {
         self.schedule.is_on().then(|| self.doubling.take().unwrap_or_default())
     }
 
-    /// Notes with whom it belongs into one cluster.
-    fn bond(&mut self, observer: &Observer, links: &[Link]) {
+    /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
+    fn bond(&mut self, observer: &Observer, links: &[Link], laws: &[(AgentId, Law)]) {
+        let is_apart = |id: AgentId| {
+            let law = laws.binary_search_by_key(&id, |(other, _)| *other).ok().map(|at| laws[at].1);
+            law.is_some_and(Law::is_asynchronous)
+        };
         self.bonds.clear();
-        self.bonds.extend_from_slice(observer.near());
-        let linked = links.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other);
+        self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
+        let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
         self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
         self.bonds.sort_unstable();
         self.bonds.dedup();
@@ -215,27 +231,45 @@ impl AgentRunner {
         self.look(time, dt);
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
         let mut list = recycled(std::mem::take(&mut seat.participants));
+        let mut sides = recycled(std::mem::take(&mut seat.sides));
+        let mut remotes = seat.remotes.take();
         let mut stepper = seat.stepper.take().unwrap_or_default();
         let mut doubling = seat.repeats(steps, id);
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
         let mut led = std::mem::take(&mut self.led);
         let all = std::iter::once(&mut *self).chain(led.members_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
-        list.extend(all.zip(parts).filter_map(|(actor, parts)| actor.participant(time, parts)));
+        for (actor, parts) in all.zip(parts) {
+            if let Some((participant, pairs)) = actor.participant(time, parts) {
+                list.push(participant);
+                sides.push(pairs);
+            }
+        }
+        let meets = sides.iter().any(Option::is_some);
         let outcome = contained(|| {
-            // a finer step that diverges says nothing of this one
-            let extra = doubling.as_mut().and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
+            // a finer step that diverges says nothing of this one; what partners give is given once
+            let repeated = doubling.as_mut().filter(|_| !meets);
+            let extra = repeated.and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
+            if meets {
+                let step = MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts };
+                remotes.get_or_insert_default().join(&mut list, &mut sides, &mut stepper, step);
+            }
             let report = stepper.step(&scene, &mut list, dt).map_err(|error| error.to_string())?;
+            if meets {
+                part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
+            }
             if let Some(doubling) = &mut doubling {
                 doubling.compare(&list, report.dt);
             }
-            Ok((report, extra, list.iter().all(|one| one.member.is_calm())))
+            let calm = list.iter().all(|one| one.member.is_calm());
+            Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
         });
-        let list = recycled(list);
+        let (list, sides) = (recycled(list), recycled(sides));
         // a panic of one member must not end the others
         self.led = led;
         if let Some(seat) = &mut self.cluster {
-            (seat.participants, seat.wishes) = (list, wishes);
+            (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
+            seat.remotes = remotes;
         }
         let (report, extra, at_rest) = outcome?;
         let dt = report.dt;
@@ -281,14 +315,15 @@ impl AgentRunner {
         Ok((plan, dt.unwrap_or(self.pace.wanted())))
     }
 
-    /// What it brings into a step from `time`, of which it makes so many parts.
-    fn participant(&mut self, time: SimTime, parts: u32) -> Option<Participant<'_>> {
+    /// What it brings into a step from `time`, of which it makes so many parts, and its asynchronous pairs.
+    fn participant(&mut self, time: SimTime, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { agent, observer, hands, links, peers, cluster, .. } = self;
-        let ClusterSeat { memory, grips, .. } = &mut **cluster.as_mut()?;
+        let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
         let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, links };
         let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
-        Some(Participant { id, member: agent.member()?, context, laws, memory, parts, grips })
+        let participant = Participant { id, member: agent.member()?, context, laws, memory, parts, grips };
+        Some((participant, asynchronous.as_deref_mut()))
     }
 
     fn wish(&mut self) -> Option<Wish> {
@@ -301,14 +336,15 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
         let Self { observer, led, peers, writer, links, cluster, .. } = self;
         observer.update(peers, writer, step, led.membership());
+        let laws = |observer: &Observer| peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws);
         if let Some(seat) = cluster {
-            seat.bond(observer, links);
+            seat.bond(observer, links, laws(observer));
         }
         led.each_at(time, |actor, membership| {
             let Self { observer, peers, writer, links, cluster, .. } = actor;
             observer.update(peers, writer, step, membership);
             if let Some(seat) = cluster {
-                seat.bond(observer, links);
+                seat.bond(observer, links, laws(observer));
             }
         });
     }
@@ -370,7 +406,10 @@ impl AgentRunner {
                 seat.memory.near(now).any(|id| id == pair.with)
             });
             for total in stepper.totals().iter().filter(|total| total.member == me) {
-                if let Partner::Agent(with) = total.partner {
+                let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
+                if let Partner::Agent(with) = total.partner
+                    && !apart(with)
+                {
                     seat.note_pair(total, with, dt_s);
                 }
             }
@@ -391,7 +430,7 @@ impl AgentRunner {
         let mut places = 0..;
         self.each_member(|actor| {
             let (Some(place), Some(seat)) = (places.next(), &actor.cluster) else { return };
-            let tied = actor.links.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other);
+            let tied = actor.links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
             for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
                 if let Ok(other) = ids.binary_search(&other) {
                     groups.join(place, other);

@@ -9,6 +9,7 @@ use super::cluster::Membership;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
+use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
 use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -26,7 +27,7 @@ pub(super) struct Peers {
 pub(super) struct Peer {
     pub shared: Arc<Shared>,
     pub form: Option<Arc<CollisionShape>>,
-    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the peers.
+    /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Vec<(AgentId, Law)>,
 }
 
@@ -61,8 +62,12 @@ impl std::fmt::Debug for Peer {
 }
 
 impl Peer {
+    fn clock(&self) -> PairClock {
+        PairClock { id: self.shared.id, step_s: self.shared.wanted_hz.recip() }
+    }
+
     fn law(&self, other: AgentId) -> Law {
-        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Ledger, |at| self.laws[at].1)
+        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Cluster, |at| self.laws[at].1)
     }
 
     /// Whether the two could ever touch.
@@ -81,6 +86,7 @@ impl Peer {
             snapshot: other.shared.slot.latest(),
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
+            computed_here: computes(self.clock(), other.clock()),
         }
     }
 }

@@ -39,7 +39,7 @@ pub struct AgentSpawn {
     pub range: Option<ResolutionRange>,
     /// Agents whose newest states it always sees. Its own number and repeats are ignored.
     pub links: Vec<AgentId>,
-    /// Laws between it and its peers, where not [`Law::Ledger`]. Given by one side; if both give one, that of the lower number counts.
+    /// Laws between it and its peers, where not [`Law::Cluster`]. Given by one side; if both give one, that of the lower number counts.
     pub laws: Vec<(AgentId, Law)>,
     /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
     pub attached: Vec<Link>,
@@ -48,7 +48,7 @@ pub struct AgentSpawn {
     /// The surroundings of the clusters in which it is stepped; without effect for an agent that is no member
     /// ([`metachron_contact::Agent::member`]).
     pub scene: Arc<ClusterScene>,
-    /// Faults injected on purpose.
+    /// Faults injected on purpose; in clusters only into agents that have asynchronous pairs.
     pub faults: Faults,
     /// Points of it that are recorded ([`AgentHandle::samples`]).
     pub watches: Vec<WatchedPoint>,
@@ -276,7 +276,12 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
             links.push(link);
         }
     }
-    let cluster = spawn.agent.member().is_some().then(|| Box::new(ClusterSeat::new(spawn.scene)));
+    let mut asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
+    let asynchronous = asynchronous.any(Law::is_asynchronous);
+    let is_member = spawn.agent.member().is_some();
+    let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, asynchronous)));
+    // within a cluster there are no messages to lose, and no clock of its own to disturb
+    let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
     AgentRunner {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
@@ -285,7 +290,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
         dt_range: spawn.dt_range,
         range: spawn.range,
         governor: spawn.governor,
-        faults: spawn.faults,
+        faults,
         writer,
         observer: peers.observer(id, &links),
         links: spawn.attached,

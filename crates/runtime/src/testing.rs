@@ -5,7 +5,7 @@ use super::pool::Pool;
 use super::spawn::AgentSpawn;
 use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
-use metachron_contact::Exchange;
+use metachron_contact::asynchronous::{GivenAt, Ledgers};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_contact::{Agent, StepContext};
@@ -126,7 +126,7 @@ pub(super) struct Dummy {
     pub taken: f64,
     /// Impulses along x given.
     pub given: f64,
-    pub exchange: Exchange,
+    pub ledgers: Ledgers,
     pub log: Option<Log>,
     pub me: AgentId,
     pub time: SimTime,
@@ -165,7 +165,7 @@ impl Dummy {
             impulses: 0,
             taken: 0.0,
             given: 0.0,
-            exchange: Exchange::wary(),
+            ledgers: Ledgers::default(),
             log: None,
             me: AgentId(0),
             time: SimTime::ZERO,
@@ -217,16 +217,16 @@ impl Dummy {
 
     fn exchange_impulses(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let taken = &mut self.taken;
-        self.exchange.open(context);
-        self.exchange.take(context, context.time, |_, _, impulse, _| *taken += impulse.linear.x);
+        self.ledgers.open(context);
+        self.ledgers.take(context, dt_s, |new| *taken += new.impulse.linear.x);
         if self.steps <= self.impulses {
             for other in context.neighbours.iter().filter(|n| n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
-                self.exchange.give(other.id, Site::Whole, 0.0, push);
+                let at = GivenAt { site: Site::Whole, time: context.time, after_s: 0.0 };
+                self.ledgers.give(other.id, at, push);
                 self.given += 1.0;
             }
         }
-        self.exchange.close(context, dt_s);
     }
 }
 
@@ -285,7 +285,7 @@ impl Agent for Dummy {
             let (centre, half) = (DVec3::Z * self.z, DVec3::splat(radius_m));
             Bounds { low: centre - half, high: centre + half, speed_m_s: self.speed_m_s() }
         });
-        self.exchange.write(into);
+        self.ledgers.write(into);
         let step = self.step.lock().unwrap_or_else(PoisonError::into_inner).take();
         if let (Some(log), Some(step)) = (&self.log, step) {
             log.lock().unwrap_or_else(PoisonError::into_inner).push(step);

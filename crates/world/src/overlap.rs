@@ -121,7 +121,7 @@ impl Scene {
 
     /// Pairs with a contact law of their own.
     fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
-        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
+        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Cluster;
         self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()
     }
 

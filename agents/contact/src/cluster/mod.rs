@@ -49,6 +49,7 @@ mod error;
 mod factor;
 mod fronts;
 mod gradients;
+mod held;
 mod iterate;
 mod joint;
 mod members;

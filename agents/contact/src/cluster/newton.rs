@@ -81,7 +81,7 @@ pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
 }
 
 /// Gains and pulls of all rows; returns the largest miss, that of momentum among them.
-fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
+pub(super) fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
     let mut largest = iterate.system.members.largest_velocity(&iterate.state.left);
     for k in 0..iterate.rows.len() {
         let (row, at) = (&iterate.rows.rows[k], iterate.state.point(k));

@@ -90,7 +90,7 @@ pub struct Solution {
     /// What the solve took.
     pub report: Report,
     velocities: Vec<DVec3>,
-    offsets: Vec<usize>,
+    pub(super) offsets: Vec<usize>,
 }
 
 impl Solution {
@@ -107,12 +107,14 @@ impl Solution {
 #[derive(Debug, Clone, Default)]
 pub struct Solver {
     settings: Settings,
-    iterate: Iterate,
+    pub(super) iterate: Iterate,
     warm: Vec<DVec3>,
     compliances: Vec<f64>,
     stores: Stores,
     kept: Kept,
-    solution: Solution,
+    pub(super) solution: Solution,
+    /// Storage of [`Self::held_compliance`].
+    pub(super) held: [Vec<DVec3>; 3],
 }
 
 impl Solver {

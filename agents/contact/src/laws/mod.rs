@@ -8,4 +8,4 @@ mod tlm;
 
 pub use metachron_core::Wave;
 pub use penalty::{Approach, push_off_n};
-pub use tlm::{Line, LineEnd, LinkForces};
+pub use tlm::{Line, LineEnd, LineLaw, LineStep, LinkForces};

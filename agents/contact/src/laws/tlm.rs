@@ -12,8 +12,37 @@ use metachron_core::Wave;
 use metachron_core::{SimSpan, SimTime};
 use std::collections::VecDeque;
 
-/// A clock that goes back by more than this is another one; less is a publication that came late, seconds.
-const MEETS_S: f64 = 0.1;
+/// One end of a link, as a row of a problem sees it during a step.
+#[derive(Debug, Clone, Copy)]
+pub struct LineStep {
+    /// When the step begins.
+    pub at: SimTime,
+    /// How long it is, seconds, > 0.
+    pub dt_s: f64,
+    /// Velocity of the other end as far as it is known, m/s.
+    pub far_m_s: DVec3,
+    /// Vector from here to the other end, metres.
+    pub way: DVec3,
+    /// The arriving wave, N.
+    pub arriving: DVec3,
+    /// Rest length: the distance at which the link exerts no force, metres, ≥ 0.
+    pub rest_m: f64,
+    /// Damping parallel to the line, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// The law of one end during a step: the force on it is `drive_n` less `resistance_n_s_m` times its velocity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineLaw {
+    /// The force on an end that does not move, N.
+    pub drive_n: DVec3,
+    /// Impedance and damping, N·s/m, ≥ 0.
+    pub resistance_n_s_m: f64,
+    /// The direction in which a link with a rest length acts; `None` for all.
+    pub along: Option<DVec3>,
+    /// The part of the arriving wave that the line reflects, N.
+    pub arriving: DVec3,
+}
 
 /// One end of a link during a step.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +90,8 @@ pub struct Line {
     since: SimTime,
 }
 
+/// Whose time goes back by more than this calls it another now; less is a message that came late, seconds.
+const MEETS_S: f64 = 0.1;
 /// The most states of the other end that are stored: those of one delay, at a hundred times this end's rate.
 const RECEIVED_MAX: usize = 256;
 /// The delay is this many of the longer of both sides' steps: one for publication, one for a lost or late message.
@@ -112,6 +143,35 @@ impl Line {
     pub fn begin(&mut self, way: DVec3, at: SimTime) {
         if self.delay_s == 0.0 {
             (self.start, self.since) = (way, at);
+        }
+    }
+
+    /// The law of one end of a link on this line.
+    ///
+    /// The line carries the changes since it was made; its stretch at that time acts as a constant force. Without a rest
+    /// length the link is isotropic, else it acts along itself.
+    #[must_use]
+    pub fn law(&self, end: &LineStep) -> LineLaw {
+        let axis = end.way.normalize_or_zero();
+        let along = (end.rest_m > 0.0).then_some(axis);
+        let part = |v: DVec3| along.map_or(v, |axis| axis * axis.dot(v));
+        let acting_share = (1.0 - self.since.secs_after(end.at) / end.dt_s).clamp(0.0, 1.0);
+        let stiffness = if self.delay_s > 0.0 { acting_share * self.stiffness_n_m } else { 0.0 };
+        let start = if end.rest_m > 0.0 { axis * (self.start.length() - end.rest_m) } else { self.start };
+        let arriving = part(end.arriving);
+        LineLaw {
+            drive_n: start * stiffness - arriving + part(end.far_m_s) * end.damping_n_s_m,
+            resistance_n_s_m: self.impedance() + end.damping_n_s_m,
+            along,
+            arriving,
+        }
+    }
+
+    /// Sends the response of an end that got `force` in the mean of a step of `h` seconds, newtons.
+    pub fn answer(&mut self, law: &LineLaw, force: DVec3, h: f64) {
+        if law.resistance_n_s_m > 0.0 {
+            let velocity = (law.drive_n - force) / law.resistance_n_s_m;
+            self.send(law.arriving, velocity * self.impedance() + law.arriving, h);
         }
     }
 

@@ -21,7 +21,7 @@ impl Ties {
             for (number, link) in (0..).zip(one.context.links) {
                 let other = place_of(all, link.other);
                 let is_mine = other.is_none_or(|other| member < other);
-                if is_mine && matches!(link.law, Law::Ledger) {
+                if is_mine && computes_link(all, one, link) {
                     self.link(step, [Some(member), other], link, number);
                 }
             }
@@ -41,6 +41,17 @@ impl Ties {
         let name = Name { member, partner: Partner::Link(number), hold: Some(hold) };
         let ends = [End { member: Some(member), point: here }, End { member: other, point: there }];
         self.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
+    }
+}
+
+/// Whether a link is the cluster's: one that is asynchronous only where its far end is a participant, or a remote member that is met here.
+fn computes_link(all: &[Participant<'_>], one: &Participant<'_>, link: &Link) -> bool {
+    let far = place_of(all, link.other).map(|other| &all[other].member);
+    match link.law {
+        Law::Cluster => far.is_none_or(|far| !far.is_remote()),
+        Law::Ledger => far.is_some_and(|far| !far.spares(one.id)),
+        Law::Tlm { .. } => far.is_some_and(|far| !far.is_remote()),
+        Law::Penalty { .. } | Law::Off => false,
     }
 }
 

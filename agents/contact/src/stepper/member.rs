@@ -73,6 +73,27 @@ pub trait ClusterMember: Send {
     /// The material point `anchor`; `None` for one that the body does not have.
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint>;
 
+    /// How the matter at the material point `anchor` turns with the body's blocks; `None` where no block is a spin there.
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        let _ = anchor;
+        None
+    }
+
+    /// The block as its published state counts it ([`metachron_core::LocalBlock::slot`]).
+    fn slot_of(&self, block: usize) -> u32 {
+        block as u32
+    }
+
+    /// How long what is given to it takes to show, seconds: of one that is stepped elsewhere a step of its own, and nothing of all others.
+    fn answers_after_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether it stands for a partner of an asynchronous pair that is stepped elsewhere.
+    fn is_remote(&self) -> bool {
+        false
+    }
+
     /// Where it is once it has moved for `t_s` seconds with the velocities `v`; `None` for a body that does not move as a whole.
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let _ = (v, t_s);
@@ -105,6 +126,12 @@ pub trait ClusterMember: Send {
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let _ = (v, h_s);
         0.0
+    }
+
+    /// Moves it to where late impulses on its blocks would have carried it, which are given times the seconds since they acted; its
+    /// velocities stay. A body whose flight is not its centre's alone stays where it is.
+    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
+        let _ = impulses_n_s2;
     }
 
     /// Keeps the present state, at the end of a step.

@@ -24,6 +24,8 @@ pub enum Partner {
     Joint(u32),
     /// What drives the body.
     Drive,
+    /// The end of a transmission line, by its number among those of the macro step.
+    Line(u32),
 }
 
 /// What a contact or a joint hands to the next step.

@@ -17,14 +17,19 @@ mod blows;
 mod doubling;
 mod joints;
 mod links;
+mod local;
+mod matter;
 mod member;
 mod memory;
+mod outside;
 mod plan;
 mod progress;
+mod remote;
 mod scene;
 mod search;
 mod springs;
 mod ties;
+mod weighing;
 
 use crate::StepContext;
 use crate::cluster::{Contact, Member, Problem, ProblemError, Settings, Solver};
@@ -33,12 +38,16 @@ use blows::Rebounds;
 pub use doubling::StepDoubling;
 use glam::DVec3;
 use joints::Joints;
+pub use local::LocalQuery;
+pub use matter::Matter;
 pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError, check_span, recycled};
+pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
+pub use remote::{RemoteMember, RemoteView};
 pub use scene::ClusterScene;
 use search::{Judge, Round, Search};
 use ties::{FineStep, Ties, place_key};
@@ -62,7 +71,7 @@ pub struct Participant<'a> {
     pub member: &'a mut dyn ClusterMember,
     /// What it sees at the start of the macro step.
     pub context: StepContext<'a>,
-    /// The laws of its pairs other than [`Law::Ledger`], by rising numbers: a pair with one is not the cluster's.
+    /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
     pub laws: &'a [(AgentId, Law)],
     /// What it remembers of others.
     pub memory: &'a mut ContactMemory,
@@ -73,9 +82,15 @@ pub struct Participant<'a> {
 }
 
 impl Participant<'_> {
-    /// Whether it touches `other` where the two meet.
+    /// Whether it touches `other` where the two meet. An asynchronous pair whose sides have come into one cluster has one clock in it.
     fn may_touch(&self, other: &Self) -> bool {
-        let off = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).is_ok();
+        let law = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).ok().map(|at| self.laws[at].1);
+        let remote = [self, other].map(|one| one.member.is_remote());
+        let off = match remote {
+            [true, true] => true,
+            [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
+            _ => law != Some(Law::Ledger),
+        };
         !(off || self.member.spares(other.id) || other.member.spares(self.id))
     }
 }
@@ -135,6 +150,12 @@ pub struct ClusterStepper {
     rebounds: Rebounds,
     /// The participant of each member of the problem.
     places: Vec<usize>,
+    outside: Outside,
+    /// Storage of local models.
+    local: [Vec<DVec3>; 2],
+    /// The macro step that is made and its fine steps, seconds.
+    macro_s: f64,
+    fine_s: f64,
 }
 
 impl Default for ClusterStepper {
@@ -159,7 +180,22 @@ impl ClusterStepper {
             kept: Vec::new(),
             rebounds: Rebounds::default(),
             places: Vec::new(),
+            outside: Outside::default(),
+            local: Default::default(),
+            macro_s: 0.0,
+            fine_s: 0.0,
         }
+    }
+
+    /// The macro step that was made last, seconds.
+    #[must_use]
+    pub const fn macro_s(&self) -> f64 {
+        self.macro_s
+    }
+
+    /// What acts on participants of the next step from outside, and what the last one gave to remote members.
+    pub fn outside(&mut self) -> &mut Outside {
+        &mut self.outside
     }
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
@@ -180,10 +216,12 @@ impl ClusterStepper {
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport { dt, ..ClusterReport::default() };
-        self.foresee(all, dt.as_secs_f64())?;
+        self.macro_s = dt.as_secs_f64();
+        self.foresee(all, self.macro_s)?;
         let blow = self.first_blow(scene, all, dt.as_secs_f64())?;
         if let Some(cut) = blow.and_then(SimSpan::from_secs_f64) {
             report.dt = cut.clamp(SHORTEST.min(dt), dt);
+            self.macro_s = report.dt.as_secs_f64();
             self.foresee(all, report.dt.as_secs_f64())?;
         }
         self.keep(all);
@@ -251,10 +289,13 @@ impl ClusterStepper {
             one.grips.clear();
         }
         self.totals.clear();
+        self.outside.begin();
         report.fine_steps = parts;
         report.depth_m = 0.0;
         self.rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
+        self.fine_s = h_s;
         for fine in 0..parts {
+            self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s)?;
             self.search.find(scene, all, &self.progress, h_s);
             self.rebounds.choose(&mut self.search, &self.progress);
@@ -323,7 +364,7 @@ impl ClusterStepper {
 
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
     fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
-        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+        for (place, (one, state)) in all.iter_mut().zip(&mut self.progress).enumerate() {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
                 if state.begun_s != own_s {
@@ -331,6 +372,7 @@ impl ClusterStepper {
                 }
                 state.begun_s = 0.0;
                 state.start(one.member.velocities(), one.member.free());
+                state.push(self.outside.answer(place, one.member, own_s / self.macro_s));
             }
             state.part += 1;
             state.look();
@@ -345,6 +387,7 @@ impl ClusterStepper {
         let step = FineStep { all, progress, h_s, after_s };
         ties.gather_springs(&step);
         ties.gather_links(&step);
+        ties.gather_lines(&step, &self.outside.lines);
         joints.gather(scene, &step, ties);
         ties.add_inertia(&step);
     }
@@ -449,13 +492,13 @@ impl ClusterStepper {
         for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
             if lasting(both) {
                 let owner = &search.owners[k];
-                progress[owner.member].touched = true;
-                owner.other.into_iter().for_each(|other| progress[other].touched = true);
+                progress[owner.member].hold();
+                owner.other.into_iter().for_each(|other| progress[other].hold());
             }
         }
         for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| **impulse != DVec3::ZERO) {
-            progress[owner.member].touched = true;
-            owner.other.into_iter().for_each(|other| progress[other].touched = true);
+            progress[owner.member].hold();
+            owner.other.into_iter().for_each(|other| progress[other].hold());
         }
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
@@ -463,18 +506,21 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, ties, .. } = self;
+        let Self { solver, search, ties, outside, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
             let place = Remembered { key: owner.key.anywhere(), force_n: impulse / h_s, owed_slip_m };
             all[owner.member].memory.pair(owner.partner).next.push(place);
+            outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
                 add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);
             }
         }
-        for (owner, impulse) in ties.owners.iter().zip(&solution.rows_n_s) {
+        for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
+            outside.note(all, owner.member, &row.sides[1], -*impulse);
+            outside.note_line(owner, *impulse);
             let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }

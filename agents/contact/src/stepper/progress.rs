@@ -21,6 +21,8 @@ pub(super) struct Progress {
     pub start: Vec<DVec3>,
     /// What its step would have changed them by without contact.
     pub gain: Vec<DVec3>,
+    /// The part of that which known impulses from outside make; empty for none.
+    pub pushed: Vec<DVec3>,
     /// What the impulses since have changed them by.
     pub given: Vec<DVec3>,
     /// v(p − 1): by which its place has moved so far.
@@ -33,8 +35,9 @@ pub(super) struct Progress {
     pub solved: Vec<DVec3>,
     /// Its place in the problem; `None` where no row touches it.
     pub place: Option<usize>,
-    /// Whether anything has acted on it for a while since its step began.
+    /// Whether anything has acted on it for a while since its step began, and whether a contact or row of the problem has.
     pub touched: bool,
+    pub held: bool,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
 }
@@ -56,7 +59,20 @@ impl Progress {
         self.given.clear();
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
-        self.touched = false;
+        (self.touched, self.held) = (false, false);
+    }
+
+    /// Notes that a contact or row of the problem acts on it.
+    pub fn hold(&mut self) {
+        (self.touched, self.held) = (true, true);
+    }
+
+    /// Adds what known impulses change its velocities by within its step; none where there are none.
+    pub fn push(&mut self, change: &[DVec3]) {
+        self.pushed.clear();
+        self.pushed.extend_from_slice(change);
+        self.gain.iter_mut().zip(change).for_each(|(gain, change)| *gain += *change);
+        self.touched |= !change.is_empty();
     }
 
     /// Finds v̄(p) and û of the fine step that begins (eq. 24).

@@ -7,6 +7,7 @@ mod boxes;
 mod sweep;
 
 use super::memory::Partner;
+use super::remote;
 use super::scene::ClusterScene;
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
@@ -155,6 +156,7 @@ impl Search {
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
         });
         self.boxes.pairs(NEAR_STEPS * h_s, &mut self.near);
+        self.near.retain(|&[a, b]| all[a].may_touch(&all[b]));
         let near = std::mem::take(&mut self.near);
         self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
         self.near = near;
@@ -294,7 +296,10 @@ impl Search {
             };
             if taken {
                 owners.push(owner);
-                contacts.push(contact(&touch, &facing, skins, round.progress));
+                let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
+                let surface_m_s = remote::slower_push_out(&touch, round.h_s, late_s);
+                let found = contact(&touch, &facing, skins, round.progress);
+                contacts.push(Contact { surface_m_s: found.surface_m_s + surface_m_s, ..found });
             } else {
                 clear_m = clear_m.min(gap_m);
             }

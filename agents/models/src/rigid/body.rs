@@ -58,7 +58,7 @@ impl RigidBody {
         let radius_m = shape.radius_m;
         let kind = ShapeKind::Solid(shape);
         let form = CollisionShape { kind, friction: spec.friction, restitution: spec.restitution };
-        Ok(Self {
+        let mut body = Self {
             spread,
             gravity: spec.gravity,
             may_sleep: spec.sleep,
@@ -70,7 +70,9 @@ impl RigidBody {
             calm_s: 0.0,
             steps: 0,
             unknowns: Unknowns::default(),
-        })
+        };
+        body.unknowns.start([body.motion.velocity, body.motion.spin(&body.spread)]);
+        Ok(body)
     }
 
     /// The centre of mass in the shape's own axes, metres.

@@ -41,6 +41,13 @@ impl Default for Unknowns {
     }
 }
 
+impl Unknowns {
+    /// Takes the velocities that a body begins with.
+    pub(super) fn start(&mut self, now: [DVec3; 2]) {
+        self.now = now;
+    }
+}
+
 impl RigidBody {
     /// The inertia tensor in world axes, kg·m².
     fn inertia(&self) -> DMat3 {
@@ -125,6 +132,10 @@ impl ClusterMember for RigidBody {
         Some(MaterialPoint::new(self.motion.position + arm, Side::rigid(0, arm)))
     }
 
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        matches!(anchor, Anchor::Local(_)).then(|| Side::node(0, SPIN))
+    }
+
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
         let Motion { position, rotation, .. } = motion;
@@ -135,6 +146,14 @@ impl ClusterMember for RigidBody {
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
         v[0].length() + v[1].length() * self.radius_m
+    }
+
+    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
+        self.motion.position += impulses_n_s2[0] / self.spread.mass_kg;
+        let turn = self.inertia().inverse() * impulses_n_s2[SPIN];
+        if turn != DVec3::ZERO {
+            self.motion.rotation = (glam::DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
+        }
     }
 
     fn keep(&mut self) {
@@ -160,6 +179,7 @@ impl ClusterMember for RigidBody {
             return Err(self.diverged(h_s, "the body left the coordinate range"));
         }
         self.acceleration = (self.motion.velocity - before.velocity) / h_s;
+        self.unknowns.now = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.steps += 1;
         self.at_rest = false;
         self.count_calm(&before, h_s, touched);
@@ -174,6 +194,7 @@ impl ClusterMember for RigidBody {
         self.at_rest = true;
         (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
         self.acceleration = DVec3::ZERO;
+        self.unknowns.now = [DVec3::ZERO; 2];
     }
 }
 

@@ -142,6 +142,11 @@ impl ClusterMember for Tube {
         Some(MaterialPoint::new(position, self.point_side(segment, share, DVec3::ZERO)))
     }
 
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        let Anchor::Arc(arc_m) = anchor else { return None };
+        Some(Side::node(0, 2 * self.division.locate(arc_m).0 + 1))
+    }
+
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
         let nodes = v.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();

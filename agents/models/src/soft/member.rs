@@ -122,6 +122,11 @@ impl ClusterMember for SoftBody {
         Some(MaterialPoint::new(position, self.shared_side([vertex; 3], [1.0, 0.0, 0.0])))
     }
 
+    fn slot_of(&self, block: usize) -> u32 {
+        let mut rows = self.system.rows().iter();
+        rows.position(|row| *row == Some(block as u32)).unwrap_or_default() as u32
+    }
+
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let rows = self.system.rows();
         let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);
@@ -168,6 +173,7 @@ impl ClusterMember for SoftBody {
             .iter()
             .zip(&unknowns.now)
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
+        unknowns.now.copy_from_slice(v);
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;

@@ -70,7 +70,7 @@ pub struct Findings {
 /// A spring whose ends are still to be named.
 pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
     let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
-    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Ledger }
+    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Cluster }
 }
 
 /// A body with its rate.
@@ -132,7 +132,7 @@ impl Table {
             let mut snapshot = Snapshot { time: self.time, ..Snapshot::default() };
             body.agent.write_snapshot(&mut snapshot);
             let seen = Neighbour::observed(AgentId(id), Arc::new(snapshot));
-            Neighbour { form: body.agent.form(), law: if self.touching { Law::Ledger } else { Law::Off }, ..seen }
+            Neighbour { form: body.agent.form(), law: if self.touching { Law::Cluster } else { Law::Off }, ..seen }
         };
         if !self.touching || self.bodies.iter().any(|body| body.agent.model() == "tool") {
             (0..).zip(&self.bodies).map(of).collect()

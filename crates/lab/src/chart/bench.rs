@@ -1,15 +1,34 @@
-//! Agents stepped in turn without a runtime: a coupling law is measured alone, without islands and without threads.
+//! Agents stepped in turn without a runtime: a coupling law is measured alone, each agent in a cluster of its own, without threads.
 //!
 //! In: agents, their rates, laws, springs and faults. Out: the last published state of each, and sums at a common time. The agent
 //! with the earliest time steps next, among equals the lower number; its state is visible immediately, stamped with the end of
 //! its step, as in a run whose steps cost nothing, or only when that time has come. Never here: measurements.
 
+use super::penalty::{Overlaps, Penalty};
+use glam::DVec3;
+use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
 use metachron_contact::audit::Member;
-use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_contact::{Law, Link, OwnershipTraits, keep_step, owns};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
-use metachron_geometry::CollisionShape;
+use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
+use metachron_core::{AgentId, Body, Grip, SimSpan, Snapshot, StepError};
+use metachron_geometry::{CollisionShape, Obstacle};
 use std::sync::Arc;
+
+/// The law of all pairs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum PairLaw {
+    /// One of the product's.
+    Product(Law),
+    /// A spring and a damper between newest states.
+    Penalty {
+        /// N/m.
+        stiffness_n_m: f64,
+        /// N·s/m.
+        damping_n_s_m: f64,
+        /// Whether states are brought forward.
+        extrapolate: bool,
+    },
+}
 
 /// Deliberate faults.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -27,7 +46,9 @@ pub(super) struct Faults {
 /// Agents that see each other.
 pub(super) struct StepHarness {
     actors: Vec<Actor>,
-    law: Law,
+    law: PairLaw,
+    obstacles: Vec<Obstacle>,
+    scene: ClusterScene,
     faults: Faults,
     noise: u64,
 }
@@ -44,20 +65,54 @@ struct Actor {
     /// Springs from fixed points.
     hands: Vec<AnchorSpring>,
     links: Vec<Link>,
-    /// Mass per length and rotary inertia of a tube.
-    weight: [f64; 2],
+    /// What an audit needs to know.
+    weight: Weight,
     /// Length of its last step, seconds.
     last_s: f64,
+    cluster: Cluster,
+}
+
+/// What an audit needs to know of an agent.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Weight {
+    /// Of a tube, kg/m and kg·m.
+    pub(super) mass_per_length_kg_m: f64,
+    pub(super) rotary_kg_m: f64,
+    /// Of a rigid body, m/s².
+    pub(super) gravity: DVec3,
+}
+
+/// The cluster of an agent alone.
+#[derive(Default)]
+struct Cluster {
+    memory: ContactMemory,
+    grips: Vec<Grip>,
+    pairs: Pairs,
+    remotes: Remotes,
+    stepper: ClusterStepper,
+    overlaps: Overlaps,
 }
 
 impl StepHarness {
     /// An empty harness whose pairs all touch by `law`.
-    pub(super) fn new(law: Law, faults: Faults) -> Self {
-        Self { actors: Vec::new(), law, faults, noise: faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1 }
+    pub(super) fn new(law: PairLaw, faults: Faults) -> Self {
+        let noise = faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        Self { actors: Vec::new(), law, obstacles: Vec::new(), scene: ClusterScene::default(), faults, noise }
     }
 
-    /// Adds an agent that steps `rate_hz` times a second; `weight`: for a tube its mass per length and rotary inertia.
-    pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: [f64; 2]) -> AgentId {
+    /// Adds solids that never move, unless they are there; `None` where one cannot be built.
+    pub(super) fn surround(&mut self, obstacles: &[Obstacle]) -> Option<()> {
+        for obstacle in obstacles {
+            if self.obstacles.iter().all(|known| known.name != obstacle.name) {
+                self.obstacles.push(obstacle.clone());
+            }
+        }
+        self.scene = ClusterScene::new(&self.obstacles).ok()?;
+        Some(())
+    }
+
+    /// Adds an agent that steps `rate_hz` times a second.
+    pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: Weight) -> AgentId {
         let mut own = Snapshot::default();
         agent.write_snapshot(&mut own);
         let (form, first) = (agent.form(), Arc::new(own.clone()));
@@ -72,6 +127,7 @@ impl StepHarness {
             links: Vec::new(),
             weight,
             last_s: 0.0,
+            cluster: Cluster::default(),
         });
         AgentId(self.actors.len() as u32 - 1)
     }
@@ -109,8 +165,8 @@ impl StepHarness {
         all.map(|(id, actor)| Member {
             id,
             snapshot: &actor.own,
-            mass_per_length_kg_m: actor.weight[0],
-            rotary_kg_m: actor.weight[1],
+            mass_per_length_kg_m: actor.weight.mass_per_length_kg_m,
+            rotary_kg_m: actor.weight.rotary_kg_m,
         })
         .collect()
     }
@@ -119,21 +175,6 @@ impl StepHarness {
     pub(super) fn next(&self, seconds: f64) -> Option<AgentId> {
         let first = (0..).zip(&self.actors).min_by_key(|(id, actor)| (actor.own.time, *id));
         first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
-    }
-
-    /// Lets every agent look around before the first step.
-    pub(super) fn start(&mut self) {
-        for i in 0..self.actors.len() {
-            let me = AgentId(i as u32);
-            let neighbours = self.neighbours_of(i);
-            let actor = &mut self.actors[i];
-            let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-            let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
-            actor.agent.observe(dt, &StepContext { me, time, neighbours: &neighbours, hands, links });
-            actor.agent.write_snapshot(&mut actor.own);
-            let shown = Arc::new(actor.own.clone());
-            actor.shown = [Arc::clone(&shown), shown];
-        }
     }
 
     /// Makes a step of an agent.
@@ -146,15 +187,21 @@ impl StepHarness {
         let lost = self.random() < self.faults.loss;
         let neighbours = self.neighbours_of(i);
         let actor = &mut self.actors[i];
-        let time: SimTime = actor.own.time;
+        let time = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let context = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
-        let wanted = dt;
-        let dt = actor.agent.longest_step(wanted, &context);
-        actor.agent.step(dt, &context)?;
+        let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
+        let context = StepContext { me, time, neighbours: &neighbours, hands, links };
+        let dt = cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, dt)?;
         actor.last_s = dt.as_secs_f64();
-        actor.agent.write_snapshot(&mut actor.own);
-        (actor.own.time, actor.own.shortened_step) = (time + dt, (dt < wanted).then_some(dt));
+        own.clear();
+        agent.write_snapshot(own);
+        own.pairs.clear();
+        own.grips.clone_from(&cluster.grips);
+        cluster.pairs.write(own);
+        own.time = time + dt;
+        if matches!(own.body, Body::Rigid(_)) {
+            own.acceleration = weight.gravity;
+        }
         if !lost {
             actor.shown.swap(0, 1);
             actor.shown[0] = Arc::new(actor.own.clone());
@@ -169,22 +216,16 @@ impl StepHarness {
 
     /// Another agent as a neighbour of one.
     fn neighbour_of(&self, me: usize, other: usize) -> Neighbour {
-        let standing = |i: usize| {
-            let actor = &self.actors[i];
-            OwnershipTraits::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())
-        };
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;
-        let snapshot = &actor.shown[usize::from(early)];
-        let linked = actor.links.iter().any(|link| link.other == AgentId(me as u32) && link.law == Law::Ledger);
+        let seen = Neighbour::observed(AgentId(other as u32), Arc::clone(&actor.shown[usize::from(early)]));
+        let clock = |at: usize| PairClock { id: AgentId(at as u32), step_s: self.actors[at].rate_hz.recip() };
         Neighbour {
-            id: AgentId(other as u32),
-            step_s: snapshot.step_s(1.0 / actor.rate_hz),
-            snapshot: Arc::clone(snapshot),
             form: actor.form.clone(),
-            law: self.law,
-            owned: owns(standing(me), standing(other), linked),
-            in_step: keep_step(standing(me), standing(other), linked),
+            law: if let PairLaw::Product(law) = self.law { law } else { Law::Off },
+            computed_here: computes(clock(me), clock(other)),
+            step_s: actor.rate_hz.recip(),
+            ..seen
         }
     }
 
@@ -195,4 +236,43 @@ impl StepHarness {
         self.noise ^= self.noise << 17;
         (self.noise >> 11) as f64 / (1_u64 << 53) as f64
     }
+}
+
+impl Cluster {
+    /// Makes a step of `dt` of an agent that is alone in its cluster; how long it was.
+    fn step(
+        &mut self,
+        agent: &mut dyn Agent,
+        scene: &ClusterScene,
+        around: Around<'_>,
+        dt: SimSpan,
+    ) -> Result<SimSpan, StepError> {
+        let Self { memory, grips, pairs, remotes, stepper, overlaps } = self;
+        let Around { context, law } = around;
+        let laws: Vec<(AgentId, Law)> = context.neighbours.iter().map(|other| (other.id, other.law)).collect();
+        let model = agent.model();
+        let Some(member) = agent.member() else { return Err(StepError::Alone { model }) };
+        let id = context.me;
+        let mut list = vec![Participant { id, member, context, laws: &laws, memory, parts: 1, grips }];
+        let sides = &mut [Some(pairs)];
+        let dt_s = dt.as_secs_f64();
+        remotes.join(&mut list, sides, stepper, MacroStep { dt_s, parts: 1 });
+        if let PairLaw::Penalty { stiffness_n_m, damping_n_s_m, extrapolate } = law {
+            // velocities and skin are those of its last step
+            let penalty = Penalty { stiffness_n_m, damping_n_s_m, extrapolate, dt_s };
+            for other in context.neighbours {
+                overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
+            }
+        }
+        let made = stepper.step(scene, &mut list, dt)?.dt;
+        part(&list, sides, stepper, made.as_secs_f64());
+        Ok(made)
+    }
+}
+
+/// What an agent sees, and the law of its pairs.
+#[derive(Clone, Copy)]
+struct Around<'a> {
+    context: StepContext<'a>,
+    law: PairLaw,
 }

@@ -3,11 +3,11 @@
 //! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent reports it at its
 //! own time, and energy and momentum at a common time. Never here: which bodies, which claims.
 
-use super::bench::{Faults, StepHarness};
+use super::bench::{Faults, PairLaw, StepHarness, Weight};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
+use metachron_contact::Link;
 use metachron_contact::audit::{Audit, audit, in_flight, settled};
-use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
 use metachron_geometry::{PlacedShape, ShapePose};
@@ -34,14 +34,16 @@ struct Solid {
 
 impl Play {
     /// An empty stage; all pairs touch by `law`.
-    pub(super) fn new(law: Law, faults: Faults) -> Self {
+    pub(super) fn new(law: PairLaw, faults: Faults) -> Self {
         Self { stage: StepHarness::new(law, faults), solids: Vec::new(), links: Vec::new() }
     }
 
     /// Adds a rigid body that fixed springs pull; `None` where the body cannot be built.
     pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<AnchorSpring>) -> Option<AgentId> {
         let (mass_kg, gravity) = (spec.mass_kg, spec.gravity);
-        let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz, [0.0; 2]);
+        self.stage.surround(&spec.obstacles)?;
+        let weight = Weight { gravity, ..Weight::default() };
+        let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz, weight);
         self.stage.attach_springs(id, springs.clone());
         self.solids.push(Solid { mass_kg, gravity, springs });
         Some(id)
@@ -49,8 +51,10 @@ impl Play {
 
     /// Adds a tube; `None` where it cannot be built.
     pub(super) fn add_tube(&mut self, spec: TubeSpec, rate_hz: f64) -> Option<AgentId> {
-        let weight = [spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m];
+        self.stage.surround(&spec.obstacles)?;
         let gravity = spec.gravity;
+        let (mass_per_length_kg_m, rotary_kg_m) = (spec.section.mass_per_length_kg_m, spec.section.rotary_kg_m);
+        let weight = Weight { mass_per_length_kg_m, rotary_kg_m, gravity };
         let id = self.stage.add(Box::new(Tube::new(spec).ok()?), rate_hz, weight);
         self.solids.push(Solid { mass_kg: 0.0, gravity, springs: Vec::new() });
         Some(id)
@@ -64,7 +68,6 @@ impl Play {
 
     /// Plays up to `seconds` and calls `go_on` with the agent after every step; `false` ends the run, and so does a failed step.
     pub(super) fn run(mut self, seconds: f64, mut go_on: impl FnMut(&Self, AgentId) -> bool) -> Self {
-        self.stage.start();
         while let Some(id) = self.stage.next(seconds) {
             if self.stage.step(id).is_err() || !go_on(&self, id) {
                 break;

@@ -9,6 +9,7 @@ mod energy_bench;
 mod experiment;
 pub(super) mod figure;
 mod lockstep_run;
+mod penalty;
 mod policies;
 pub(super) mod power;
 mod rows;

@@ -2,7 +2,7 @@
 //!
 //! In: the two rates. Out: agents in contact. Never here: measurements.
 
-use super::bench::Faults;
+use super::bench::{Faults, PairLaw};
 use super::energy_bench::Play;
 use super::stability::common::{GRAVITY, TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
@@ -59,7 +59,7 @@ fn tube(path_m: Vec<DVec3>) -> TubeSpec {
 
 /// A tube falls a centimetre onto a bar that rests freely on the floor, and bends over it.
 fn tube_on_bar([tube_hz, bar_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(Law::Ledger, faults);
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
     let half = DVec3::new(0.04, 0.15, 0.1);
     let height = 2.0 * half.z + TUBE_RADIUS_M;
     let x = 0.2;
@@ -80,7 +80,7 @@ fn tube_on_bar([tube_hz, bar_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
 
 /// Two fingers on springs press a tube from both sides and hold it against its weight.
 fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(Law::Ledger, faults);
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
     let y = 0.1;
     let path_m = vec![DVec3::new(0.0, -y, 0.0), DVec3::new(0.0, y, 0.0)];
     let hose = play.add_tube(TubeSpec { friction: 0.8, ..tube(path_m) }, tube_hz)?;
@@ -113,7 +113,7 @@ fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
 
 /// A tube clamped at one end swings down two centimetres onto another that is clamped at both.
 fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(Law::Ledger, faults);
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
     let half = 0.2;
     let lower = vec![DVec3::X * -half, DVec3::X * half];
     let lower = play.add_tube(TubeSpec { clamp: [true; 2], ..tube(lower) }, lower_hz)?;
@@ -128,7 +128,7 @@ fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
 
 /// A ball falls a centimetre onto a box that rests freely on the floor, and stays there.
 fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(Law::Ledger, faults);
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
     let (half, radius_m, fall_m) = (0.1, 0.05, 0.01);
     let plain = |solid: Solid, height: f64, mass_kg: f64| {
         let plain = plain_body(solid, DVec3::Z * height, mass_kg);
@@ -144,7 +144,7 @@ fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
 
 /// Two balls collide off-centre, with friction.
 fn oblique_blow(rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(Law::Ledger, faults);
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
     let ball = |at: DVec3, velocity: DVec3, mass: f64| RigidSpec {
         velocity,
         friction: 0.3,

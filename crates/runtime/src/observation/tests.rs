@@ -110,7 +110,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
         stiffness_n_m: 10.0,
         damping_n_s_m: 0.0,
         rest_m: 0.0,
-        law: Law::Ledger,
+        law: Law::Cluster,
     };
     spawns[1].attached = vec![link];
     let mut run = assemble(spawns).unwrap();
@@ -120,7 +120,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
         let met = actor.observer.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
         (met.collect::<Vec<_>>(), actor.links.clone())
     };
-    let ledger = Law::Ledger;
+    let ledger = Law::Cluster;
     assert_eq!(seen(0), (vec![(1, ledger, true), (2, penalty, true), (3, ledger, true)], vec![]));
     assert_eq!(seen(1), (vec![(3, ledger, true), (0, ledger, true)], vec![link]), "links come first");
     assert_eq!(seen(2), (vec![(0, penalty, true), (3, ledger, true)], vec![]));

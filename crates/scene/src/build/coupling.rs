@@ -1,5 +1,4 @@
-//! Reads the couplings of a scene file: pairs that act on each other otherwise than as one problem with all they touch, which is the
-//! default.
+//! Reads the couplings of a scene file: pairs that act on each other otherwise than as one problem, which is the default.
 //!
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
@@ -57,8 +56,17 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     let before = c.count();
-    let law = law(c, place, file)?;
+    let soft = [a, b].into_iter().any(|end| matches!(end, NamedObject::Soft(_)));
+    if soft && file.law == Some(CouplingLaw::Tlm) {
+        c.wrong(place, "law", "is `tlm`, which sheets, solids and ropes do not support", "expected `ledger` or `off`");
+    }
+    if let Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) = file.law {
+        let what = format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name());
+        c.wrong(place, "law", what, "expected `ledger`, `tlm` or `off`, or no law: all that touch is one problem");
+        return None;
+    }
     check_keys(c, place, file);
+    let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
         Kind::Attach => attach(c, place, file, [a, b], objects),
@@ -66,7 +74,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     if c.count() > before {
         return None;
     }
-    Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law })
+    Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law: law? })
 }
 
 /// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
@@ -94,13 +102,18 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
 /// Reports keys that have no meaning for this kind and law, and required keys that are missing.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     let attach = file.kind.unwrap_or_default() == Kind::Attach;
-    let what = if attach { "an attachment" } else { "contact" };
+    let spring = attach || file.law == Some(CouplingLaw::Tlm);
+    let what = match file.law {
+        _ if attach => "an attachment".to_owned(),
+        Some(law) => format!("contact by `{}`", law.name()),
+        None => "contact".to_owned(),
+    };
     for (key, given, belongs, needed) in [
         ("at_a", file.at_a.is_some(), attach, attach),
         ("at_b", file.at_b.is_some(), attach, attach),
         ("rest_m", file.rest_m.is_some(), attach, false),
-        ("stiffness_n_m", file.stiffness_n_m.is_some(), attach, attach),
-        ("damping_n_s_m", file.damping_n_s_m.is_some(), attach, false),
+        ("stiffness_n_m", file.stiffness_n_m.is_some(), spring, spring),
+        ("damping_n_s_m", file.damping_n_s_m.is_some(), spring, false),
     ] {
         if given && !belongs {
             c.wrong(place, key, format_args!("does not belong to {what}"), "expected no such key here");
@@ -110,22 +123,21 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
         }
     }
     if attach && file.law == Some(CouplingLaw::Off) {
-        c.wrong(place, "law", "is `off`, which attaches nothing", "expected no law, or no such coupling");
+        c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
     }
 }
 
-/// The law of the pair; refuses those of pairs whose sides keep clocks of their own.
 fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<Law> {
-    let what = match file.law {
-        None => return Some(Law::Ledger),
-        Some(CouplingLaw::Off) => return Some(Law::Off),
-        Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) => {
-            format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name())
+    match file.law {
+        None => Some(Law::Cluster),
+        Some(CouplingLaw::Off) => Some(Law::Off),
+        Some(CouplingLaw::Tlm) => {
+            let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
+            Some(Law::Tlm { stiffness_n_m, damping_n_s_m })
         }
-        Some(law) => format!("is `{}`: pairs that keep clocks of their own are not stepped in clusters", law.name()),
-    };
-    c.wrong(place, "law", what, "expected `off`, or no law: all that touch is solved as one problem");
-    None
+        // penalties are refused before
+        Some(CouplingLaw::Ledger | CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) => Some(Law::Ledger),
+    }
 }
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {

@@ -44,13 +44,14 @@ pub enum CouplingKind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CouplingLaw {
-    /// Asynchronous; refused in this version.
+    /// Asynchronous: the object with the shorter wanted step, at equal steps the first of the file, computes every impulse; the other takes
+    /// it in its next step from a ledger. Momentum is conserved for any clocks.
     Ledger,
     /// Refused: penalty laws stay in the laboratory.
     Penalty,
     /// Refused: penalty laws stay in the laboratory.
     PenaltyExtrapolated,
-    /// Asynchronous; refused in this version.
+    /// Asynchronous by transmission line modelling: passive for any delay, at the cost of a parasitic mass.
     Tlm,
     /// No interaction: the two pass through each other.
     Off,

@@ -190,7 +190,7 @@ proptest! {
                 foot_on(a).distance(at(vertex)).total_cmp(&foot_on(b).distance(at(vertex)))
             });
             // a vertex reports its nearest place
-            for triangle in nearest {
+            if let Some(triangle) = nearest {
                 let corners = triangle.map(at);
                 let foot = foot_on(triangle);
                 let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();

@@ -2,7 +2,7 @@
 //!
 //! In: the system, the shift of its rates, a seed. Out: the agents. Never here: measurements.
 
-use super::super::bench::Faults;
+use super::super::bench::{Faults, PairLaw};
 use super::super::energy_bench::Play;
 use super::common::{TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::DVec3;
@@ -43,7 +43,7 @@ pub(super) fn system(name: &str, turn: usize, seed: u64) -> Option<(Play, [Agent
 
 /// Plate, tube, ball, tube, plate along x; the ball flies, the plates approach, the tubes are hit.
 fn colliding_row(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
-    let mut play = Play::new(Law::Ledger, Faults::default());
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
     let sway = |k: u64| libm::sin((31 * seed + 7 * k) as f64) * SWAY_M_S;
     let body = |solid: Solid, at: DVec3, mass_kg: f64, velocity: DVec3| RigidSpec {
@@ -73,7 +73,7 @@ fn colliding_row(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
 
 /// Five agents in a ring, each on a spring to the next: ball, tube, ball, tube, ball; the balls fly inwards.
 fn ring(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
-    let mut play = Play::new(Law::Ledger, Faults::default());
+    let mut play = Play::new(PairLaw::Product(Law::Ledger), Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / 5.0;
     let at = |i: usize| DVec3::new(libm::cos(angle(i)), libm::sin(angle(i)), 0.1 * (i as f64 - 2.0)) * RING_M;

@@ -3,7 +3,7 @@
 //! 50 g fall 5 cm onto 100 g on springs of 500 N/m. The mounted body keeps 1 kHz; the other is slow, its steps have jitter, and
 //! some of its states are lost. In 1d two balls; in 3d a tilted box that turns and slides lands on a plate with friction.
 
-use super::super::bench::Faults;
+use super::super::bench::{Faults, PairLaw};
 use super::super::energy_bench::{ContactImpulse, Play};
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -211,14 +211,14 @@ impl Fall {
 }
 
 /// The law with a name.
-pub(super) fn law(name: &str, stiffness_n_m: f64, damping_ratio: f64) -> Law {
+pub(super) fn law(name: &str, stiffness_n_m: f64, damping_ratio: f64) -> PairLaw {
     let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
     let damping_n_s_m = 2.0 * damping_ratio * (stiffness_n_m * reduced_kg).sqrt();
     match name {
-        "penalty" => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: false },
-        "penalty-extrapolated" => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: true },
-        "tlm" => Law::Tlm { stiffness_n_m, damping_n_s_m },
-        _ => Law::Ledger,
+        "penalty" => PairLaw::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: false },
+        "penalty-extrapolated" => PairLaw::Penalty { stiffness_n_m, damping_n_s_m, extrapolate: true },
+        "tlm" => PairLaw::Product(Law::Tlm { stiffness_n_m, damping_n_s_m }),
+        _ => PairLaw::Product(Law::Ledger),
     }
 }
 
@@ -245,7 +245,7 @@ fn mount(at: DVec3, count: f64) -> AnchorSpring {
 }
 
 /// Builds the two bodies, one `fall_m` above the other.
-pub(super) fn pair(space: &str, law: Law, rate_hz: f64, faults: Faults, fall_m: f64) -> Option<Pair> {
+pub(super) fn pair(space: &str, law: PairLaw, rate_hz: f64, faults: Faults, fall_m: f64) -> Option<Pair> {
     let mut play = Play::new(law, faults);
     let gravity = DVec3::NEG_Z * GRAVITY;
     let body = |solid: Solid, height_m: f64, mass: f64, friction: f64| RigidSpec {

@@ -1,4 +1,4 @@
-//! Two balls with different clocks collide once: against the closed form, through the impulse ledger and not in one island.
+//! Two balls with different clocks collide once: against the closed form, through the impulse ledger and not in one cluster.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -6,14 +6,17 @@ use super::super::lockstep_run::{LockstepRun, members};
 use super::super::table::Table;
 use super::common::plain_body;
 use glam::DVec3;
+use metachron_contact::Law;
 use metachron_contact::audit::settled;
-use metachron_core::PairKind;
+use metachron_contact::stepper::ClusterScene;
+use metachron_core::{AgentId, PairKind};
 use metachron_core::{SimSpan, SimTime};
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_runtime::AgentSpawn;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// The experiment.
 pub(in super::super) struct Impact;
@@ -53,7 +56,7 @@ pub(in super::super) struct Row {
     kind: String,
     steps_hitting: u64,
     steps_hit: u64,
-    /// Whether one of them was led by the other, in an island, at the end.
+    /// Whether one of them was led by the other, in one cluster, at the end.
     led: bool,
 }
 
@@ -152,7 +155,7 @@ impl Experiment for Impact {
                 worst(rows.iter().map(|r| r.error)),
                 TOLERANCE,
             ),
-            Finding::at_most("pairs not coupled by the ledger, or stepped in one island", other as f64, 0.0),
+            Finding::at_most("pairs not coupled by the ledger, or stepped in one cluster", other as f64, 0.0),
         ]
     }
 }
@@ -181,10 +184,14 @@ fn collide(case: &Case) -> Option<ImpactResult> {
     let far = GAP_M + 2.0 * RADIUS_M;
     let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
     let [rate_hitting, rate_hit] = case.rates_hz;
-    let spawns = vec![
-        AgentSpawn::alone("hitting", Box::new(hitting), rate_hitting),
-        AgentSpawn::alone("hit", Box::new(hit), rate_hit),
-    ];
+    let among = Arc::new(ClusterScene::default());
+    let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn {
+        clusters: Some(Arc::clone(&among)),
+        ..AgentSpawn::alone(name, Box::new(ball), rate_hz)
+    };
+    let mut hitting = alone("hitting", hitting, rate_hitting);
+    hitting.laws = vec![(AgentId(1), Law::Ledger)];
+    let spawns = vec![hitting, alone("hit", hit, rate_hit)];
     let mut run = LockstepRun::start(spawns).ok()?;
     run.run_to(SECONDS);
     let snapshots = run.snapshots();
