@@ -18,7 +18,7 @@ pub fn random_case(seed: u64) -> Case {
         let sides = random_sides(&mut numbers, &bodies);
         let compliance_per_kg = Some(10.0_f64.powf(numbers.between(-5.0, -1.0)));
         let target_m_s = numbers.vector() * 0.1;
-        JointRow { target_m_s, compliance_per_kg, ..JointRow::new(0, sides, Hold::ALL) }
+        JointRow { target_m_s, compliance_per_kg, ..JointRow::new(sides, Hold::ALL) }
     });
     let rows = rows.collect();
     Case { h_s, bodies, contacts, rows }
