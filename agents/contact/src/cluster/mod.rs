@@ -59,6 +59,7 @@ mod rows;
 mod scale;
 mod shifts;
 mod side;
+mod skew;
 mod solver;
 mod system;
 mod tiles;

@@ -1,9 +1,12 @@
 //! Dense kernels of a factor, over tiles of 4 × 4 numbers.
 //!
 //! In: columns of a front that are to be eliminated, and room for what they leave. Out: their factor and that rest. Never here: where
-//! numbers come from. Plain loops over tiles of fixed size, which compile to vector instructions and sum in one order everywhere.
+//! numbers come from. Plain loops over tiles of fixed size, compiled for the widest vectors that a processor has. Products and sums are
+//! rounded one by one and in one order whatever the width, so the bits are the same everywhere.
 //!
 //! Rows come in chunks of four; a chunk has its columns one after the other. Numbers that fill a chunk up are those of the identity.
+
+use fearless_simd::{Level, dispatch};
 
 /// Rows and columns of a tile.
 pub(super) const TILE: usize = 4;
@@ -26,7 +29,12 @@ pub(super) fn filled(size: usize) -> usize {
 ///
 /// # Errors
 /// The column at which the matrix is not positive definite.
-pub(super) fn eliminate(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+pub(super) fn eliminate(level: Level, lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+    dispatch!(level, _ => eliminate_by(lower, update, columns))
+}
+
+#[inline(always)]
+fn eliminate_by(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
     let tiles = columns / TILE;
     if tiles == 0 {
         return Ok(());
@@ -86,6 +94,7 @@ fn divide(tile: &mut Tile, inverse: &Tile) {
 }
 
 /// A symmetric tile, of which the lower half is read, becomes the inverse of its lower Cholesky factor.
+#[inline(always)]
 fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
     let mut l = [0.0; TILE_SIZE];
     let at = |row: usize, column: usize| TILE * column + row;
@@ -113,6 +122,7 @@ fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
 }
 
 /// x ← L⁻¹ x of the square, and what it takes from the rows below.
+#[inline(always)]
 pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
     for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate() {
         let own = row * TILE < columns;
@@ -135,6 +145,7 @@ pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
 }
 
 /// x ← L⁻ᵀ x of the square, the rows below being known.
+#[inline(always)]
 pub(super) fn solve_up(lower: &[f64], columns: usize, x: &mut [f64]) {
     for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate().rev() {
         let own = row * TILE < columns;

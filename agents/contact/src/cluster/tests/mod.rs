@@ -9,6 +9,7 @@ mod promises;
 mod random;
 mod rebounds;
 mod scenes;
+mod sliding;
 mod slow;
 
 use super::{Block, Contact, JointRow, Member, Problem, Side, SideTerm};
