@@ -135,7 +135,7 @@ impl Ties {
             let row = JointRow {
                 target_m_s: line.target_m_s,
                 compliance_per_kg: Some((step.h_s * line.resistance_n_s_m).recip()),
-                ..JointRow::new(0, sides, line.hold)
+                ..JointRow::new(sides, line.hold)
             };
             let owner =
                 RowOwner { member: line.member, other: None, partner: Partner::Line(number), key: 0, hold: None };
