@@ -190,8 +190,13 @@ impl StepHarness {
         let time = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
         let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
-        let context = StepContext { me, time, neighbours: &neighbours, hands, links };
-        let dt = cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, dt)?;
+        // a blow ends a macro step where it happens: the rest of the step follows
+        let end = time + dt;
+        let mut now = time;
+        while now < end {
+            let context = StepContext { me, time: now, neighbours: &neighbours, hands, links };
+            now += cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, end.since(now))?;
+        }
         actor.last_s = dt.as_secs_f64();
         own.clear();
         agent.write_snapshot(own);
