@@ -1,198 +1,190 @@
-//! Agents stepped in turn without a runtime: a coupling law is measured alone, without islands and without threads.
+//! Agents stepped as one cluster without a runtime: contact and steps are measured alone, without clocks and threads.
 //!
-//! In: agents, their rates, laws, springs and faults. Out: the last published state of each, and sums at a common time. The agent
-//! with the earliest time steps next, among equals the lower number; its state is visible immediately, stamped with the end of
-//! its step, as in a run whose steps cost nothing, or only when that time has come. Never here: measurements.
+//! In: agents, their rates and springs, static solids. Out: the state of each after every macro step, and what pairs gave each other.
+//! Never here: measurements.
 
-use metachron_contact::audit::Member;
+use glam::DVec3;
+use metachron_contact::stepper::{
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
+};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_contact::{Law, Link, OwnershipTraits, keep_step, owns};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
-use metachron_geometry::CollisionShape;
-use std::sync::Arc;
+use metachron_core::{AgentId, Grip, SimSpan, SimTime, Snapshot, StepError, recycled};
+use metachron_geometry::Obstacle;
 
-/// Deliberate faults.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Faults {
-    /// Each step is longer or shorter by up to this share.
-    pub(super) jitter: f64,
-    /// The share of states that never become visible.
-    pub(super) loss: f64,
-    /// Equal seeds disturb equally.
-    pub(super) seed: u64,
-    /// Whether a state becomes visible only when its time has come: as where a step takes as long as the time that it covers.
-    pub(super) due: bool,
-}
-
-/// Agents that see each other.
+/// Agents of one cluster.
 pub(super) struct StepHarness {
     actors: Vec<Actor>,
-    law: Law,
-    faults: Faults,
-    noise: u64,
+    scene: ClusterScene,
+    stepper: ClusterStepper,
+    time: SimTime,
+    report: ClusterReport,
+    /// The impulses of all contacts so far, magnitudes summed, N·s.
+    impulse_n_s: f64,
+    /// Storage, empty between steps.
+    participants: Vec<Participant<'static>>,
 }
 
 /// An agent in the harness.
 struct Actor {
     agent: Box<dyn Agent>,
-    form: Option<Arc<CollisionShape>>,
-    rate_hz: f64,
-    /// Its newest state, visible to others or not.
+    step_s: f64,
     own: Snapshot,
-    /// The state visible to others, and the one visible before.
-    shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
     hands: Vec<AnchorSpring>,
-    links: Vec<Link>,
-    /// Mass per length and rotary inertia of a tube.
-    weight: [f64; 2],
-    /// Length of its last step, seconds.
-    last_s: f64,
+    /// What it sees that is not in the harness.
+    neighbours: Vec<Neighbour>,
+    memory: ContactMemory,
+    grips: Vec<Grip>,
+}
+
+/// What the pairs of the last macro step were.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PairSums {
+    /// The deepest overlap, metres.
+    pub(super) depth_m: f64,
+    pub(super) contacts: u32,
 }
 
 impl StepHarness {
-    /// An empty harness whose pairs all touch by `law`.
-    pub(super) fn new(law: Law, faults: Faults) -> Self {
-        Self { actors: Vec::new(), law, faults, noise: faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1 }
+    /// An empty harness among static solids; `None` where one of these is invalid.
+    pub(super) fn among(obstacles: &[Obstacle]) -> Option<Self> {
+        Some(Self {
+            actors: Vec::new(),
+            scene: ClusterScene::new(obstacles).ok()?,
+            stepper: ClusterStepper::default(),
+            time: SimTime::ZERO,
+            report: ClusterReport::default(),
+            impulse_n_s: 0.0,
+            participants: Vec::new(),
+        })
     }
 
-    /// Adds an agent that steps `rate_hz` times a second; `weight`: for a tube its mass per length and rotary inertia.
-    pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: [f64; 2]) -> AgentId {
+    /// Adds an agent that wants to step `rate_hz` times a second; `None` for one that is no member of clusters.
+    pub(super) fn add(&mut self, mut agent: Box<dyn Agent>, rate_hz: f64) -> Option<AgentId> {
+        agent.member()?;
         let mut own = Snapshot::default();
         agent.write_snapshot(&mut own);
-        let (form, first) = (agent.form(), Arc::new(own.clone()));
-        let shown = [first.clone(), first];
         self.actors.push(Actor {
             agent,
-            form,
-            rate_hz,
+            step_s: 1.0 / rate_hz,
             own,
-            shown,
             hands: Vec::new(),
-            links: Vec::new(),
-            weight,
-            last_s: 0.0,
+            neighbours: Vec::new(),
+            memory: ContactMemory::default(),
+            grips: Vec::new(),
         });
-        AgentId(self.actors.len() as u32 - 1)
+        Some(AgentId(self.actors.len() as u32 - 1))
     }
 
-    /// Attaches fixed springs to an agent.
-    pub(super) fn attach_springs(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
-        self.actors[id.0 as usize].hands = hands;
+    /// Attaches fixed springs to an agent, instead of those it had.
+    pub(super) fn attach_springs(&mut self, id: AgentId, hands: impl IntoIterator<Item = AnchorSpring>) {
+        let actor = &mut self.actors[id.0 as usize];
+        actor.hands.clear();
+        actor.hands.extend(hands);
     }
 
-    /// An agent's own newest state, visible to others or not.
+    /// What an agent sees that is not in the harness.
+    pub(super) fn set_neighbours(&mut self, id: AgentId, neighbours: Vec<Neighbour>) {
+        self.actors[id.0 as usize].neighbours = neighbours;
+    }
+
+    /// Changes the step that an agent wants, seconds.
+    pub(super) fn set_step(&mut self, id: AgentId, step_s: f64) {
+        self.actors[id.0 as usize].step_s = step_s;
+    }
+
+    /// An agent's newest state.
     pub(super) fn own(&self, id: AgentId) -> &Snapshot {
         &self.actors[id.0 as usize].own
     }
 
-    /// Length of an agent's last step, seconds.
-    pub(super) fn last_s(&self, id: AgentId) -> f64 {
-        self.actors[id.0 as usize].last_s
+    /// The newest states of all agents.
+    pub(super) fn snapshots(&self) -> impl Iterator<Item = &Snapshot> {
+        self.actors.iter().map(|actor| &actor.own)
     }
 
-    /// Links `of` to the link's other end; both agents have the link.
-    pub(super) fn link(&mut self, of: AgentId, link: Link) {
-        self.actors[of.0 as usize].links.push(link);
-        let back = Link { other: of, here: link.there, there: link.here, ..link };
-        self.actors[link.other.0 as usize].links.push(back);
+    /// The time of all agents.
+    pub(super) const fn time(&self) -> SimTime {
+        self.time
     }
 
-    /// The shape of an agent.
-    pub(super) fn form(&self, id: AgentId) -> Option<&Arc<CollisionShape>> {
-        self.actors[id.0 as usize].form.as_ref()
+    /// Linear momentum of all agents, N·s.
+    pub(super) fn momentum_n_s(&self) -> DVec3 {
+        self.actors.iter().map(|actor| actor.agent.momentum().0).sum()
     }
 
-    /// The newest own states of all agents, for an audit.
-    pub(super) fn members(&self) -> Vec<Member<'_>> {
-        let all = (0..).map(AgentId).zip(&self.actors);
-        all.map(|(id, actor)| Member {
-            id,
-            snapshot: &actor.own,
-            mass_per_length_kg_m: actor.weight[0],
-            rotary_kg_m: actor.weight[1],
+    /// The impulses of all contacts so far, magnitudes summed over pairs and macro steps, N·s.
+    pub(super) const fn impulse_n_s(&self) -> f64 {
+        self.impulse_n_s
+    }
+
+    /// How the last macro step was made.
+    pub(super) const fn report(&self) -> &ClusterReport {
+        &self.report
+    }
+
+    /// What the pairs of agents were in the last macro step.
+    pub(super) fn pairs(&self) -> PairSums {
+        let between = self.stepper.totals().iter().filter(|total| matches!(total.partner, Partner::Agent(_)));
+        between.fold(PairSums::default(), |sum, total| PairSums {
+            depth_m: sum.depth_m.max(total.depth_m),
+            contacts: sum.contacts + total.contacts,
         })
-        .collect()
     }
 
-    /// The agent that steps next; `None` where all have reached `seconds`.
-    pub(super) fn next(&self, seconds: f64) -> Option<AgentId> {
-        let first = (0..).zip(&self.actors).min_by_key(|(id, actor)| (actor.own.time, *id));
-        first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
-    }
-
-    /// Lets every agent look around before the first step.
-    pub(super) fn start(&mut self) {
-        for i in 0..self.actors.len() {
-            let me = AgentId(i as u32);
-            let neighbours = self.neighbours_of(i);
-            let actor = &mut self.actors[i];
-            let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-            let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
-            actor.agent.observe(dt, &StepContext { me, time, neighbours: &neighbours, hands, links });
-            actor.agent.write_snapshot(&mut actor.own);
-            let shown = Arc::new(actor.own.clone());
-            actor.shown = [Arc::clone(&shown), shown];
-        }
-    }
-
-    /// Makes a step of an agent.
+    /// Makes macro steps up to `seconds`.
     ///
     /// # Errors
-    /// A step that the agent refuses.
-    pub(super) fn step(&mut self, me: AgentId) -> Result<(), StepError> {
-        let i = me.0 as usize;
-        let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
-        let lost = self.random() < self.faults.loss;
-        let neighbours = self.neighbours_of(i);
-        let actor = &mut self.actors[i];
-        let time: SimTime = actor.own.time;
-        let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let context = StepContext { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
-        let wanted = dt;
-        let dt = actor.agent.longest_step(wanted, &context);
-        actor.agent.step(dt, &context)?;
-        actor.last_s = dt.as_secs_f64();
-        actor.agent.write_snapshot(&mut actor.own);
-        (actor.own.time, actor.own.shortened_step) = (time + dt, (dt < wanted).then_some(dt));
-        if !lost {
-            actor.shown.swap(0, 1);
-            actor.shown[0] = Arc::new(actor.own.clone());
+    /// A step that a member refuses.
+    pub(super) fn run_to(&mut self, seconds: f64) -> Result<(), StepError> {
+        let end = SimTime::ZERO + SimSpan::from_secs_f64(seconds).unwrap_or(SimSpan::ZERO);
+        while self.time < end {
+            self.step_at_most(end.since(self.time))?;
         }
         Ok(())
     }
 
-    /// All other agents as neighbours of one.
-    fn neighbours_of(&self, me: usize) -> Vec<Neighbour> {
-        (0..self.actors.len()).filter(|&other| other != me).map(|other| self.neighbour_of(me, other)).collect()
+    /// Makes a macro step as long as its members want.
+    ///
+    /// # Errors
+    /// A step that a member refuses.
+    pub(super) fn step(&mut self) -> Result<(), StepError> {
+        self.step_at_most(SimSpan::from_nanos(u64::MAX))
     }
 
-    /// Another agent as a neighbour of one.
-    fn neighbour_of(&self, me: usize, other: usize) -> Neighbour {
-        let standing = |i: usize| {
-            let actor = &self.actors[i];
-            OwnershipTraits::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())
-        };
-        let (actor, now) = (&self.actors[other], self.actors[me].own.time);
-        let early = self.faults.due && actor.shown[0].time > now;
-        let snapshot = &actor.shown[usize::from(early)];
-        let linked = actor.links.iter().any(|link| link.other == AgentId(me as u32) && link.law == Law::Ledger);
-        Neighbour {
-            id: AgentId(other as u32),
-            step_s: snapshot.step_s(1.0 / actor.rate_hz),
-            snapshot: Arc::clone(snapshot),
-            form: actor.form.clone(),
-            law: self.law,
-            owned: owns(standing(me), standing(other), linked),
-            in_step: keep_step(standing(me), standing(other), linked),
+    /// Makes a macro step of at most this length.
+    fn step_at_most(&mut self, most: SimSpan) -> Result<(), StepError> {
+        let Self { actors, scene, stepper, time, participants, .. } = self;
+        let mut roles = Vec::with_capacity(actors.len());
+        for actor in actors.iter_mut() {
+            roles.extend(actor.agent.member().map(|member| (member.role(), actor.step_s)));
         }
-    }
-
-    /// A number in 0 … 1, the same on every run.
-    fn random(&mut self) -> f64 {
-        self.noise ^= self.noise << 13;
-        self.noise ^= self.noise >> 7;
-        self.noise ^= self.noise << 17;
-        (self.noise >> 11) as f64 / (1_u64 << 53) as f64
+        let plan = Plan::of(roles.iter().copied());
+        let dt = SimSpan::from_secs_f64(plan.macro_s).map_or(most, |dt| dt.min(most));
+        let mut all = recycled(std::mem::take(participants));
+        for ((id, actor), (role, step_s)) in (0..).map(AgentId).zip(actors.iter_mut()).zip(roles) {
+            let Actor { agent, hands, neighbours, memory, grips, .. } = actor;
+            let context = StepContext { me: id, time: *time, neighbours, hands, links: &[] };
+            let parts = plan.parts_in(role, step_s);
+            all.extend(agent.member().map(|member| Participant {
+                id,
+                member,
+                context,
+                laws: &[],
+                memory,
+                parts,
+                grips,
+            }));
+        }
+        let outcome = stepper.step(scene, &mut all, dt);
+        *participants = recycled(all);
+        self.report = outcome?;
+        self.time += self.report.dt;
+        self.impulse_n_s += self.stepper.totals().iter().map(|total| total.impulse_n_s.length()).sum::<f64>();
+        for actor in &mut self.actors {
+            actor.agent.write_snapshot(&mut actor.own);
+            actor.own.time = self.time;
+        }
+        Ok(())
     }
 }

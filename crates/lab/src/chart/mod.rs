@@ -73,15 +73,11 @@ const fn entry<E: Experiment>() -> Entry {
 }
 
 const STABILITY: &[Entry] = &[
-    entry::<stability::drop::Drop>(),
-    entry::<stability::penalty_limit::PenaltyLimit>(),
     entry::<stability::pairs::Pairs>(),
     entry::<stability::heavy::Heavy>(),
-    entry::<stability::closed::Closed>(),
     entry::<stability::tube_map::TubeMap>(),
     entry::<stability::capstan::Capstan>(),
     entry::<stability::incline::Incline>(),
-    entry::<stability::impact::Impact>(),
 ];
 
 const ACCURACY: &[Entry] = &[
