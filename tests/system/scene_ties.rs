@@ -233,8 +233,7 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(r#"a = "left", b = "post""#, "\"post\"", &["which is fixed"]);
     coupling_refused(r#"a = "ghost", b = "left""#, "\"ghost\"", &["without a body"]);
     coupling_refused(&format!(r#"{pair}, law = "spring""#), "\"spring\"", &["`ledger`", "`tlm`"]);
-    coupling_refused(&format!(r#"{pair}, stiffness_n_m = 5"#), "5", &["does not belong to contact by `ledger`"]);
-    coupling_refused(&format!(r#"{pair}, law = "tlm", stiffness_n_m = -5"#), "-5", &["`stiffness_n_m`", "N/m"]);
+    coupling_refused(&format!(r#"{pair}, stiffness_n_m = 5"#), "5", &["does not belong to contact"]);
     coupling_refused(&format!(r#"{pair}, at_a = 0.5"#), "0.5", &["`at_a`", "does not belong"]);
     let attach = r#"a = "hose", b = "left", kind = "attach", stiffness_n_m = 5"#;
     coupling_refused(&format!("{attach}, at_a = 1.5, at_b = [0, 0, 0]"), "1.5", &["from 0 to 1"]);
@@ -242,13 +241,12 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(&format!("{attach}, at_a = 0.5, at_b = 0.5"), "0.5", &["[x, y, z]"]);
     coupling_refused(&format!("{attach}, at_a = \"end\", at_b = [0, 0, 0]"), "\"end\"", &["a number from 0 to 1"]);
     coupling_refused(&format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"off\""), "\"off\"", &["attaches nothing"]);
-    coupling_refused(
-        &format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"penalty\""),
-        "\"penalty\"",
-        &["a law of contacts"],
-    );
-    let tlm = format!(r#"{pair}, law = "tlm""#);
-    coupling_refused(&tlm, &format!("{{ {tlm} }}"), &["`stiffness_n_m`", "is missing"]);
+    for law in ["penalty", "penalty-extrapolated"] {
+        coupling_refused(&format!(r#"{pair}, law = "{law}""#), &format!("\"{law}\""), &["stay in the laboratory"]);
+    }
+    for law in ["ledger", "tlm"] {
+        coupling_refused(&format!(r#"{pair}, law = "{law}""#), &format!("\"{law}\""), &["clocks of their own"]);
+    }
     let twice = format!("coupling = [\n{{ {pair}, law = \"off\" }},\n{{ a = \"right\", b = \"left\" }},\n]");
     let (line, text, said) = refusal(&twice);
     assert_eq!((line, text.as_str()), (3, "\"left\""), "{said}");
