@@ -176,7 +176,7 @@ pub enum BenchSubject {
     Rod,
     /// Time to select a level of detail for every object, by policy and number of objects
     Select,
-    /// A thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes
+    /// A thousand boxes as agents that step in clusters while they touch, compared with one rapier3d world of the same boxes
     Pile,
     /// Pictures on this machine's adapter, by triangles, pixels and shading
     Render,

@@ -1,283 +1,190 @@
-//! Agents stepped in turn without a runtime: a coupling law is measured alone, each agent in a cluster of its own, without threads.
+//! Agents stepped as one cluster without a runtime: contact and steps are measured alone, without clocks and threads.
 //!
-//! In: agents, their rates, laws, springs and faults. Out: the last published state of each, and sums at a common time. The agent
-//! with the earliest time steps next, among equals the lower number; its state is visible immediately, stamped with the end of
-//! its step, as in a run whose steps cost nothing, or only when that time has come. Never here: measurements.
+//! In: agents, their rates and springs, static solids. Out: the state of each after every macro step, and what pairs gave each other.
+//! Never here: measurements.
 
-use super::penalty::{Overlaps, Penalty};
 use glam::DVec3;
-use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
-use metachron_contact::audit::Member;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
-use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Body, Grip, SimSpan, Snapshot, StepError};
-use metachron_geometry::{CollisionShape, Obstacle};
-use std::sync::Arc;
+use metachron_contact::stepper::{
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
+};
+use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
+use metachron_core::{AgentId, Grip, SimSpan, SimTime, Snapshot, StepError, recycled};
+use metachron_geometry::Obstacle;
 
-/// The law of all pairs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum PairLaw {
-    /// One of the product's.
-    Product(Law),
-    /// A spring and a damper between newest states.
-    Penalty {
-        /// N/m.
-        stiffness_n_m: f64,
-        /// N·s/m.
-        damping_n_s_m: f64,
-        /// Whether states are brought forward.
-        extrapolate: bool,
-    },
-}
-
-/// Deliberate faults.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Faults {
-    /// Each step is longer or shorter by up to this share.
-    pub(super) jitter: f64,
-    /// The share of states that never become visible.
-    pub(super) loss: f64,
-    /// Equal seeds disturb equally.
-    pub(super) seed: u64,
-    /// Whether a state becomes visible only when its time has come: as where a step takes as long as the time that it covers.
-    pub(super) due: bool,
-}
-
-/// Agents that see each other.
+/// Agents of one cluster.
 pub(super) struct StepHarness {
     actors: Vec<Actor>,
-    law: PairLaw,
-    obstacles: Vec<Obstacle>,
     scene: ClusterScene,
-    faults: Faults,
-    noise: u64,
+    stepper: ClusterStepper,
+    time: SimTime,
+    report: ClusterReport,
+    /// The impulses of all contacts so far, magnitudes summed, N·s.
+    impulse_n_s: f64,
+    /// Storage, empty between steps.
+    participants: Vec<Participant<'static>>,
 }
 
 /// An agent in the harness.
 struct Actor {
     agent: Box<dyn Agent>,
-    form: Option<Arc<CollisionShape>>,
-    rate_hz: f64,
-    /// Its newest state, visible to others or not.
+    step_s: f64,
     own: Snapshot,
-    /// The state visible to others, and the one visible before.
-    shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
     hands: Vec<AnchorSpring>,
-    links: Vec<Link>,
-    /// What an audit needs to know.
-    weight: Weight,
-    /// Length of its last step, seconds.
-    last_s: f64,
-    cluster: Cluster,
-}
-
-/// What an audit needs to know of an agent.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Weight {
-    /// Of a tube, kg/m and kg·m.
-    pub(super) mass_per_length_kg_m: f64,
-    pub(super) rotary_kg_m: f64,
-    /// Of a rigid body, m/s².
-    pub(super) gravity: DVec3,
-}
-
-/// The cluster of an agent alone.
-#[derive(Default)]
-struct Cluster {
+    /// What it sees that is not in the harness.
+    neighbours: Vec<Neighbour>,
     memory: ContactMemory,
     grips: Vec<Grip>,
-    pairs: Pairs,
-    remotes: Remotes,
-    stepper: ClusterStepper,
-    overlaps: Overlaps,
+}
+
+/// What the pairs of the last macro step were.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct PairSums {
+    /// The deepest overlap, metres.
+    pub(super) depth_m: f64,
+    pub(super) contacts: u32,
 }
 
 impl StepHarness {
-    /// An empty harness whose pairs all touch by `law`.
-    pub(super) fn new(law: PairLaw, faults: Faults) -> Self {
-        let noise = faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        Self { actors: Vec::new(), law, obstacles: Vec::new(), scene: ClusterScene::default(), faults, noise }
+    /// An empty harness among static solids; `None` where one of these is invalid.
+    pub(super) fn among(obstacles: &[Obstacle]) -> Option<Self> {
+        Some(Self {
+            actors: Vec::new(),
+            scene: ClusterScene::new(obstacles).ok()?,
+            stepper: ClusterStepper::default(),
+            time: SimTime::ZERO,
+            report: ClusterReport::default(),
+            impulse_n_s: 0.0,
+            participants: Vec::new(),
+        })
     }
 
-    /// Adds solids that never move, unless they are there; `None` where one cannot be built.
-    pub(super) fn surround(&mut self, obstacles: &[Obstacle]) -> Option<()> {
-        for obstacle in obstacles {
-            if self.obstacles.iter().all(|known| known.name != obstacle.name) {
-                self.obstacles.push(obstacle.clone());
-            }
-        }
-        self.scene = ClusterScene::new(&self.obstacles).ok()?;
-        Some(())
-    }
-
-    /// Adds an agent that steps `rate_hz` times a second.
-    pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: Weight) -> AgentId {
+    /// Adds an agent that wants to step `rate_hz` times a second; `None` for one that is no member of clusters.
+    pub(super) fn add(&mut self, mut agent: Box<dyn Agent>, rate_hz: f64) -> Option<AgentId> {
+        agent.member()?;
         let mut own = Snapshot::default();
         agent.write_snapshot(&mut own);
-        let (form, first) = (agent.form(), Arc::new(own.clone()));
-        let shown = [first.clone(), first];
         self.actors.push(Actor {
             agent,
-            form,
-            rate_hz,
+            step_s: 1.0 / rate_hz,
             own,
-            shown,
             hands: Vec::new(),
-            links: Vec::new(),
-            weight,
-            last_s: 0.0,
-            cluster: Cluster::default(),
+            neighbours: Vec::new(),
+            memory: ContactMemory::default(),
+            grips: Vec::new(),
         });
-        AgentId(self.actors.len() as u32 - 1)
+        Some(AgentId(self.actors.len() as u32 - 1))
     }
 
-    /// Attaches fixed springs to an agent.
-    pub(super) fn attach_springs(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
-        self.actors[id.0 as usize].hands = hands;
+    /// Attaches fixed springs to an agent, instead of those it had.
+    pub(super) fn attach_springs(&mut self, id: AgentId, hands: impl IntoIterator<Item = AnchorSpring>) {
+        let actor = &mut self.actors[id.0 as usize];
+        actor.hands.clear();
+        actor.hands.extend(hands);
     }
 
-    /// An agent's own newest state, visible to others or not.
+    /// What an agent sees that is not in the harness.
+    pub(super) fn set_neighbours(&mut self, id: AgentId, neighbours: Vec<Neighbour>) {
+        self.actors[id.0 as usize].neighbours = neighbours;
+    }
+
+    /// Changes the step that an agent wants, seconds.
+    pub(super) fn set_step(&mut self, id: AgentId, step_s: f64) {
+        self.actors[id.0 as usize].step_s = step_s;
+    }
+
+    /// An agent's newest state.
     pub(super) fn own(&self, id: AgentId) -> &Snapshot {
         &self.actors[id.0 as usize].own
     }
 
-    /// Length of an agent's last step, seconds.
-    pub(super) fn last_s(&self, id: AgentId) -> f64 {
-        self.actors[id.0 as usize].last_s
+    /// The newest states of all agents.
+    pub(super) fn snapshots(&self) -> impl Iterator<Item = &Snapshot> {
+        self.actors.iter().map(|actor| &actor.own)
     }
 
-    /// Links `of` to the link's other end; both agents have the link.
-    pub(super) fn link(&mut self, of: AgentId, link: Link) {
-        self.actors[of.0 as usize].links.push(link);
-        let back = Link { other: of, here: link.there, there: link.here, ..link };
-        self.actors[link.other.0 as usize].links.push(back);
+    /// The time of all agents.
+    pub(super) const fn time(&self) -> SimTime {
+        self.time
     }
 
-    /// The shape of an agent.
-    pub(super) fn form(&self, id: AgentId) -> Option<&Arc<CollisionShape>> {
-        self.actors[id.0 as usize].form.as_ref()
+    /// Linear momentum of all agents, N·s.
+    pub(super) fn momentum_n_s(&self) -> DVec3 {
+        self.actors.iter().map(|actor| actor.agent.momentum().0).sum()
     }
 
-    /// The newest own states of all agents, for an audit.
-    pub(super) fn members(&self) -> Vec<Member<'_>> {
-        let all = (0..).map(AgentId).zip(&self.actors);
-        all.map(|(id, actor)| Member {
-            id,
-            snapshot: &actor.own,
-            mass_per_length_kg_m: actor.weight.mass_per_length_kg_m,
-            rotary_kg_m: actor.weight.rotary_kg_m,
+    /// The impulses of all contacts so far, magnitudes summed over pairs and macro steps, N·s.
+    pub(super) const fn impulse_n_s(&self) -> f64 {
+        self.impulse_n_s
+    }
+
+    /// How the last macro step was made.
+    pub(super) const fn report(&self) -> &ClusterReport {
+        &self.report
+    }
+
+    /// What the pairs of agents were in the last macro step.
+    pub(super) fn pairs(&self) -> PairSums {
+        let between = self.stepper.totals().iter().filter(|total| matches!(total.partner, Partner::Agent(_)));
+        between.fold(PairSums::default(), |sum, total| PairSums {
+            depth_m: sum.depth_m.max(total.depth_m),
+            contacts: sum.contacts + total.contacts,
         })
-        .collect()
     }
 
-    /// The agent that steps next; `None` where all have reached `seconds`.
-    pub(super) fn next(&self, seconds: f64) -> Option<AgentId> {
-        let first = (0..).zip(&self.actors).min_by_key(|(id, actor)| (actor.own.time, *id));
-        first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
-    }
-
-    /// Makes a step of an agent.
+    /// Makes macro steps up to `seconds`.
     ///
     /// # Errors
-    /// A step that the agent refuses.
-    pub(super) fn step(&mut self, me: AgentId) -> Result<(), StepError> {
-        let i = me.0 as usize;
-        let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
-        let lost = self.random() < self.faults.loss;
-        let neighbours = self.neighbours_of(i);
-        let actor = &mut self.actors[i];
-        let time = actor.own.time;
-        let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
-        // a blow ends a macro step where it happens: the rest of the step follows
-        let end = time + dt;
-        let mut now = time;
-        while now < end {
-            let context = StepContext { me, time: now, neighbours: &neighbours, hands, links };
-            now += cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, end.since(now))?;
-        }
-        actor.last_s = dt.as_secs_f64();
-        own.clear();
-        agent.write_snapshot(own);
-        own.pairs.clear();
-        own.grips.clone_from(&cluster.grips);
-        cluster.pairs.write(own);
-        own.time = time + dt;
-        if matches!(own.body, Body::Rigid(_)) {
-            own.acceleration = weight.gravity;
-        }
-        if !lost {
-            actor.shown.swap(0, 1);
-            actor.shown[0] = Arc::new(actor.own.clone());
+    /// A step that a member refuses.
+    pub(super) fn run_to(&mut self, seconds: f64) -> Result<(), StepError> {
+        let end = SimTime::ZERO + SimSpan::from_secs_f64(seconds).unwrap_or(SimSpan::ZERO);
+        while self.time < end {
+            self.step_at_most(end.since(self.time))?;
         }
         Ok(())
     }
 
-    /// All other agents as neighbours of one.
-    fn neighbours_of(&self, me: usize) -> Vec<Neighbour> {
-        (0..self.actors.len()).filter(|&other| other != me).map(|other| self.neighbour_of(me, other)).collect()
+    /// Makes a macro step as long as its members want.
+    ///
+    /// # Errors
+    /// A step that a member refuses.
+    pub(super) fn step(&mut self) -> Result<(), StepError> {
+        self.step_at_most(SimSpan::from_nanos(u64::MAX))
     }
 
-    /// Another agent as a neighbour of one.
-    fn neighbour_of(&self, me: usize, other: usize) -> Neighbour {
-        let (actor, now) = (&self.actors[other], self.actors[me].own.time);
-        let early = self.faults.due && actor.shown[0].time > now;
-        let seen = Neighbour::observed(AgentId(other as u32), Arc::clone(&actor.shown[usize::from(early)]));
-        let clock = |at: usize| PairClock { id: AgentId(at as u32), step_s: self.actors[at].rate_hz.recip() };
-        Neighbour {
-            form: actor.form.clone(),
-            law: if let PairLaw::Product(law) = self.law { law } else { Law::Off },
-            computed_here: computes(clock(me), clock(other)),
-            step_s: actor.rate_hz.recip(),
-            ..seen
+    /// Makes a macro step of at most this length.
+    fn step_at_most(&mut self, most: SimSpan) -> Result<(), StepError> {
+        let Self { actors, scene, stepper, time, participants, .. } = self;
+        let mut roles = Vec::with_capacity(actors.len());
+        for actor in actors.iter_mut() {
+            roles.extend(actor.agent.member().map(|member| (member.role(), actor.step_s)));
         }
-    }
-
-    /// A number in 0 … 1, the same on every run.
-    fn random(&mut self) -> f64 {
-        self.noise ^= self.noise << 13;
-        self.noise ^= self.noise >> 7;
-        self.noise ^= self.noise << 17;
-        (self.noise >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
-impl Cluster {
-    /// Makes a step of `dt` of an agent that is alone in its cluster; how long it was.
-    fn step(
-        &mut self,
-        agent: &mut dyn Agent,
-        scene: &ClusterScene,
-        around: Around<'_>,
-        dt: SimSpan,
-    ) -> Result<SimSpan, StepError> {
-        let Self { memory, grips, pairs, remotes, stepper, overlaps } = self;
-        let Around { context, law } = around;
-        let laws: Vec<(AgentId, Law)> = context.neighbours.iter().map(|other| (other.id, other.law)).collect();
-        let model = agent.model();
-        let Some(member) = agent.member() else { return Err(StepError::Alone { model }) };
-        let id = context.me;
-        let mut list = vec![Participant { id, member, context, laws: &laws, memory, parts: 1, grips }];
-        let sides = &mut [Some(pairs)];
-        let dt_s = dt.as_secs_f64();
-        remotes.join(&mut list, sides, stepper, MacroStep { dt_s, parts: 1 });
-        if let PairLaw::Penalty { stiffness_n_m, damping_n_s_m, extrapolate } = law {
-            // velocities and skin are those of its last step
-            let penalty = Penalty { stiffness_n_m, damping_n_s_m, extrapolate, dt_s };
-            for other in context.neighbours {
-                overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
-            }
+        let plan = Plan::of(roles.iter().copied());
+        let dt = SimSpan::from_secs_f64(plan.macro_s).map_or(most, |dt| dt.min(most));
+        let mut all = recycled(std::mem::take(participants));
+        for ((id, actor), (role, step_s)) in (0..).map(AgentId).zip(actors.iter_mut()).zip(roles) {
+            let Actor { agent, hands, neighbours, memory, grips, .. } = actor;
+            let context = StepContext { me: id, time: *time, neighbours, hands, links: &[] };
+            let parts = plan.parts_in(role, step_s);
+            all.extend(agent.member().map(|member| Participant {
+                id,
+                member,
+                context,
+                laws: &[],
+                memory,
+                parts,
+                grips,
+            }));
         }
-        let made = stepper.step(scene, &mut list, dt)?.dt;
-        part(&list, sides, stepper, made.as_secs_f64());
-        Ok(made)
+        let outcome = stepper.step(scene, &mut all, dt);
+        *participants = recycled(all);
+        self.report = outcome?;
+        self.time += self.report.dt;
+        self.impulse_n_s += self.stepper.totals().iter().map(|total| total.impulse_n_s.length()).sum::<f64>();
+        for actor in &mut self.actors {
+            actor.agent.write_snapshot(&mut actor.own);
+            actor.own.time = self.time;
+        }
+        Ok(())
     }
-}
-
-/// What an agent sees, and the law of its pairs.
-#[derive(Clone, Copy)]
-struct Around<'a> {
-    context: StepContext<'a>,
-    law: PairLaw,
 }

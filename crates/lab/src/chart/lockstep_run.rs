@@ -1,4 +1,4 @@
-//! Agents in a run of their own in virtual time, by the program's own runtime, islands included.
+//! Agents in a run of their own in virtual time, by the program's own runtime, clusters included.
 //!
 //! In: agents with rates. Out: a run whose steps cost nothing, and its agents' newest states. Never here: measurements.
 
@@ -41,7 +41,7 @@ impl LockstepRun {
         self.0.agents().iter().map(|agent| agent.latest()).collect()
     }
 
-    /// The number of steps of each agent, and the leader of its island.
+    /// The number of steps of each agent, and the leader of its cluster.
     pub(super) fn steps(&self) -> Vec<(u64, Option<AgentId>)> {
         self.0.agents().iter().map(|agent| agent.stats()).map(|stats| (stats.steps, stats.led_by)).collect()
     }
@@ -50,5 +50,5 @@ impl LockstepRun {
 /// Rigid bodies for an audit.
 pub(super) fn members(snapshots: &[Arc<Snapshot>]) -> Vec<Member<'_>> {
     let all = (0..).map(AgentId).zip(snapshots);
-    all.map(|(id, snapshot)| Member { id, snapshot, mass_per_length_kg_m: 0.0, rotary_kg_m: 0.0 }).collect()
+    all.map(|(id, snapshot)| Member { id, snapshot, mass_per_length_kg_m: 0.0 }).collect()
 }

@@ -3,13 +3,13 @@
 //! In: which subject, which folder. Out: files, a table, findings. Never here: what is measured (each experiment is a file).
 
 mod accuracy;
+mod asynchronous;
 mod bench;
 mod coupling;
 mod energy_bench;
 mod experiment;
 pub(super) mod figure;
 mod lockstep_run;
-mod penalty;
 mod policies;
 pub(super) mod power;
 mod rows;

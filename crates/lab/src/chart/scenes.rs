@@ -1,13 +1,11 @@
-//! Small scenes with two clocks, shared by several experiments.
+//! Small scenes with two rates, shared by several experiments.
 //!
 //! In: the two rates. Out: agents in contact. Never here: measurements.
 
-use super::bench::{Faults, PairLaw};
 use super::energy_bench::Play;
 use super::stability::common::{GRAVITY, TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
-use metachron_contact::Law;
 use metachron_core::{AgentId, Anchor};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
@@ -26,13 +24,13 @@ pub(super) struct Scene {
 pub(super) const WITH_TUBES: [&str; 3] = ["tube-on-bar", "gripper", "crossing"];
 
 /// The scene with a name.
-pub(super) fn scene(name: &str, rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
+pub(super) fn scene(name: &str, rates_hz: [f64; 2]) -> Option<Scene> {
     match name {
-        "tube-on-bar" => tube_on_bar(rates_hz, faults),
-        "gripper" => gripper(rates_hz, faults),
-        "crossing" => crossing(rates_hz, faults),
-        "ball-on-box" => ball_on_box(rates_hz, faults),
-        "oblique-blow" => oblique_blow(rates_hz, faults),
+        "tube-on-bar" => tube_on_bar(rates_hz),
+        "gripper" => gripper(rates_hz),
+        "crossing" => crossing(rates_hz),
+        "ball-on-box" => ball_on_box(rates_hz),
+        "oblique-blow" => oblique_blow(rates_hz),
         _ => None,
     }
 }
@@ -58,15 +56,15 @@ fn tube(path_m: Vec<DVec3>) -> TubeSpec {
 }
 
 /// A tube falls a centimetre onto a bar that rests freely on the floor, and bends over it.
-fn tube_on_bar([tube_hz, bar_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
+fn tube_on_bar([tube_hz, bar_hz]: [f64; 2]) -> Option<Scene> {
+    let mut play = Play::among(&[floor()])?;
     let half = DVec3::new(0.04, 0.15, 0.1);
     let height = 2.0 * half.z + TUBE_RADIUS_M;
     let x = 0.2;
     let path_m = vec![DVec3::new(-x, 0.0, height + 0.01), DVec3::new(x, 0.0, height + 0.01)];
     let hose = play.add_tube(tube(path_m), tube_hz)?;
     let bar = plain_body(Solid::Box { half_extents_m: half }, DVec3::Z * half.z, 1.0);
-    let bar = RigidSpec { gravity: gravity(), friction: 0.5, obstacles: [floor()].into(), ..bar };
+    let bar = RigidSpec { gravity: gravity(), friction: 0.5, ..bar };
     let bar = play.add_body(bar, bar_hz, vec![])?;
     let points = vec![
         (hose, Anchor::Arc(0.0)),
@@ -74,13 +72,13 @@ fn tube_on_bar([tube_hz, bar_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
         (hose, Anchor::Arc(2.0 * x)),
         (bar, Anchor::Local(DVec3::ZERO)),
     ];
-    let zero_j = play.raw_j() - weight_n(2.0 * x) * (0.01 + half.z);
+    let zero_j = play.energy_j() - weight_n(2.0 * x) * (0.01 + half.z);
     Some(Scene { play, points, zero_j })
 }
 
 /// Two fingers on springs press a tube from both sides and hold it against its weight.
-fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
+fn gripper([tube_hz, finger_hz]: [f64; 2]) -> Option<Scene> {
+    let mut play = Play::among(&[])?;
     let y = 0.1;
     let path_m = vec![DVec3::new(0.0, -y, 0.0), DVec3::new(0.0, y, 0.0)];
     let hose = play.add_tube(TubeSpec { friction: 0.8, ..tube(path_m) }, tube_hz)?;
@@ -107,13 +105,13 @@ fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
         let id = play.add_body(finger, finger_hz, corners.map(spring).to_vec())?;
         points.push((id, Anchor::Local(DVec3::ZERO)));
     }
-    let zero_j = play.raw_j() - 2.0 * 0.5 * 400.0 * 0.01 * 0.01;
+    let zero_j = play.energy_j() - 2.0 * 0.5 * 400.0 * 0.01 * 0.01;
     Some(Scene { play, points, zero_j })
 }
 
 /// A tube clamped at one end swings down two centimetres onto another that is clamped at both.
-fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
+fn crossing([lower_hz, upper_hz]: [f64; 2]) -> Option<Scene> {
+    let mut play = Play::among(&[])?;
     let half = 0.2;
     let lower = vec![DVec3::X * -half, DVec3::X * half];
     let lower = play.add_tube(TubeSpec { clamp: [true; 2], ..tube(lower) }, lower_hz)?;
@@ -122,29 +120,29 @@ fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     let upper = play.add_tube(TubeSpec { clamp: [true, false], ..tube(upper) }, upper_hz)?;
     let points =
         [lower, upper].into_iter().flat_map(|id| [0.0, half, 2.0 * half].map(|s| (id, Anchor::Arc(s)))).collect();
-    let zero_j = play.raw_j() - weight_n(2.0 * half) * 0.05;
+    let zero_j = play.energy_j() - weight_n(2.0 * half) * 0.05;
     Some(Scene { play, points, zero_j })
 }
 
 /// A ball falls a centimetre onto a box that rests freely on the floor, and stays there.
-fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
+fn ball_on_box([ball_hz, box_hz]: [f64; 2]) -> Option<Scene> {
+    let mut play = Play::among(&[floor()])?;
     let (half, radius_m, fall_m) = (0.1, 0.05, 0.01);
     let plain = |solid: Solid, height: f64, mass_kg: f64| {
         let plain = plain_body(solid, DVec3::Z * height, mass_kg);
-        RigidSpec { gravity: gravity(), friction: 0.5, obstacles: [floor()].into(), ..plain }
+        RigidSpec { gravity: gravity(), friction: 0.5, ..plain }
     };
     let ball = plain(Solid::Ball { radius_m }, 2.0 * half + radius_m + fall_m, 0.1);
     let ball = play.add_body(ball, ball_hz, vec![])?;
     let below = play.add_body(plain(Solid::Box { half_extents_m: DVec3::splat(half) }, half, 1.0), box_hz, vec![])?;
     let points = [ball, below].map(|id| (id, Anchor::Local(DVec3::ZERO))).to_vec();
-    let zero_j = play.raw_j() - 0.1 * GRAVITY * fall_m;
+    let zero_j = play.energy_j() - 0.1 * GRAVITY * fall_m;
     Some(Scene { play, points, zero_j })
 }
 
 /// Two balls collide off-centre, with friction.
-fn oblique_blow(rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
-    let mut play = Play::new(PairLaw::Product(Law::Ledger), faults);
+fn oblique_blow(rates_hz: [f64; 2]) -> Option<Scene> {
+    let mut play = Play::among(&[])?;
     let ball = |at: DVec3, velocity: DVec3, mass: f64| RigidSpec {
         velocity,
         friction: 0.3,

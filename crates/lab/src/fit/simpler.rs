@@ -80,7 +80,7 @@ fn flying(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Optio
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
     let agents = &task.objects[object].agents;
     let paired = played.pairs.iter().any(|(a, b)| agents.contains(a) || agents.contains(b));
-    let jointed = spec.joints.iter().any(|joint| agents.iter().any(|agent| joint.holds(*agent)));
+    let jointed = task.scene.joints.iter().any(|joint| agents.iter().any(|agent| joint.holds(*agent)));
     let flies = paths(task, played, object).iter().all(|path| path.from_flight_m(spec.gravity) <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
     let note = format!(

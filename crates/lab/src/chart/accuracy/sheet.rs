@@ -53,7 +53,6 @@ pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
         held: Vec::new(),
         friction: 0.0,
         gravity: DVec3::NEG_Z * GRAVITY,
-        obstacles: [].into(),
         sleep: false,
     }
 }

@@ -1,19 +1,15 @@
-//! The coupling error: the same scene with separate clocks, and under one very fine common clock.
+//! The coupling error: the same scene with members of unequal steps, and with very fine ones for all.
 //!
-//! Both runs are compared whenever the slower and the faster clock show the same time, with every given impulse delivered: this
-//! measures the effect of the clocks, not the age of published states. The error of each agent's own longer step is included;
-//! at a ratio of 1 there is little else.
+//! Both runs are compared at every whole multiple of the longer step. The error of each agent's own longer step is included; at a ratio
+//! of 1 there is little else.
 
-use super::super::bench::Faults;
 use super::super::energy_bench::Play;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::scenes::{Scene, scene};
 use super::super::table::Table;
 use glam::DVec3;
-use metachron_contact::audit::{Member, in_flight, settled};
-use metachron_core::Site;
-use metachron_core::{AgentId, Anchor, Body, SimTime};
+use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -22,20 +18,18 @@ pub(in super::super) struct CouplingError;
 const SCENES: [&str; 4] = ["oblique-blow", "ball-on-box", "tube-on-bar", "crossing"];
 const RATIOS: [u32; 5] = [1, 3, 10, 30, 100];
 const QUICK_RATIOS: [u32; 2] = [1, 10];
-/// A step of the faster clock, and of the common clock of the other run, a quarter of it, nanoseconds.
+/// The shorter step, and that of the other run, a quarter of it, nanoseconds.
 const FAST_NS: u64 = 1_000_000;
 const ORACLE_NS: u64 = FAST_NS / 4;
-/// Clocks that differ by less show the same time, seconds: a sixth of a tenth of a second is no whole number of nanoseconds.
-const SAME_S: f64 = 1e-6;
 const SECONDS: f64 = 1.0;
 const QUICK_SECONDS: f64 = 0.4;
 /// Bounds for two balls: of the impulse, as close as against the closed form, and of the momentum, closer.
 const BLOW_MAX: f64 = 0.01;
 const MOMENTUM_MAX: f64 = 0.005;
-/// How far a body that rests on another may be from its place under one clock, metres.
+/// How far a body that rests on another may be from its place with fine steps, metres.
 const REST_MAX_M: f64 = 2e-3;
 
-/// A scene, the ratio of the clocks, and which agent has the fast one.
+/// A scene, the ratio of the steps, and which agent has the short one.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     scene: String,
@@ -56,7 +50,7 @@ pub(in super::super) struct Row {
     /// Positions of the followed points: root mean square and greatest distance, metres.
     position_rms_m: f64,
     position_max_m: f64,
-    /// Difference of the total momenta at the last comparison, as a share of the impulse exchanged under one clock.
+    /// Difference of the total momenta at the last comparison, as a share of the impulse exchanged with fine steps.
     momentum: f64,
     /// Difference of the impulses exchanged up to there, as the same share.
     impulse: f64,
@@ -66,8 +60,7 @@ impl Experiment for CouplingError {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "error";
-    const TITLE: &'static str =
-        "coupling error: the same scene with separate clocks and under one very fine common clock";
+    const TITLE: &'static str = "coupling error: the same scene with unequal steps and with very fine ones for all";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
@@ -96,9 +89,9 @@ impl Experiment for CouplingError {
     fn figure(rows: &[Row]) -> Figure {
         let panels = vec![
             panel(rows, "position", "position, rms over the run, mm", |r| 1e3 * r.position_rms_m),
-            panel(rows, "impulse", "impulse error / impulse under the common clock", |r| r.impulse),
+            panel(rows, "impulse", "impulse error / impulse with fine steps", |r| r.impulse),
         ];
-        Figure { title: "Coupling error against one common clock of 4 kHz".to_owned(), panels, columns: 2 }
+        Figure { title: "Coupling error against steps of 4 kHz for all".to_owned(), panels, columns: 2 }
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -125,7 +118,7 @@ impl Experiment for CouplingError {
         vec![
             Finding::at_most("runs that stopped early", lost, 0.0),
             Finding::at_most(
-                "two balls: impulse error over the impulse under the common clock",
+                "two balls: impulse error over the impulse with fine steps",
                 of(SCENES[0], |r| r.impulse),
                 BLOW_MAX,
             ),
@@ -196,49 +189,16 @@ fn apart(case: &Case) -> Option<RunDifference> {
 
 /// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
 fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
-    let Scene { play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64), Faults::default())?;
-    let samples = libm::round(case.seconds * 1e9) as u64 / every_ns;
-    let ids: Vec<AgentId> = (0..play.stage.members().len() as u32).map(AgentId).collect();
+    let Scene { mut play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64))?;
     let mut trail = Trail::default();
-    play.run(2.0 * case.seconds, |play, _| {
-        let due = SimTime::from_nanos((trail.samples.len() as u64 + 1) * every_ns);
-        if ids.iter().all(|id| play.stage.own(*id).time.secs_after(due).abs() < SAME_S) {
-            trail.samples.push(points.iter().map(|(id, anchor)| position_m(play, *id, *anchor)).collect());
-            trail.momentum = play.common(due).momentum;
-            let pairs = ids.iter().flat_map(|id| &play.stage.own(*id).pairs);
-            trail.impulse_n_s = pairs.map(|pair| pair.impulse_n_s).sum();
-        }
-        (trail.samples.len() as u64) < samples
-    });
-    (trail.samples.len() as u64 == samples).then_some(trail)
-}
-
-/// The position of a point, with every impulse on its way to its agent delivered.
-fn position_m(play: &Play, id: AgentId, anchor: Anchor) -> DVec3 {
-    let members = play.stage.members();
-    let Some(member) = members.get(id.0 as usize) else { return DVec3::NAN };
-    let body = match settled(member, &members, member.snapshot.time) {
-        Some(state) => Body::Rigid(state),
-        None => delivered(member, &members),
-    };
-    body.point(anchor).map_or(DVec3::NAN, |(x, _)| x)
-}
-
-/// A tube moved by the impulses that other agents gave it since its last step.
-fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
-    let mut body = member.snapshot.body.clone();
-    let (Body::Curve(state), Some(inertia)) = (&mut body, member.snapshot.inertia.response()) else { return body };
-    let mut carried = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
-    in_flight(member, members, |_, site, _, moved| {
-        let Site::Arc(arc_m) = site else { return };
-        let Some((segment, share)) = state.locate(arc_m) else { return };
-        carried[2 * segment] += moved.linear * (1.0 - share);
-        carried[2 * segment + 2] += moved.linear * share;
-        carried[2 * segment + 1] += moved.angular;
-    });
-    if inertia.slots() == carried.len() {
-        inertia.respond(&mut carried, false);
-        state.positions.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, by)| *x += *by);
+    for sample in 1..=libm::round(case.seconds * 1e9) as u64 / every_ns {
+        play.stage.run_to((sample * every_ns) as f64 * 1e-9).ok()?;
+        trail.samples.push(points.iter().map(|(id, anchor)| position_m(&play, *id, *anchor)).collect());
     }
-    body
+    (trail.momentum, trail.impulse_n_s) = (play.stage.momentum_n_s(), play.stage.impulse_n_s());
+    Some(trail)
+}
+
+fn position_m(play: &Play, id: AgentId, anchor: Anchor) -> DVec3 {
+    play.stage.own(id).body.point(anchor).map_or(DVec3::NAN, |(x, _)| x)
 }

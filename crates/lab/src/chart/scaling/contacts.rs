@@ -3,8 +3,7 @@
 use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace};
-use super::tubes::{folded, gripping_neighbours, step};
-use metachron_core::SimSpan;
+use super::tubes::{TUBE, folded, grasp, on_ground};
 use std::time::Duration;
 
 /// The experiment.
@@ -12,8 +11,8 @@ pub(in super::super) struct Contacts;
 
 const FREE: &str = "free, steps of 4 ms";
 const HELD: &str = "held by a tool, steps of 1 ms";
-const DT: SimSpan = SimSpan::from_nanos(4_000_000);
-const DT_HELD: SimSpan = SimSpan::from_nanos(1_000_000);
+const DT_S: f64 = 4e-3;
+const HELD_DT_S: f64 = 1e-3;
 /// How long each case is measured, and steps of 4 ms until the tube rests on itself.
 const SPAN: Duration = Duration::from_millis(500);
 const FALLS: u32 = 1500;
@@ -35,18 +34,22 @@ impl Growth for Contacts {
     }
 
     fn measure(case: &Case) -> Option<Cost> {
-        let mut tube = folded(case.size)?;
+        let tube = folded(case.size)?;
+        let (bytes, length_m) = (tube.memory_bytes(), tube.length_m());
+        let mut stage = on_ground(tube, DT_S)?;
         for _ in 0..FALLS {
-            step(&mut tube, DT, &[])?;
+            stage.step().ok()?;
         }
-        let held = case.case == HELD;
-        let (dt, neighbours) = if held { (DT_HELD, gripping_neighbours(&tube)?) } else { (DT, vec![]) };
-        for _ in 0..if held { HOLDS } else { 0 } {
-            step(&mut tube, dt, &neighbours)?;
+        if case.case == HELD {
+            grasp(&mut stage, length_m)?;
+            stage.set_step(TUBE, HELD_DT_S);
+            for _ in 0..HOLDS {
+                stage.step().ok()?;
+            }
         }
-        let us = least_us(SPAN, || step(&mut tube, dt, &neighbours))?;
-        let floor_us = floor_us(tube.memory_bytes(), SPAN / 10)?;
-        Some(Cost { count: tube.contacts() as f64, us, floor_us })
+        let us = least_us(SPAN, || stage.step().ok())?;
+        let floor_us = floor_us(bytes, SPAN / 10)?;
+        Some(Cost { count: f64::from(stage.report().contacts), us, floor_us })
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

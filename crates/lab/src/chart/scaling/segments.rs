@@ -4,8 +4,7 @@ use super::super::accuracy::peers;
 use super::super::experiment::{Finding, worst};
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
-use super::tubes::{gripping_neighbours, step, straight};
-use metachron_core::SimSpan;
+use super::tubes::{grasp, hanging, straight};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -23,7 +22,7 @@ const CLAIMED: RangeInclusive<f64> = 100.0..=4000.0;
 const SPAN: Duration = Duration::from_millis(200);
 /// Steps before the measurement, so that all tubes hang alike: they come to rest in the first half of these.
 const WARM: u32 = 500;
-const DT: SimSpan = SimSpan::from_nanos(10_000_000);
+const DT_S: f64 = 0.01;
 
 impl Growth for Segments {
     const NAME: &'static str = "segments";
@@ -43,13 +42,17 @@ impl Growth for Segments {
     }
 
     fn measure(case: &Case) -> Option<Cost> {
-        let mut tube = straight(case.size, case.case != ALONE)?;
-        let neighbours = if case.case == HELD { gripping_neighbours(&tube)? } else { vec![] };
-        for _ in 0..WARM {
-            step(&mut tube, DT, &neighbours)?;
+        let tube = straight(case.size, case.case != ALONE)?;
+        let (bytes, length_m) = (tube.memory_bytes(), tube.length_m());
+        let mut stage = hanging(tube, DT_S)?;
+        if case.case == HELD {
+            grasp(&mut stage, length_m)?;
         }
-        let us = least_us(SPAN, || step(&mut tube, DT, &neighbours))?;
-        let floor_us = floor_us(tube.memory_bytes(), SPAN / 10)?;
+        for _ in 0..WARM {
+            stage.step().ok()?;
+        }
+        let us = least_us(SPAN, || stage.step().ok())?;
+        let floor_us = floor_us(bytes, SPAN / 10)?;
         Some(Cost { count: f64::from(case.size), us, floor_us })
     }
 

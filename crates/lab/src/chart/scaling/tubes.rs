@@ -1,11 +1,12 @@
 //! The tubes of the cost measurements.
 //!
-//! In: segments. Out: tubes close to their rest shapes, and the tool that grasps them. Never here: time.
+//! In: segments. Out: tubes close to their rest shapes, alone in a cluster, and the tool that grasps them. Never here: time.
 
+use super::super::bench::StepHarness;
 use super::super::stability::common::{GRAVITY, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, Neighbour, StepContext};
-use metachron_core::{AgentId, Anchor, Body, Grasp, SimSpan, SimTime, Snapshot, ToolState};
+use metachron_contact::Neighbour;
+use metachron_core::{AgentId, Anchor, Body, Grasp, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
@@ -47,22 +48,8 @@ pub(super) fn folded(segments: u32) -> Option<Tube> {
         path_m.extend([near, 0.5 * STRAND_M, far].map(at));
     }
     let plain = plain_tube(path_m, RADIUS_M, segments as usize);
-    let ground = Obstacle {
-        name: "ground".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.3,
-        restitution: 0.0,
-    };
-    let mut spec = TubeSpec {
-        self_contact: true,
-        friction: 0.3,
-        damping_per_s: 1.0,
-        gravity: DVec3::NEG_Z * GRAVITY,
-        obstacles: [ground].into(),
-        ..plain
-    };
+    let mut spec =
+        TubeSpec { self_contact: true, friction: 0.3, damping_per_s: 1.0, gravity: DVec3::NEG_Z * GRAVITY, ..plain };
     // 5e4 Pa in place of 1e6
     for stiffness in
         [&mut spec.section.ea_n, &mut spec.section.ga_n, &mut spec.section.ei_n_m2, &mut spec.section.gj_n_m2]
@@ -72,29 +59,47 @@ pub(super) fn folded(segments: u32) -> Option<Tube> {
     Tube::new(spec).ok()
 }
 
-/// A tool that grasps the middle of `tube` at its present place, as a neighbour with one fixed state.
-pub(super) fn gripping_neighbours(tube: &Tube) -> Option<Vec<Neighbour>> {
-    let mut seen = Snapshot::default();
-    tube.write_snapshot(&mut seen);
-    let anchor = Anchor::Arc(0.5 * tube.length_m());
-    let (tip, _) = seen.body.point(anchor)?;
+/// A tube on the ground, alone in a cluster, with steps of `dt_s` seconds.
+pub(super) fn on_ground(tube: Tube, dt_s: f64) -> Option<StepHarness> {
+    let ground = Obstacle {
+        name: "ground".into(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.3,
+        restitution: 0.0,
+    };
+    let mut stage = StepHarness::among(&[ground])?;
+    stage.add(Box::new(tube), 1.0 / dt_s)?;
+    Some(stage)
+}
+
+/// A tube in the air, alone in a cluster, with steps of `dt_s` seconds.
+pub(super) fn hanging(tube: Tube, dt_s: f64) -> Option<StepHarness> {
+    let mut stage = StepHarness::among(&[])?;
+    stage.add(Box::new(tube), 1.0 / dt_s)?;
+    Some(stage)
+}
+
+/// The tube of a stage.
+pub(super) const TUBE: AgentId = AgentId(0);
+
+/// Lets a tool grasp the middle of the tube, of this length, at its present place: a neighbour with one fixed state.
+pub(super) fn grasp(stage: &mut StepHarness, length_m: f64) -> Option<()> {
+    let anchor = Anchor::Arc(0.5 * length_m);
+    let (tip, _) = stage.own(TUBE).body.point(anchor)?;
     let pose = ToolState {
         tip,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,
         spin: DVec3::ZERO,
         jaw: 0.0,
-        grasp: Some(Grasp { target: AgentId(0), anchor, orientation: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
+        grasp: Some(Grasp { target: TUBE, anchor, orientation: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
         admits: None,
         force_n: 0.0,
         is_idle: false,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
-    Some(vec![Neighbour { owned: true, ..Neighbour::observed(AgentId(1), tool) }])
-}
-
-/// One step among `neighbours`; `None` where it fails.
-pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
-    let context = StepContext { neighbours, ..StepContext::alone(AgentId(0), SimTime::ZERO) };
-    tube.step(dt, &context).ok().map(drop)
+    stage.set_neighbours(TUBE, vec![Neighbour::observed(AgentId(1), tool)]);
+    Some(())
 }

@@ -4,13 +4,12 @@
 //! The tube is thin compared with the cylinder, so that it does not matter that its tension acts at its axis and friction at its
 //! surface (docs/theory/contact.md, eq. 14, gives the difference for thicker tubes).
 
+use super::super::bench::StepHarness;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
@@ -148,22 +147,21 @@ fn path(wrap_rad: f64) -> Vec<DVec3> {
     path
 }
 
-fn tube(case: &Case) -> Option<Tube> {
-    let drum = Obstacle {
+fn drum(case: &Case) -> Obstacle {
+    Obstacle {
         name: "drum".to_owned(),
         solid: Solid::Cylinder { radius_m: DRUM_M, half_height_m: 0.5 },
         position: DVec3::ZERO,
         rotation: DQuat::from_rotation_x(FRAC_PI_2),
         friction: case.friction,
         restitution: 0.0,
-    };
+    }
+}
+
+fn tube(case: &Case) -> Option<Tube> {
     let segments = (case.wrap_rad * SEGMENTS_A_RADIAN * (1.0 + 2.0 * TAIL_M / (case.wrap_rad * DRUM_M))) as usize;
-    let mut spec = TubeSpec {
-        obstacles: [drum].into(),
-        friction: case.friction,
-        damping_per_s: 5.0,
-        ..plain_tube(path(case.wrap_rad), TUBE_M, segments)
-    };
+    let mut spec =
+        TubeSpec { friction: case.friction, damping_per_s: 5.0, ..plain_tube(path(case.wrap_rad), TUBE_M, segments) };
     // its rest shape follows the drum, so bending takes no force; with even less stiffness a taut tube chatters and creeps
     (spec.section.ea_n, spec.section.ga_n) = (2e3, 1e3);
     (spec.section.ei_n_m2, spec.section.gj_n_m2) = (1e-3, 1e-3);
@@ -173,26 +171,25 @@ fn tube(case: &Case) -> Option<Tube> {
 
 /// Raises the load at the end until the start has moved; returns the ratio of the loads then.
 fn slip_ratio(case: &Case) -> Option<f64> {
-    let mut tube = tube(case)?;
-    let dt = SimSpan::from_secs_f64(DT_S)?;
+    let tube = tube(case)?;
     let theory = libm::exp(case.friction * case.wrap_rad);
     let [from, rate, to] = RAMP;
     let length = tube.length_m();
     let (first, last) = (DVec3::NEG_X, DVec3::new(libm::cos(case.wrap_rad), 0.0, -libm::sin(case.wrap_rad)));
-    let (mut time, mut snapshot, mut rested) = (SimTime::ZERO, Snapshot::default(), None);
+    let mut stage = StepHarness::among(&[drum(case)])?;
+    let id = stage.add(Box::new(tube), 1.0 / DT_S)?;
+    let mut rested = None;
     loop {
-        let t = time.as_secs_f64();
+        let t = stage.time().as_secs_f64();
         let ratio = theory * (from + rate * (t - SETTLE_S).max(0.0));
         if ratio > theory * to {
             return None;
         }
         let on = (t / (0.5 * SETTLE_S)).min(1.0);
         let hands = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
-        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(dt, &context).ok()?;
-        time += dt;
-        tube.write_snapshot(&mut snapshot);
-        let (start, _) = snapshot.body.probe(0.0)?;
+        stage.attach_springs(id, hands);
+        stage.step().ok()?;
+        let (start, _) = stage.own(id).body.probe(0.0)?;
         if t < SETTLE_S {
             rested = Some(start);
         } else if rested.is_some_and(|rested| start.distance(rested) > SLIP_M) {

@@ -5,7 +5,7 @@
 //! a spring to the next. Without external forces momentum is constant and energy may only fall. Both are sampled when all five
 //! clocks show the same time, with every given impulse delivered; and also as published, to measure what is in flight.
 
-use super::super::energy_bench::Play;
+use super::super::asynchronous::play::Play;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;

@@ -2,8 +2,8 @@
 //!
 //! In: the system, the shift of its rates, a seed. Out: the agents. Never here: measurements.
 
-use super::super::bench::{Faults, PairLaw};
-use super::super::energy_bench::Play;
+use super::super::asynchronous::bench::{Faults, PairLaw};
+use super::super::asynchronous::play::Play;
 use super::common::{TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::DVec3;
 use metachron_contact::{Law, Link};

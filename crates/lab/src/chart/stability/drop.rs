@@ -3,8 +3,8 @@
 //! 50 g fall 5 cm onto 100 g on springs of 500 N/m. The mounted body keeps 1 kHz; the other is slow, its steps have jitter, and
 //! some of its states are lost. In 1d two balls; in 3d a tilted box that turns and slides lands on a plate with friction.
 
-use super::super::bench::{Faults, PairLaw};
-use super::super::energy_bench::{ContactImpulse, Play};
+use super::super::asynchronous::bench::{Faults, PairLaw};
+use super::super::asynchronous::play::{ContactImpulse, Play};
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;

@@ -9,6 +9,7 @@ use super::super::lockstep_run::LockstepRun;
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
+use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
@@ -60,7 +61,7 @@ pub(in super::super) struct Row {
     /// Greatest energy above that of the start, as a share of what the fall can give.
     gain: f64,
     holds: bool,
-    /// Number of agents led by another one, in an island.
+    /// Number of agents led by another one, in a cluster.
     led: usize,
     /// The least value of another engine that holds at this mass ratio and step.
     best_peer_value: Option<f64>,
@@ -204,14 +205,16 @@ fn cube_stack(case: &Case) -> Option<MassRatioResult> {
         friction: 0.5,
         restitution: 0.0,
     };
+    let scene = Arc::new(ClusterScene::new(&[ground]).ok()?);
     let mut spawns = Vec::new();
     for i in 0..count {
         let mass = if i + 1 == count { 1000.0 * case.ratio } else { 1000.0 };
         let half_extents_m = DVec3::splat(0.5);
         let plain = plain_body(Solid::Box { half_extents_m }, DVec3::Z * (0.5 + 1.001 * f64::from(i)), mass);
         let gravity = DVec3::NEG_Z * GRAVITY;
-        let spec = RigidSpec { friction: 0.5, gravity, obstacles: [ground.clone()].into(), ..plain };
-        spawns.push(AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
+        let spec = RigidSpec { friction: 0.5, gravity, ..plain };
+        let one = AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz);
+        spawns.push(AgentSpawn { scene: Arc::clone(&scene), ..one });
     }
     let mut run = LockstepRun::start(spawns).ok()?;
     run.run_to(SECONDS);
@@ -233,17 +236,18 @@ fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
         anchor_b_m: if i == 0 { DVec3::ZERO } else { DVec3::NEG_Z * HALF_LINK_M },
         ..Joint::new(AgentId(i), i.checked_sub(1).map(AgentId), JointKind::Spherical)
     };
-    let joints: Arc<[Joint]> = (0..LINKS).map(joint).collect();
+    let scene = Arc::new(ClusterScene::default().jointed((0..LINKS).map(joint).collect()).ok()?);
     let mut spawns = Vec::new();
     for i in 0..LINKS {
         let mass = if i + 1 == LINKS { case.ratio } else { 1.0 };
         let solid = Solid::Capsule { radius_m: 0.03, half_height_m: 0.06 };
         let plain = plain_body(solid, along * (HALF_LINK_M * (1.0 + 2.0 * f64::from(i))), mass);
         let rotation = DQuat::from_rotation_arc(DVec3::NEG_Z, along);
-        let spec = RigidSpec { rotation, gravity: DVec3::NEG_Z * GRAVITY, joints: Arc::clone(&joints), ..plain };
+        let spec = RigidSpec { rotation, gravity: DVec3::NEG_Z * GRAVITY, ..plain };
         let body = Box::new(RigidBody::new(spec).ok()?);
         let mut one = AgentSpawn::alone(format!("link-{i}"), body, case.rate_hz);
         one.together = (i > 0).then_some(AgentId(0));
+        one.scene = Arc::clone(&scene);
         spawns.push(one);
     }
     let mut run = LockstepRun::start(spawns).ok()?;

@@ -8,7 +8,6 @@ use super::common::plain_body;
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_contact::audit::settled;
-use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, PairKind};
 use metachron_core::{SimSpan, SimTime};
 use metachron_geometry::Solid;
@@ -16,7 +15,6 @@ use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_runtime::AgentSpawn;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// The experiment.
 pub(in super::super) struct Impact;
@@ -184,11 +182,7 @@ fn collide(case: &Case) -> Option<ImpactResult> {
     let far = GAP_M + 2.0 * RADIUS_M;
     let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
     let [rate_hitting, rate_hit] = case.rates_hz;
-    let among = Arc::new(ClusterScene::default());
-    let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn {
-        clusters: Some(Arc::clone(&among)),
-        ..AgentSpawn::alone(name, Box::new(ball), rate_hz)
-    };
+    let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn::alone(name, Box::new(ball), rate_hz);
     let mut hitting = alone("hitting", hitting, rate_hitting);
     hitting.laws = vec![(AgentId(1), Law::Ledger)];
     let spawns = vec![hitting, alone("hit", hit, rate_hit)];

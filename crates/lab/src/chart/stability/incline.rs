@@ -1,12 +1,13 @@
 //! Incline: a box and a tube on a slope stick below tan(angle) = μ and slide above, as far as Coulomb's law predicts.
 
+use super::super::bench::StepHarness;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
+use metachron_contact::Agent;
+use metachron_core::{Body, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
@@ -126,30 +127,25 @@ fn slid(case: &Case, angle: f64) -> Option<f64> {
     };
     let (down, up) = (rotation * DVec3::X, rotation * DVec3::Z);
     let gravity = DVec3::NEG_Z * GRAVITY;
-    let mut agent: Box<dyn Agent> = if case.body == "box" {
+    let agent: Box<dyn Agent> = if case.body == "box" {
         let half_extents_m = DVec3::new(0.1, 0.1, 0.02);
         let plain = plain_body(Solid::Box { half_extents_m }, up * half_extents_m.z, 1.0);
-        let spec = RigidSpec { rotation, friction: FRICTION, gravity, obstacles: [ground].into(), ..plain };
+        let spec = RigidSpec { rotation, friction: FRICTION, gravity, ..plain };
         Box::new(RigidBody::new(spec).ok()?)
     } else {
         let radius_m = 0.015;
         let plain = plain_tube(vec![up * radius_m, up * radius_m + down * 0.4], radius_m, 20);
-        Box::new(Tube::new(TubeSpec { friction: FRICTION, gravity, obstacles: [ground].into(), ..plain }).ok()?)
+        Box::new(Tube::new(TubeSpec { friction: FRICTION, gravity, ..plain }).ok()?)
     };
-    let before = middle(&*agent)?;
-    let dt = SimSpan::from_secs_f64(DT_S)?;
-    let mut time = SimTime::ZERO;
-    while time.as_secs_f64() < SECONDS - 0.5 * DT_S {
-        agent.step(dt, &StepContext::alone(AgentId(0), time)).ok()?;
-        time += dt;
-    }
-    Some((middle(&*agent)? - before).dot(down))
+    let mut stage = StepHarness::among(&[ground])?;
+    let id = stage.add(agent, 1.0 / DT_S)?;
+    let before = middle(stage.own(id))?;
+    stage.run_to(SECONDS).ok()?;
+    Some((middle(stage.own(id))? - before).dot(down))
 }
 
 /// The centre of mass; for a tube, the mean of its nodes weighted by length.
-fn middle(agent: &dyn Agent) -> Option<DVec3> {
-    let mut snapshot = Snapshot::default();
-    agent.write_snapshot(&mut snapshot);
+fn middle(snapshot: &Snapshot) -> Option<DVec3> {
     match &snapshot.body {
         Body::Curve(curve) => {
             let halves = curve.positions.windows(2).zip(curve.arc_m.windows(2));

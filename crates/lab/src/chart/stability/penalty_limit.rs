@@ -7,7 +7,7 @@
 //! stiffness at which the motion no longer decays. A linear model of both clocks, sampled in the same way, has 0.67 of the
 //! formula at 240 to 60 Hz; at lower rates the springs of the mounted body take part.
 
-use super::super::bench::Faults;
+use super::super::asynchronous::bench::Faults;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;

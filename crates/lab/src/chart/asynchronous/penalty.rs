@@ -14,18 +14,18 @@ const STICK_M_S: f64 = 1e-3;
 
 /// A place where two surfaces touch, as one side of it sees the other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Approach {
+pub(in super::super) struct Approach {
     /// Distance of the surfaces, metres; below zero they overlap.
-    pub(super) gap_m: f64,
+    pub(in super::super) gap_m: f64,
     /// Unit normal, towards this side.
-    pub(super) normal: DVec3,
+    pub(in super::super) normal: DVec3,
     /// Velocity of this side relative to the other, m/s.
-    pub(super) velocity_m_s: DVec3,
+    pub(in super::super) velocity_m_s: DVec3,
 }
 
 /// The force on the side that the normal points to, newtons: the stiffness times the depth, less the damping times
 /// the separation speed, never attractive; friction opposes the slip.
-pub(super) fn push_off_n(approach: Approach, stiffness_n_m: f64, damping_n_s_m: f64, friction: f64) -> DVec3 {
+pub(in super::super) fn push_off_n(approach: Approach, stiffness_n_m: f64, damping_n_s_m: f64, friction: f64) -> DVec3 {
     let Approach { gap_m, normal, velocity_m_s: velocity } = approach;
     if gap_m >= 0.0 {
         return DVec3::ZERO;
@@ -38,7 +38,7 @@ pub(super) fn push_off_n(approach: Approach, stiffness_n_m: f64, damping_n_s_m: 
 
 /// Overlaps of two skins.
 #[derive(Default)]
-pub(super) struct Overlaps {
+pub(in super::super) struct Overlaps {
     matter: Matter,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
@@ -46,7 +46,7 @@ pub(super) struct Overlaps {
 
 impl Overlaps {
     /// The impulses by which a member pushes itself off another's newest state in a step of `dt_s` seconds, as known impulses of its cluster.
-    pub(super) fn push_off(
+    pub(in super::super) fn push_off(
         &mut self,
         one: &Participant<'_>,
         other: &Neighbour,
@@ -75,15 +75,15 @@ impl Overlaps {
 
 /// A penalty law in a step.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Penalty {
+pub(in super::super) struct Penalty {
     /// Stiffness of the contact, N/m, > 0; stable below 0.55 μ/τ².
-    pub(super) stiffness_n_m: f64,
+    pub(in super::super) stiffness_n_m: f64,
     /// Damping of the contact, N·s/m, ≥ 0.
-    pub(super) damping_n_s_m: f64,
+    pub(in super::super) damping_n_s_m: f64,
     /// Whether the other's state is brought forward to one's own time.
-    pub(super) extrapolate: bool,
+    pub(in super::super) extrapolate: bool,
     /// The step, seconds.
-    pub(super) dt_s: f64,
+    pub(in super::super) dt_s: f64,
 }
 
 #[cfg(test)]
