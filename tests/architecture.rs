@@ -108,12 +108,6 @@ fn is_test(path: &str) -> bool {
     path.contains("/tests/") || path.ends_with("tests.rs")
 }
 
-/// The files that go with contact between clocks as it is today; they may only become fewer.
-fn doomed() -> BTreeSet<String> {
-    let text = fs::read_to_string(root().join("docs/doomed.txt")).unwrap();
-    text.lines().map(str::to_owned).collect()
-}
-
 #[test]
 fn every_source_file_opens_by_saying_what_it_is() {
     let silent: Vec<_> = sources().into_iter().filter(|(_, text)| !text.starts_with("//! ")).map(|(p, _)| p).collect();
@@ -223,9 +217,8 @@ fn types(text: &str) -> Vec<&str> {
 
 #[test]
 fn names_of_files_and_types_are_words_of_the_field() {
-    let doomed = doomed();
     let mut found = Vec::new();
-    for (path, text) in sources().into_iter().filter(|(path, _)| !doomed.contains(path)) {
+    for (path, text) in sources() {
         let stem = Path::new(&path).file_stem().unwrap().to_str().unwrap();
         for name in [stem].into_iter().chain(types(&text)) {
             for word in words(name).iter().filter(|word| DENIED.contains(&word.as_str())) {
@@ -292,8 +285,7 @@ fn is_tuple(parameter: &str) -> bool {
 
 #[test]
 fn no_function_takes_a_tuple_apart() {
-    let doomed = doomed();
-    for (path, text) in sources().iter().filter(|(path, _)| !doomed.contains(path) && !is_test(path)) {
+    for (path, text) in sources().iter().filter(|(path, _)| !is_test(path)) {
         let code = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
         let tuples: Vec<_> = parameters(code).into_iter().filter(|parameter| is_tuple(parameter)).collect();
         assert!(tuples.is_empty(), "{path}: a struct with named fields instead of {tuples:?}");
@@ -307,12 +299,6 @@ fn parameters_that_are_tuples_are_found() {
     let found = parameters(code);
     assert_eq!(found.iter().filter(|parameter| is_tuple(parameter)).count(), 1, "{found:?}");
     assert!(found.contains(&"(y, z): (u8, [u8; 2])") && found.contains(&"w: u8"), "{found:?}");
-}
-
-#[test]
-fn every_doomed_file_is_still_there() {
-    let gone: Vec<_> = doomed().into_iter().filter(|path| !root().join(path).is_file()).collect();
-    assert!(gone.is_empty(), "take these lines out of docs/doomed.txt: {gone:#?}");
 }
 
 /// The modules of a crate by path, such as `rod::step`.
@@ -380,10 +366,9 @@ fn ring<'a>(from: &'a str, arrows: &'a BTreeMap<String, BTreeSet<String>>) -> BT
 
 #[test]
 fn no_more_than_twelve_files_of_the_physics_import_each_other_in_a_ring() {
-    let doomed = doomed();
     for (folder, _) in ARROWS.iter().filter(|(folder, _)| folder.starts_with("agents") || *folder == "crates/runtime") {
         let modules = modules(folder);
-        let kept = |file: &str| !doomed.contains(file) && !is_test(file);
+        let kept = |file: &str| !is_test(file);
         let arrows: BTreeMap<_, _> = modules
             .iter()
             .filter(|(_, file)| kept(file))

@@ -10,15 +10,6 @@ pub enum Law {
     Cluster,
     /// Asynchronous: one side computes the impulses and books them in a ledger, the other takes them in its next step.
     Ledger,
-    /// Each side pushes itself off the other's last known state, as most engines do: for comparison.
-    Penalty {
-        /// Stiffness of the contact, N/m, > 0; stable below 0.55 μ/τ² (docs/theory/coupling.md).
-        stiffness_n_m: f64,
-        /// Damping of the contact, N·s/m, ≥ 0.
-        damping_n_s_m: f64,
-        /// Whether the other's state is brought forward to one's own time.
-        extrapolate: bool,
-    },
     /// Wave variables on a line between the two: passive whatever the delay, at the price of a mass k T².
     Tlm {
         /// Stiffness of the line, N/m, > 0.

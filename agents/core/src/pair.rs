@@ -11,10 +11,6 @@ pub enum PairKind {
     Ledger,
     /// Contact within one cluster.
     Cluster,
-    /// Contact by penalty forces from stale states.
-    Penalty,
-    /// Contact by penalty forces from states that are brought forward.
-    PenaltyExtrapolated,
     /// Contact or link by wave variables.
     Tlm,
     /// A tool's hold.
@@ -24,26 +20,12 @@ pub enum PairKind {
 }
 
 impl PairKind {
-    /// Contact by penalty forces, whose two sides each push themselves.
-    #[must_use]
-    pub const fn of_penalty(extrapolate: bool) -> Self {
-        if extrapolate { Self::PenaltyExtrapolated } else { Self::Penalty }
-    }
-
-    /// Whether it is a contact by penalty forces.
-    #[must_use]
-    pub const fn is_penalty(self) -> bool {
-        matches!(self, Self::Penalty | Self::PenaltyExtrapolated)
-    }
-
     /// The word of reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ledger => "ledger",
             Self::Cluster => "cluster",
-            Self::Penalty => "penalty",
-            Self::PenaltyExtrapolated => "penalty-extrapolated",
             Self::Tlm => "tlm",
             Self::Grasp => "grasp",
             Self::Attachment => "attach",

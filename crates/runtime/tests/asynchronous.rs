@@ -29,7 +29,7 @@ fn body(name: &str, solid: Solid, height_m: f64, mass_kg: f64, rate_hz: f64) -> 
         restitution: 0.0,
     };
     let scene = Arc::new(ClusterScene::new(&[floor]).unwrap());
-    AgentSpawn { clusters: Some(scene), ..AgentSpawn::alone(name, Box::new(RigidBody::new(spec).unwrap()), rate_hz) }
+    AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(RigidBody::new(spec).unwrap()), rate_hz) }
 }
 
 /// A ball over a plate on the floor, by a law.

@@ -93,18 +93,15 @@ impl Coupling {
         self.parasitic_kg = state.parasitic_kg;
     }
 
-    fn record_error(&mut self, error: f64) {
-        self.momentum_error = Some(self.momentum_error.filter(|_| self.compared).unwrap_or(0.0).max(error));
-        self.compared = true;
-    }
-
     /// Compares the ledgers of both sides, which differ by `apart_n_s`.
     fn compare(&mut self, apart_n_s: f64, same_reading: bool) {
         if self.impulse_n_s <= 0.0 {
             return;
         }
         if same_reading {
-            self.record_error(apart_n_s / self.impulse_n_s);
+            let error = apart_n_s / self.impulse_n_s;
+            self.momentum_error = Some(self.momentum_error.filter(|_| self.compared).unwrap_or(0.0).max(error));
+            self.compared = true;
         } else if !self.compared {
             self.momentum_error = Some((apart_n_s - self.in_flight_n_s).max(0.0) / self.impulse_n_s);
         }
@@ -173,19 +170,6 @@ impl Couplings {
         let Some((mine, theirs)) = newest.get(owner.0 as usize).zip(newest.get(other.0 as usize)) else { return };
         let held_by_tool = state.kind == PairKind::Grasp && theirs.body.tool().is_some();
         let (a, b) = if held_by_tool { (other, owner) } else { (owner, other) };
-        if let Some(back) = both_sides(state, theirs, owner) {
-            // each side of a penalty force computes its own value: one coupling, and the difference of the two
-            let greatest = state.impulse_n_s.max(back.impulse_n_s);
-            let (a, b) = (a.min(b), a.max(b));
-            let coupling = self.at(a, b, state.kind.name());
-            if owner == a {
-                coupling.update(state);
-            }
-            if greatest > 0.0 {
-                coupling.record_error((state.impulse_n_s - back.impulse_n_s).abs() / greatest);
-            }
-            return;
-        }
         let coupling = self.at(a, b, state.kind.name());
         coupling.update(state);
         if held_by_tool {
@@ -217,11 +201,6 @@ impl Couplings {
         }
         at
     }
-}
-
-/// The state of the same pair as its peer publishes it, where both sides apply forces.
-fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Option<&'s PairState> {
-    theirs.pairs.iter().find(|back| state.kind.is_penalty() && back.with == owner && back.kind == state.kind)
 }
 
 /// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
@@ -288,19 +267,6 @@ mod tests {
             (couplings.all().len(), couplings.all()[0].kind, couplings.all()[0].force_max_n),
             (1, "ledger", 3.0)
         );
-    }
-
-    #[test]
-    fn the_two_sides_of_a_penalty_are_one_coupling_with_their_difference() {
-        for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
-            let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
-            let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
-            let mut couplings = Couplings::default();
-            note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
-            let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
-            assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, name));
-            assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
-        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! has f = Z v + c. Z = k T, so the line has a mass k T² of its own. Each end publishes the time integral of the wave it sent:
 //! lost readings lose nothing, double readings repeat nothing, and averages over a step only dissipate.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use metachron_core::Wave;
 use metachron_core::{SimSpan, SimTime};
 use std::collections::VecDeque;
@@ -42,38 +42,6 @@ pub struct LineLaw {
     pub along: Option<DVec3>,
     /// The part of the arriving wave that the line reflects, N.
     pub arriving: DVec3,
-}
-
-/// One end of a link during a step.
-#[derive(Debug, Clone, Copy)]
-pub struct LineEnd {
-    /// Start time of the step, and its length, seconds.
-    pub step: (SimTime, f64),
-    /// Its own velocity at the end of the step without the link, m/s.
-    pub own: DVec3,
-    /// Velocity of the other end as far as it is known, m/s.
-    pub far: DVec3,
-    /// Vector from here to the other end, metres.
-    pub way: DVec3,
-    /// The arriving wave, N.
-    pub arriving: DVec3,
-    /// The velocity that a force on this end causes by the end of the step, m/s per newton.
-    pub yields: DMat3,
-    /// Rest length: the distance at which the link exerts no force, metres, ≥ 0.
-    pub rest_m: f64,
-    /// Damping parallel to the line, N·s/m, ≥ 0.
-    pub damping_n_s_m: f64,
-}
-
-/// The forces of a link at one end.
-#[derive(Debug, Clone, Copy)]
-pub struct LinkForces {
-    /// The force on this end, N.
-    pub force: DVec3,
-    /// The part of the arriving wave that the line reflects, N: the part along the link where that has a rest length.
-    pub arriving: DVec3,
-    /// The force into the line, N.
-    pub into_line: DVec3,
 }
 
 /// One end of a line.
@@ -173,30 +141,6 @@ impl Line {
             let velocity = (law.drive_n - force) / law.resistance_n_s_m;
             self.send(law.arriving, velocity * self.impedance() + law.arriving, h);
         }
-    }
-
-    /// The forces of a link on this line at one end, implicit in its own motion.
-    ///
-    /// The line carries the changes since it was made; its stretch at that time acts as a constant force. Without a rest
-    /// length the link is isotropic, else it acts along itself.
-    #[must_use]
-    pub fn forces(&self, end: &LineEnd) -> LinkForces {
-        let direction = end.way.normalize_or_zero();
-        let here = if end.rest_m > 0.0 {
-            DMat3::from_cols(direction * direction.x, direction * direction.y, direction * direction.z)
-        } else {
-            DMat3::IDENTITY
-        };
-        let (at, h) = end.step;
-        let acting_share = (1.0 - self.since.secs_after(at) / h).clamp(0.0, 1.0);
-        let stiffness = if self.delay_s > 0.0 { acting_share * self.stiffness_n_m } else { 0.0 };
-        let start = if end.rest_m > 0.0 { direction * (self.start.length() - end.rest_m) } else { self.start };
-        let (z, c) = (self.impedance(), end.damping_n_s_m);
-        let arriving = here * end.arriving;
-        let drive = start * stiffness - arriving + here * ((end.far - end.own) * c - end.own * z);
-        let force = (DMat3::IDENTITY + here * end.yields * (z + c)).inverse() * drive;
-        let into_line = here * (end.own + end.yields * force) * z + arriving;
-        LinkForces { force, arriving, into_line }
     }
 
     /// The average of the wave that arrives in the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.

@@ -51,7 +51,7 @@ fn computes_link(all: &[Participant<'_>], one: &Participant<'_>, link: &Link) ->
         Law::Cluster => far.is_none_or(|far| !far.is_remote()),
         Law::Ledger => far.is_some_and(|far| !far.spares(one.id)),
         Law::Tlm { .. } => far.is_some_and(|far| !far.is_remote()),
-        Law::Penalty { .. } | Law::Off => false,
+        Law::Off => false,
     }
 }
 

@@ -101,8 +101,8 @@ fn an_impulse_wakes_its_receiver() {
 fn laws_and_attachments_are_known_on_both_sides() {
     let log = Log::default();
     let mut spawns: Vec<_> = (0..4).map(|_| ball(0.0, 0.0, &log).at(240.0)).collect();
-    let penalty = Law::Penalty { stiffness_n_m: 10.0, damping_n_s_m: 1.0, extrapolate: false };
-    spawns[2].laws = vec![(AgentId(0), penalty), (AgentId(1), Law::Off)];
+    let line = Law::Tlm { stiffness_n_m: 10.0, damping_n_s_m: 1.0 };
+    spawns[2].laws = vec![(AgentId(0), line), (AgentId(1), Law::Off)];
     let link = Link {
         other: AgentId(3),
         here: Anchor::Arc(0.5),
@@ -121,9 +121,9 @@ fn laws_and_attachments_are_known_on_both_sides() {
         (met.collect::<Vec<_>>(), actor.links.clone())
     };
     let ledger = Law::Cluster;
-    assert_eq!(seen(0), (vec![(1, ledger, true), (2, penalty, true), (3, ledger, true)], vec![]));
+    assert_eq!(seen(0), (vec![(1, ledger, true), (2, line, true), (3, ledger, true)], vec![]));
     assert_eq!(seen(1), (vec![(3, ledger, true), (0, ledger, true)], vec![link]), "links come first");
-    assert_eq!(seen(2), (vec![(0, penalty, true), (3, ledger, true)], vec![]));
+    assert_eq!(seen(2), (vec![(0, line, true), (3, ledger, true)], vec![]));
     let back = Link { other: AgentId(1), here: link.there, there: link.here, ..link };
     assert_eq!(seen(3), (vec![(1, ledger, true), (0, ledger, true), (2, ledger, true)], vec![back]));
 }
