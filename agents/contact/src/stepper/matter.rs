@@ -82,7 +82,7 @@ impl Matter {
         let view = match &form.kind {
             ShapeKind::Solid(_) => ShapePose::Solid { position: *position, rotation: *rotation },
             ShapeKind::Tool(_) => ShapePose::Tool { tip: *position, rotation: *rotation, jaw: self.jaw? },
-            ShapeKind::Chain { .. } => ShapePose::Chain { positions: points, radii_m },
+            ShapeKind::Chain => ShapePose::Chain { positions: points, radii_m },
             ShapeKind::Surface(_) => ShapePose::Surface(points),
         };
         Some(PlacedShape { form, view })
