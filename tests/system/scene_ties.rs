@@ -208,12 +208,12 @@ fn joints_of_one_pair_must_leave_something_free_together() {
 fn couplings_name_laws_and_points_of_both_objects() {
     let scene = with(
         r#"coupling = [
-        { a = "left", b = "right", law = "penalty-extrapolated", stiffness_n_m = 50, damping_n_s_m = 2 },
+        { a = "left", b = "right" },
         { a = "hose", b = "right", kind = "attach", at_a = 0.25, at_b = [0, 0, 0.5], stiffness_n_m = 10, rest_m = 0.5 },
         { a = "tool", b = "hose", law = "off" },
     ]"#,
     );
-    assert_eq!(scene.couplings[0].law, Law::Penalty { stiffness_n_m: 50.0, damping_n_s_m: 2.0, extrapolate: true });
+    assert_eq!((scene.couplings[0].kind, scene.couplings[0].law), (CouplingKind::Contact, Law::Ledger));
     let CouplingKind::Attach { at_a: Anchor::Arc(arc_m), at_b: Anchor::Local(local), rest_m, .. } =
         scene.couplings[1].kind
     else {

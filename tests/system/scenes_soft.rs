@@ -57,15 +57,6 @@ fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
 }
 
 #[test]
-fn a_coupling_by_a_law_that_soft_bodies_do_not_know_is_refused() {
-    let ball =
-        "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
-    let couple = "[[coupling]]\na = \"s\"\nb = \"b\"\nlaw = \"penalty\"\nstiffness_n_m = 10\n";
-    let error = read(&format!("[[object]]\n{SHEET}young_pa = 1e5\n{ball}{couple}")).expect_err("no such law");
-    assert!(error.problems[0].message.contains("sheets, solids and ropes do not support"), "{:?}", error.problems);
-}
-
-#[test]
 fn the_gut_hangs_from_its_mesentery_and_the_grasper_feels_it() {
     let report = lockstep("mesentery", &["--seconds", "2.5"]);
     for name in ["gut", "mesentery"] {

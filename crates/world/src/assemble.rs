@@ -80,7 +80,6 @@ fn spawn(
         links: member.links.clone(),
         laws: ties.laws(member.id),
         attached: ties.attached(member.id),
-        together: ties.together(member.id),
         scene: Arc::default(),
         faults: faults(member.faults),
         watches: watches.collect(),
