@@ -82,6 +82,18 @@ impl Scene {
         }
     }
 
+    /// What bends and is held through a static solid, with the solid's index: it passes through as if the solid were bored.
+    pub(super) fn held_through(&self) -> impl Iterator<Item = (AgentId, usize)> + '_ {
+        let mut pairs = Vec::new();
+        self.overlaps_with_static(&mut pairs);
+        pairs.into_iter().filter_map(|(id, container, _)| match container {
+            Container::Fixed(at) if self.agents[id.0 as usize].spec.is_deformable() && !self.is_free(id) => {
+                Some((id, at))
+            }
+            _ => None,
+        })
+    }
+
     /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
     fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&StartShape, &StartShape, f64)) {
         let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());

@@ -39,7 +39,7 @@ pub use memory::{ContactMemory, Partner};
 use metachron_core::{AgentId, Grip, SimSpan, StepError, check_span, recycled};
 pub use plan::Plan;
 use progress::Progress;
-pub use scene::ClusterScene;
+pub use scene::{ClusterScene, Passage};
 use search::{Judge, Round, Search};
 use ties::{FineStep, Ties, place_key};
 
