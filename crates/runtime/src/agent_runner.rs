@@ -239,7 +239,7 @@ impl AgentRunner {
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<PendingTurn>, Effort), String> {
         self.take_commands();
         let now = timeline.sim_at(wall);
-        let near = self.is_near_others(now, self.pace.is_late(timeline, wall));
+        let near = self.keeps_common_time(now, self.pace.is_late(timeline, wall));
         let before = self.pace.time();
         let start = self.pace.begin(timeline, wall, near);
         let jumped = self.pace.time().since(before);

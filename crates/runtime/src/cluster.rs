@@ -37,6 +37,8 @@ const STRETCHED_MAX_S: f64 = 1.0 / 60.0;
 /// What an agent brings into the cluster that it is stepped in.
 pub(super) struct ClusterSeat {
     scene: Arc<ClusterScene>,
+    /// Agents that joints hold it to.
+    jointed: Vec<AgentId>,
     /// Only of one that makes turns.
     stepper: Option<Box<ClusterStepper>>,
     memory: ContactMemory,
@@ -105,13 +107,15 @@ impl std::fmt::Debug for ClusterSeat {
 }
 
 impl ClusterSeat {
-    /// A seat in the clusters of `scene`; `asynchronous` of an agent that has pairs with clocks of their own.
-    pub fn new(scene: Arc<ClusterScene>, asynchronous: bool) -> Self {
+    /// A seat in the clusters of `scene`, whose joints hold it to the agents `jointed`; `asynchronous` of an agent that has pairs with clocks
+    /// of their own.
+    pub fn new(scene: Arc<ClusterScene>, jointed: Vec<AgentId>, asynchronous: bool) -> Self {
         Self {
             asynchronous: asynchronous.then(Box::default),
             remotes: None,
             sides: Vec::new(),
             scene,
+            jointed,
             stepper: None,
             memory: ContactMemory::default(),
             grips: Vec::new(),
@@ -163,6 +167,7 @@ impl ClusterSeat {
         };
         self.bonds.clear();
         self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
+        self.bonds.extend_from_slice(&self.jointed);
         let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
         self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
         self.bonds.sort_unstable();
@@ -329,6 +334,16 @@ impl AgentRunner {
     fn wish(&mut self) -> Option<Wish> {
         let step_s = self.pace.wanted().as_secs_f64();
         self.agent.member().map(|member| Wish { role: member.role(), step_s })
+    }
+
+    /// Looks around before the first step: the agents with which it begins in one cluster.
+    pub fn look_first(&mut self) -> &[AgentId] {
+        let step = PlannedStep { start: self.pace.scene_time(), dt: self.pace.dt() };
+        let Self { observer, peers, writer, links, cluster, .. } = self;
+        let Some(seat) = cluster else { return &[] };
+        observer.update(peers, writer, step, &Membership::default());
+        seat.bond(observer, links, peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws));
+        &seat.bonds
     }
 
     /// Looks around for itself and for all that step with it.

@@ -43,8 +43,6 @@ pub struct AgentSpawn {
     pub laws: Vec<(AgentId, Law)>,
     /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
     pub attached: Vec<Link>,
-    /// An agent with which it shares a cluster from the first step on: the lower number leads.
-    pub together: Option<AgentId>,
     /// The surroundings of the clusters in which it is stepped; without effect for an agent that is no member
     /// ([`metachron_contact::Agent::member`]).
     pub scene: Arc<ClusterScene>,
@@ -72,7 +70,6 @@ impl AgentSpawn {
             links: Vec::new(),
             laws: Vec::new(),
             attached: Vec::new(),
-            together: None,
             scene: Arc::default(),
             faults: Faults::default(),
             watches: Vec::new(),
@@ -160,13 +157,16 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<AssembledRun, RunE
     let sleep = Arc::new(SleepRegistry::new(count));
     let (peers, writers) = peers(&mut spawns, &sleep);
     let peers = Arc::new(peers);
-    let together: Vec<_> = spawns.iter().map(|spawn| spawn.together).collect();
+    let mut jointed = jointed(&spawns);
     let ids = (0..).map(AgentId);
-    let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
+    let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| {
+        let jointed = std::mem::take(&mut jointed[id.0 as usize]);
+        actor(id, Seated { spawn, jointed, writer }, &peers)
+    });
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
     let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign_leaders(actors, &together), handles, sleep })
+    Ok(AssembledRun { actors: assign_leaders(actors), handles, sleep })
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -184,8 +184,7 @@ fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
         return Err(RunError::BadFaults { name: name(), jitter, loss });
     }
     let laws = spawn.laws.iter().map(|(id, _)| *id);
-    let mut others =
-        spawn.links.iter().copied().chain(laws).chain(spawn.attached.iter().map(|l| l.other)).chain(spawn.together);
+    let mut others = spawn.links.iter().copied().chain(laws).chain(spawn.attached.iter().map(|l| l.other));
     match others.find(|other| other.0 as usize >= agents) {
         Some(link) => Err(RunError::BadLink { name: name(), link: link.0 }),
         None => Ok(()),
@@ -224,6 +223,19 @@ fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<S
     store_laws(spawns, &mut all);
     let broad_phase = may_any_touch(&all).then(|| BroadPhase::new(all.len()));
     (Peers { all, broad_phase }, writers)
+}
+
+/// For each agent those that joints hold it to.
+fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<AgentId>> {
+    let mut jointed = vec![Vec::new(); spawns.len()];
+    for (spawn, a) in spawns.iter().zip((0..).map(AgentId)) {
+        let others = spawn.scene.joints_of(a).filter_map(|(_, joint)| joint.b);
+        for b in others.filter(|b| (b.0 as usize) < spawns.len()) {
+            jointed[a.0 as usize].push(b);
+            jointed[b.0 as usize].push(a);
+        }
+    }
+    jointed
 }
 
 /// Whether any two agents could touch.
@@ -268,7 +280,16 @@ fn shared(
     }
 }
 
-fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> AgentRunner {
+/// What an agent is assembled from.
+struct Seated {
+    spawn: AgentSpawn,
+    /// Agents that joints hold it to.
+    jointed: Vec<AgentId>,
+    writer: SlotWriter<Snapshot>,
+}
+
+fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
+    let Seated { mut spawn, jointed, writer } = parts;
     let me = &peers.all[id.0 as usize];
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
@@ -279,7 +300,7 @@ fn actor(id: AgentId, mut spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWri
     let mut asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
     let asynchronous = asynchronous.any(Law::is_asynchronous);
     let is_member = spawn.agent.member().is_some();
-    let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, asynchronous)));
+    let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, jointed, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
     AgentRunner {

@@ -7,7 +7,7 @@ use super::ties::{Ties, faults};
 use super::world::WorldError;
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::stepper::{ClusterScene, Passage};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -39,6 +39,8 @@ pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) 
 fn surroundings(scene: &Scene) -> Result<ClusterScene, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
+    let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
+    let among = among.with_passages(passages);
     among.jointed(Arc::clone(&scene.joints)).map_err(|error| failed(error.to_string()))
 }
 
@@ -80,7 +82,6 @@ fn spawn(
         links: member.links.clone(),
         laws: ties.laws(member.id),
         attached: ties.attached(member.id),
-        together: ties.together(member.id),
         scene: Arc::default(),
         faults: faults(member.faults),
         watches: watches.collect(),

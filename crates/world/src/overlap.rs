@@ -1,10 +1,9 @@
 //! Finds agents that start in contact with or inside each other or static solids.
 //!
-//! In: a scene. Out: all pairs that overlap although they collide, and how deep; every pair in contact; every
-//! pair of rigid bodies so near that rotation could bring them into contact.
+//! In: a scene. Out: all pairs that overlap although they collide, and how deep.
 //! Never here: the response to it.
 
-use super::couplings::{Coupling, CouplingKind};
+use super::couplings::CouplingKind;
 use super::initial_shape::{StartShape, shape};
 use super::scene::{Scene, Spec};
 use metachron_contact::Law;
@@ -15,8 +14,6 @@ use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
 pub(super) const OVERLAP_MIN_M: f64 = 2e-5;
-/// Bodies no farther apart than this count as in contact, metres.
-const TOUCH_MAX_M: f64 = 1e-4;
 
 /// An agent that starts inside another agent or inside a static solid.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,44 +82,16 @@ impl Scene {
         }
     }
 
-    /// Every pair of agents that starts in contact and is solved with all that it touches.
-    #[must_use]
-    pub fn touching_pairs(&self) -> Vec<(AgentId, AgentId)> {
-        let other = self.pairs_by_other_laws();
+    /// What bends and is held through a static solid, with the solid's index: it passes through as if the solid were bored.
+    pub(super) fn held_through(&self) -> impl Iterator<Item = (AgentId, usize)> + '_ {
         let mut pairs = Vec::new();
-        self.pairs_within(TOUCH_MAX_M, |one, two, _| {
-            let pair = (one.id.min(two.id), one.id.max(two.id));
-            if !other.contains(&pair) {
-                pairs.push(pair);
+        self.overlaps_with_static(&mut pairs);
+        pairs.into_iter().filter_map(|(id, container, _)| match container {
+            Container::Fixed(at) if self.agents[id.0 as usize].spec.is_deformable() && !self.is_free(id) => {
+                Some((id, at))
             }
-        });
-        pairs.sort_unstable();
-        pairs
-    }
-
-    /// Every pair of rigid agents of equal rate whose bounding spheres overlap and that is solved with all that it touches.
-    #[must_use]
-    pub fn near_pairs(&self) -> Vec<(AgentId, AgentId)> {
-        let rate = |id: AgentId| self.agents.get(id.0 as usize).map(|member| member.pace.rate_hz);
-        let other = self.pairs_by_other_laws();
-        let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
-        let mut pairs = Vec::new();
-        self.box_pairs(rigid.filter_map(shape).collect(), 0.0, |one, two| {
-            let pair = (one.id.min(two.id), one.id.max(two.id));
-            let apart_m = (one.low + one.high).distance(two.low + two.high) / 2.0;
-            let reach_m = (one.high.x - one.low.x + two.high.x - two.low.x) / 2.0;
-            if apart_m < reach_m && rate(pair.0) == rate(pair.1) && !other.contains(&pair) {
-                pairs.push(pair);
-            }
-        });
-        pairs.sort_unstable();
-        pairs
-    }
-
-    /// Pairs with a contact law of their own.
-    fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
-        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Cluster;
-        self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()
+            _ => None,
+        })
     }
 
     /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.

@@ -1,11 +1,11 @@
-//! Converts the joints, couplings and faults of a scene for agents and the runtime.
+//! Converts the couplings and faults of a scene for agents and the runtime.
 //!
-//! In: a [`Scene`]. Out: for each agent its laws, links, faults, and the leader of the cluster in which it begins. Never here: forces.
+//! In: a [`Scene`]. Out: for each agent its laws, links and faults. Never here: forces.
 
 use super::couplings::{Coupling, CouplingKind};
 use super::{Scene, Spec};
 use metachron_contact::{Law, Link};
-use metachron_core::{AgentId, DisjointSets};
+use metachron_core::AgentId;
 use metachron_runtime::Faults;
 use std::collections::BTreeMap;
 
@@ -13,7 +13,6 @@ use std::collections::BTreeMap;
 pub struct Ties {
     laws: BTreeMap<AgentId, Vec<(AgentId, Law)>>,
     attached: BTreeMap<AgentId, Vec<Link>>,
-    leaders: Vec<AgentId>,
 }
 
 impl Ties {
@@ -27,7 +26,7 @@ impl Ties {
         for (id, link) in scene.couplings.iter().filter_map(link) {
             attached.entry(id).or_default().push(link);
         }
-        Self { laws, attached, leaders: leaders(scene) }
+        Self { laws, attached }
     }
 
     /// The contact laws between `id` and its peers that are not the ledger; returned for one side of a pair.
@@ -38,11 +37,6 @@ impl Ties {
     /// The permanent links of `id`; returned for one side of a pair.
     pub fn attached(&mut self, id: AgentId) -> Vec<Link> {
         self.attached.remove(&id).unwrap_or_default()
-    }
-
-    /// The leader of the cluster in which `id` begins, if ties or contact connect it to others: the lowest number among them.
-    pub fn together(&self, id: AgentId) -> Option<AgentId> {
-        self.leaders.get(id.0 as usize).copied().filter(|leader| *leader != id)
     }
 }
 
@@ -80,31 +74,4 @@ fn link(coupling: &Coupling) -> Option<(AgentId, Link)> {
     let CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m } = coupling.kind else { return None };
     let law = coupling.law;
     Some((coupling.a, Link { other: coupling.b, here: at_a, there: at_b, stiffness_n_m, damping_n_s_m, rest_m, law }))
-}
-
-/// More bodies than this near each other begin in one cluster, instead of joining it one by one.
-const HEAP_MIN: usize = 128;
-
-/// For each agent the lowest number among those that are connected to it by joints, by attachments, by contact at the start or as a heap:
-/// its own if there are none. A stack that starts at rest must not first be dropped on itself, and a thousand bodies about to touch must
-/// not first detect each other one by one.
-fn leaders(scene: &Scene) -> Vec<AgentId> {
-    let mut sets = DisjointSets::default();
-    sets.reset(scene.agents.len());
-    let jointed = scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?)));
-    let attached = scene.couplings.iter().filter(|c| c.kind != CouplingKind::Contact && c.law == Law::Ledger);
-    let pairs = jointed.chain(attached.map(|c| (c.a, c.b))).chain(scene.touching_pairs()).chain(heaps(scene));
-    pairs.for_each(|(a, b)| sets.join(a.0 as usize, b.0 as usize));
-    (0..sets.len()).map(|at| AgentId(sets.lowest(at) as u32)).collect()
-}
-
-/// The pairs of rigid bodies near each other that belong to heaps of more than [`HEAP_MIN`].
-fn heaps(scene: &Scene) -> Vec<(AgentId, AgentId)> {
-    let mut pairs = scene.near_pairs();
-    let (mut sets, mut sizes) = (DisjointSets::default(), vec![0; scene.agents.len()]);
-    sets.reset(sizes.len());
-    pairs.iter().for_each(|(a, b)| sets.join(a.0 as usize, b.0 as usize));
-    (0..sizes.len()).for_each(|at| sizes[sets.lowest(at)] += 1);
-    pairs.retain(|(a, _)| sizes[sets.lowest(a.0 as usize)] > HEAP_MIN);
-    pairs
 }

@@ -48,7 +48,7 @@ pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
-pub use scene::ClusterScene;
+pub use scene::{ClusterScene, Passage};
 use search::{Judge, Round, Search};
 use ties::{FineStep, Ties, place_key};
 

@@ -17,6 +17,17 @@ pub struct ClusterScene {
     by_body: Vec<u32>,
     /// Pairs of jointed bodies that do not collide, the lower number first, sorted.
     apart: Vec<[AgentId; 2]>,
+    /// Sorted.
+    passages: Vec<Passage>,
+}
+
+/// A static solid that a body passes through: one through which it is held on both sides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Passage {
+    /// The body.
+    pub body: AgentId,
+    /// The solid's number.
+    pub solid: u32,
 }
 
 impl ClusterScene {
@@ -43,6 +54,19 @@ impl ClusterScene {
         apart.sort_unstable();
         apart.dedup();
         Ok(Self { joints, by_body, apart, ..self })
+    }
+
+    /// The same with static solids that bodies pass through.
+    #[must_use]
+    pub fn with_passages(mut self, passages: impl IntoIterator<Item = Passage>) -> Self {
+        self.passages.extend(passages);
+        self.passages.sort_unstable();
+        self
+    }
+
+    /// Whether a body passes through a static solid.
+    pub fn has_passage(&self, passage: Passage) -> bool {
+        self.passages.binary_search(&passage).is_ok()
     }
 
     /// The joints whose first body is `id`, with their numbers.

@@ -8,7 +8,7 @@ mod sweep;
 
 use super::memory::Partner;
 use super::remote;
-use super::scene::ClusterScene;
+use super::scene::{ClusterScene, Passage};
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
 use boxes::Boxes;
@@ -194,7 +194,8 @@ impl Search {
             if one.member.is_led() {
                 continue; // what leads it is stronger than what never moves
             }
-            for (number, solid) in (0..).zip(scene.statics()) {
+            let met = |number: u32| !scene.has_passage(Passage { body: one.id, solid: number });
+            for (number, solid) in (0..).zip(scene.statics()).filter(|(number, _)| met(*number)) {
                 self.find_of(round, Pair { member, against: Against::Static { number, solid } });
             }
         }

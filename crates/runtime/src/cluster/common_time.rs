@@ -47,9 +47,9 @@ impl AgentRunner {
         awaited.map(|n| n.snapshot.time.as_nanos()).reduce(u64::wrapping_add)
     }
 
-    /// Whether it keeps one time with others: some are near that do not step with it, or have not taken yet what it gave.
-    /// Not asked where nobody is late.
-    pub fn is_near_others(&mut self, now: SimTime, late: bool) -> bool {
+    /// Whether it keeps one time with others: it leads some, or some are near that do not step with it, or have not taken yet what it
+    /// gave. Not asked where nobody is late.
+    pub fn keeps_common_time(&mut self, now: SimTime, late: bool) -> bool {
         let is_any_behind = self.pace.clock_offset() > SimSpan::ZERO || self.shared.sleep.is_any_far_behind(now);
         let was_near = self.was_near.take();
         if !(late || is_any_behind) {
@@ -66,15 +66,15 @@ impl AgentRunner {
         if is_any_behind {
             self.agree_on_time(was_near, is_near);
         }
-        is_near
+        is_near || !self.led.is_empty()
     }
 
-    /// A newcomer takes the time of those it comes near for its own, and an agent that nobody is near any more that of the scene. One that
-    /// was near them before it was asked keeps its own: it has a share in what they do.
+    /// A newcomer takes the time of those it comes near for its own, and an agent that is alone again that of the scene. One that was near
+    /// them before it was asked, or leads others, keeps its own: it has a share in what they do.
     fn agree_on_time(&mut self, was_near: Option<bool>, is_near: bool) {
         let clock_offset = match (was_near, is_near) {
-            (_, false) => SimSpan::ZERO,
             (Some(false), true) => self.offset_of_last(),
+            (_, false) if self.led.is_empty() => SimSpan::ZERO,
             _ => return,
         };
         if clock_offset != self.pace.clock_offset() {

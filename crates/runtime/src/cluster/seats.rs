@@ -265,17 +265,13 @@ pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> R
     Ok(())
 }
 
-/// Seats agents that belong `together` before the first step: for each place in the list, the agent that makes turns of its own.
-pub(in super::super) fn assign_leaders(
-    actors: Vec<AgentRunner>,
-    together: &[Option<AgentId>],
-) -> Vec<Option<Box<AgentRunner>>> {
+/// Seats agents that belong together before the first step: those that may touch in it, and those that links or joints connect. For each place
+/// in the list, the agent that makes turns of its own.
+pub(in super::super) fn assign_leaders(mut actors: Vec<AgentRunner>) -> Vec<Option<Box<AgentRunner>>> {
     let mut sets = DisjointSets::default();
-    sets.reset(together.len());
-    for (at, other) in together.iter().enumerate() {
-        if let Some(other) = other.map(|id| id.0 as usize).filter(|other| *other < together.len()) {
-            sets.join(at, other);
-        }
+    sets.reset(actors.len());
+    for (at, actor) in actors.iter_mut().enumerate().filter(|(_, actor)| actor.shared.handover.is_some()) {
+        actor.look_first().iter().for_each(|other| sets.join(at, other.0 as usize));
     }
     let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
     for at in 0..places.len() {

@@ -3,6 +3,8 @@
 use super::super::lockstep::Lockstep;
 use super::super::testing::{Dummy, Fault, Log, RecordedStep, Swing, eventually, on_every_executor, system};
 use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
+use metachron_contact::joint::{Joint, JointKind};
+use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};
@@ -136,16 +138,19 @@ fn a_led_step_costs_what_its_members_cost() {
 #[test]
 fn agents_that_belong_together_are_led_before_the_first_step() {
     let log = Log::default();
-    let mut spawns = close(&log);
-    // a chain of pairs, named from either side
-    spawns[1].together = Some(AgentId(2));
-    spawns[4].together = Some(AgentId(1));
-    spawns[5].together = Some(AgentId(5));
-    let run = lockstep(spawns, Machine::two_cores_software());
-    let leaders: Vec<_> = run.agents().iter().map(|a| a.stats().led_by.map(|id| id.0)).collect();
-    assert_eq!(leaders, [None, None, Some(1), None, Some(1), None]);
-    drop(run);
+    let at = |z: f64| Dummy { z, ..Dummy::member(20.0, &log) }.at(240.0);
+    let mut spawns: Vec<_> = [0.0, 10.0, 20.0, 20.1, 30.0, 40.0].map(at).into();
+    let rope = |a, b| Joint::new(AgentId(a), Some(AgentId(b)), JointKind::Rope { length_m: 30.0 });
+    let scene = ClusterScene::default().jointed([rope(4, 1), rope(1, 2)].into()).unwrap();
+    let scene = Arc::new(scene);
+    spawns.iter_mut().for_each(|spawn| spawn.scene = Arc::clone(&scene));
+    let mut run = lockstep(spawns, Machine::two_cores_software());
+    let leaders = |run: &Lockstep| run.agents().iter().map(|a| a.led_by().map(|id| id.0)).collect::<Vec<_>>();
+    // joints hold 1, 2 and 4, and 3 may touch 2
+    assert_eq!(leaders(&run), [None, None, Some(1), Some(1), Some(1), None]);
     assert!(log.lock().unwrap().is_empty());
+    run.wait_until(ms(1000));
+    assert_eq!(leaders(&run), [None, None, Some(1), Some(1), Some(1), None], "however far joints reach");
 }
 
 #[test]

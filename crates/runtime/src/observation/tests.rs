@@ -182,7 +182,6 @@ fn invalid_faults_and_unknown_peers_are_refused() {
     assert!(refuse(|s| s.faults.loss = 1.0).contains("loss 1 must"));
     assert!(refuse(|s| s.faults.jitter = f64::NAN).contains("dummy at 60"));
     assert!(refuse(|s| s.laws = vec![(AgentId(4), Law::Off)]).contains("agent 4"));
-    assert!(refuse(|s| s.together = Some(AgentId(5))).contains("agent 5"));
 }
 
 #[test]

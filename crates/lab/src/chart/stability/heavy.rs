@@ -246,7 +246,6 @@ fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
         let spec = RigidSpec { rotation, gravity: DVec3::NEG_Z * GRAVITY, ..plain };
         let body = Box::new(RigidBody::new(spec).ok()?);
         let mut one = AgentSpawn::alone(format!("link-{i}"), body, case.rate_hz);
-        one.together = (i > 0).then_some(AgentId(0));
         one.scene = Arc::clone(&scene);
         spawns.push(one);
     }
