@@ -5,9 +5,11 @@
 
 use super::banded_ldl::Row;
 use super::energy_limiter;
+use super::history::History;
+use super::method::Integrator;
 use super::rest::RestDetector;
 use super::state::RodState;
-use super::step::{Divergence, Setting, TURN_MAX_RAD};
+use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::{Iterate, SubstepProblem, assemble};
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
@@ -36,6 +38,7 @@ pub(super) struct Unknowns {
 #[derive(Debug, Clone, Default)]
 struct Kept {
     now: RodState,
+    past: History,
     rest: RestDetector,
     time: SimTime,
     quiet_before: bool,
@@ -44,6 +47,8 @@ struct Kept {
     steps: u64,
 }
 
+/// Velocities differ by less than this through rounding alone, m/s and rad/s.
+const ROUNDING_M_S: f64 = 1e-9;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
 const RISES: f64 = 2.0;
 
@@ -171,18 +176,20 @@ impl ClusterMember for Tube {
     }
 
     fn keep(&mut self) {
-        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, .. } = self;
+        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, stepper, .. } = self;
         let kept = &mut unknowns.kept;
         kept.now.copy_from(now);
+        kept.past.copy_from(&stepper.past);
         kept.rest.copy_from(rest);
         (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
         kept.acceleration = *acceleration;
     }
 
     fn go_back(&mut self) {
-        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, matter, division, .. } = self;
+        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } = self;
         let kept = &unknowns.kept;
         now.copy_from(&kept.now);
+        stepper.past.copy_from(&kept.past);
         // a copy has no forces
         now.strain(matter, division);
         rest.copy_from(&kept.rest);
@@ -197,27 +204,13 @@ impl ClusterMember for Tube {
         }
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
         let before = self.momentum().0;
         let unknowns = std::mem::take(&mut self.unknowns);
-        let finite = self.step_by(h_s, |stepper, now, setting, _| {
-            let mut rise_j = unknowns.rise_j;
-            if v != unknowns.free {
-                let problem = whole_step(setting, h_s);
-                stepper.rhs.clear();
-                stepper.rhs.extend_from_slice(v);
-                stepper.advance(now, &problem, true);
-                rise_j = stepper.energy_rise(now, &problem) - work_j(&stepper.rows, v, &unknowns.free);
-            }
-            if rise_j > 0.0 {
-                energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
-            }
-            let finite = stepper.next.is_finite();
-            if finite {
-                std::mem::swap(now, &mut stepper.next);
-            }
-            finite
-        });
+        // what it gained in parts is what it would have gained but for rounding
+        let gained = v.iter().zip(&unknowns.free).all(|(v, free)| v.distance(*free) <= ROUNDING_M_S);
+        let is_free = !touched && gained && self.integrates_free_motion(h_s);
+        let finite = if is_free { self.advance_freely(h_s) } else { self.advance_with(v, h_s, &unknowns) };
         self.unknowns = unknowns;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
@@ -243,6 +236,43 @@ impl ClusterMember for Tube {
 
     fn work(&self) -> f64 {
         self.division.segments() as f64
+    }
+}
+
+impl Tube {
+    /// Whether its own integrator makes a step of `h_s` seconds that nothing acts on; in contact all of them are implicit Euler.
+    fn integrates_free_motion(&self, h_s: f64) -> bool {
+        self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
+    }
+
+    /// Makes the step begun by its own integrator; whether its state is finite then.
+    fn advance_freely(&mut self, h_s: f64) -> bool {
+        self.ties.clear();
+        self.step_by(h_s, Stepper::step).is_ok()
+    }
+
+    /// Ends the step begun with the velocities `v`; whether its state is finite then.
+    fn advance_with(&mut self, v: &[DVec3], h_s: f64, unknowns: &Unknowns) -> bool {
+        self.step_by(h_s, |stepper, now, setting, _| {
+            let mut rise_j = unknowns.rise_j;
+            if v != unknowns.free {
+                let problem = whole_step(setting, h_s);
+                stepper.rhs.clear();
+                stepper.rhs.extend_from_slice(v);
+                stepper.advance(now, &problem, true);
+                rise_j = stepper.energy_rise(now, &problem) - work_j(&stepper.rows, v, &unknowns.free);
+            }
+            if rise_j > 0.0 {
+                energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
+            }
+            // what follows has no two steps of one kind before it
+            stepper.past.forget();
+            let finite = stepper.next.is_finite();
+            if finite {
+                std::mem::swap(now, &mut stepper.next);
+            }
+            finite
+        })
     }
 }
 
