@@ -231,7 +231,10 @@ const fn is_led(form: &CollisionShape) -> bool {
 /// Treats `neighbour` as a member of the same cluster, or again as a peer outside it.
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
-        (neighbour.form, neighbour.law) = (None, Law::Off);
+        // a tool needs the form of what it may grasp, whoever steps both
+        let is_tool = peers.get(me).and_then(|peer| peer.form.as_deref()).is_some_and(is_led);
+        let form = neighbour.form.take().filter(|_| is_tool);
+        (neighbour.form, neighbour.law) = (form, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {
         *neighbour = outsider;
     }
