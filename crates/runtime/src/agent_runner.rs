@@ -151,7 +151,6 @@ impl AgentRunner {
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
         self.shared.sleep.clear_wake(self.id());
         self.admit_arrivals();
-        self.forget_costs();
         match contained(|| self.attempt(timeline, wall)) {
             Ok((open, effort)) => {
                 self.open = open;

@@ -48,7 +48,7 @@ pub(super) struct ClusterSeat {
     bonds: Vec<AgentId>,
     /// Of these the ones that rest: they are woken.
     sleepers: Vec<AgentId>,
-    /// Work of its own steps in this turn, in the unit of its model.
+    /// Work of its own steps in the last turn, in the unit of its model.
     work: f64,
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
@@ -428,9 +428,9 @@ impl AgentRunner {
                     seat.note_pair(total, with, dt_s);
                 }
             }
-            seat.work += stepper.work_of(me);
+            seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;
-            done.set(done.get() + stepper.work_of(me));
+            done.set(done.get() + seat.work);
             place += 1;
         });
     }
@@ -456,13 +456,6 @@ impl AgentRunner {
         if let Some(seat) = &mut self.cluster {
             (seat.groups, seat.ids) = (groups, ids);
         }
-    }
-
-    /// A new turn begins.
-    pub fn forget_costs(&mut self) {
-        let forget = |actor: &mut Self| actor.cluster.iter_mut().for_each(|seat| seat.work = 0.0);
-        forget(self);
-        self.led.each(forget);
     }
 
     /// What the last turn cost of its own body and of each that it leads.

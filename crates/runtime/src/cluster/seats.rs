@@ -128,16 +128,8 @@ impl Led {
         self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|seat| seat.actor.return_turns());
     }
 
-    /// Takes out those at `time`, led by the lowest of them; `None` where there are none.
-    pub(super) fn take_at(&mut self, time: SimTime) -> Option<Box<AgentRunner>> {
-        let mut taken: Vec<Seat> = self.seats.extract_if(.., |seat| seat.actor.pace.time() == time).collect();
-        let mut first = (!taken.is_empty()).then(|| taken.remove(0).actor)?;
-        first.led.seats = taken;
-        Some(first)
-    }
-
     /// Adds `actor` and all it leads.
-    pub(super) fn admit(&mut self, mut actor: Box<AgentRunner>) {
+    fn admit(&mut self, mut actor: Box<AgentRunner>) {
         // where it will be when it makes its own turns again is not known
         actor.was_near = None;
         self.seats.append(&mut actor.led.seats);
@@ -204,7 +196,7 @@ impl AgentRunner {
     }
 
     /// Makes its own turns again, and those of all it leads.
-    pub(super) fn return_turns(mut self: Box<Self>) {
+    fn return_turns(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
         self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
         shared.sleep.follow(id, None);

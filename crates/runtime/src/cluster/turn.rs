@@ -3,7 +3,7 @@
 //! In: agents that hand their turns over ([`super::seats`]). Out: the states, metrics and commands of each as if it made its turns itself.
 //!
 //! admit      agents that want to be led
-//! gather     each to the leader's time: those that are behind at one time step as one problem, one that is ahead waits
+//! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
 //! step       all that are at one time as one problem ([`super`]); where that fails they part, to fail alone or not at all
 //! write, conclude    the state of each by its own writer
 //! part       those that have lost touch make their own turns again; several that still belong together are led by the lowest number
@@ -12,6 +12,7 @@
 
 use super::super::agent_clock::{Start, Timeline};
 use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
+use super::super::metrics::Entry;
 use super::Span;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;
@@ -25,70 +26,51 @@ pub(in super::super) struct Leap<'a> {
 }
 
 impl AgentRunner {
-    /// Brings those it leads to its own time, those at one time together; how many steps that took. Time that a leader gives up it gives up
-    /// for all, so that nobody makes steps for it.
+    /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that time.
     pub fn gather(&mut self, timeline: &Timeline, wall: Duration, leap: Leap<'_>) -> u32 {
         if self.led.is_empty() {
             return 0;
         }
-        let (target, clock_offset) = (self.pace.time(), self.pace.clock_offset());
+        let (time, clock_offset, mut steps) = (self.pace.time(), self.pace.clock_offset(), 0);
         self.led.each(|actor| {
-            let prepared = contained(|| {
+            let caught_up = contained(|| {
                 actor.shared.sleep.clear_wake(actor.id());
                 actor.take_commands();
-                actor.pace.drop_time(leap.start.dropped, leap.jumped);
+                if actor.pace.time() == time - leap.jumped {
+                    actor.pace.drop_time(leap.start.dropped, leap.jumped);
+                    actor.pace.follow_clock_offset(clock_offset);
+                    return Ok(0);
+                }
                 actor.pace.follow_clock_offset(clock_offset);
-                Ok(())
+                actor.catch_up(time, timeline, wall)
             });
-            prepared.unwrap_or_else(|reason| actor.park(reason));
+            match caught_up {
+                Ok(made) => steps += made,
+                Err(reason) => actor.park(reason),
+            }
         });
         self.led.release_parked();
-        let mut steps = 0;
-        while let Some(first) = self.led.all().map(|actor| actor.pace.time()).min().filter(|time| *time < target) {
-            let times = self.led.all().map(|actor| actor.pace.time());
-            let next = times.filter(|time| *time > first).fold(target, SimTime::min);
-            let Some(behind) = self.led.take_at(first) else { break };
-            steps += self.advance_together(behind, next, timeline.sim_at(wall));
-        }
         steps
     }
 
-    /// Steps `behind` and all it leads as one problem until they are at `next`, and takes them in again; how many steps that took. Where
-    /// that fails they return: one of them will fail alone, the others find together again.
-    fn advance_together(&mut self, mut behind: Box<Self>, next: SimTime, now: SimTime) -> u32 {
+    /// Steps alone up to `time`; how many steps that took.
+    fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
         let mut steps = 0;
-        let advanced = contained(|| {
-            while behind.pace.time() < next {
-                steps += behind.step_towards(next, now)?;
-            }
-            Ok(())
-        });
-        match advanced {
-            Ok(()) => self.led.admit(behind),
-            Err(reason) => {
-                if behind.led.is_empty() {
-                    behind.park(reason);
-                }
-                behind.release_all();
-                behind.return_turns();
-            }
+        while self.pace.time() < time {
+            let span = portion(time.since(self.pace.time()), self.pace.dt());
+            let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span))?;
+            self.write_snapshot(self.pace.time() + dt, false)?;
+            self.pace.advance_by(dt);
+            let work_s = self.shared.gauges.work_s.get();
+            let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
+            self.metrics.write(&self.shared.gauges, &self.pace, entry);
+            steps += 1;
         }
-        steps
-    }
-
-    /// One step with all that it leads, no farther than `next`; how many steps that is.
-    fn step_towards(&mut self, next: SimTime, now: SimTime) -> Result<u32, String> {
-        let span = portion(next.since(self.pace.time()), self.pace.dt());
-        let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span))?;
-        let start = Start { late: Duration::ZERO, dropped: SimSpan::ZERO };
-        let open = PendingTurn { start, dt, resolution: None, errors_m: [0.0; 2], rests: false };
-        self.write_led(&open);
-        self.write_snapshot(self.pace.time() + dt, false)?;
-        self.pace.advance_by(dt);
-        let work_s = self.shared.gauges.work_s.get();
-        self.record_step(&open, now, work_s);
-        self.conclude_led(now, work_s);
-        Ok(1 + self.led.len() as u32)
+        if steps > 0 {
+            // what it has given on the way is settled before the first common step
+            self.publish(timeline.sim_at(wall));
+        }
+        Ok(steps)
     }
 
     /// Whether nothing keeps it from resting, nor any of those it leads.
