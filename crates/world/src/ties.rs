@@ -66,7 +66,7 @@ fn contact_laws(scene: &Scene) -> Vec<PairLaw> {
             laws.entry(pair).or_insert(Law::Off);
         }
     }
-    let own = laws.into_iter().filter(|(_, law)| *law != Law::Ledger);
+    let own = laws.into_iter().filter(|(_, law)| *law != Law::Cluster);
     own.map(|((a, b), law)| PairLaw { a, b, law }).collect()
 }
 

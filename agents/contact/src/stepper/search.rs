@@ -156,7 +156,7 @@ impl Search {
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
         });
         self.boxes.pairs(NEAR_STEPS * h_s, &mut self.near);
-        self.near.retain(|&[a, b]| all[a].may_touch(&all[b]));
+        self.near.retain(|&[a, b]| !(all[a].member.is_remote() && all[b].member.is_remote()));
         let near = std::mem::take(&mut self.near);
         self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
         self.near = near;
