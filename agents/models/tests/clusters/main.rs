@@ -1,5 +1,6 @@
 //! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
 
+mod alike;
 mod bodies;
 mod errors;
 mod grasp;
