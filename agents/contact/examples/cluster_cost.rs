@@ -69,7 +69,7 @@ fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_conta
         .map(|body| Member { blocks: &body.blocks, free: &body.free, share: 1.0, response: None })
         .collect();
     let (members, contacts) = (&members, &scene.contacts);
-    let problem = Problem { h_s: H_S, members, contacts, rows: &[], rebound_from_m_s: 9.81 * H_S };
+    let problem = Problem { h_s: H_S, members, contacts, rows: &[] };
     of(solver.solve(&problem).expect("a problem"))
 }
 
@@ -88,7 +88,6 @@ fn median(mut times: Vec<Duration>) -> f64 {
 fn touch(sides: [Side; 2], normal: DVec3) -> Contact {
     let first = normal.any_orthonormal_vector();
     Contact {
-        key: 0,
         sides,
         normal,
         tangents: [first, normal.cross(first)],

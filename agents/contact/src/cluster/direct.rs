@@ -41,6 +41,7 @@ impl Direct {
             members
                 .blocks
                 .iter()
+                .filter(|block| !members.lends[members.owners[block.row]])
                 .filter_map(|block| Some(Block { row: place(block.row)?, column: place(block.column)?, ..*block })),
         );
         pairs.clear();

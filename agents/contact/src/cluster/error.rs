@@ -14,11 +14,6 @@ pub enum ProblemError {
         /// The step given, seconds.
         h_s: f64,
     },
-    /// The speed from which contacts rebound was negative or no number.
-    Rebound {
-        /// The speed given, m/s.
-        rebound_from_m_s: f64,
-    },
     /// A member has a block outside its matrix, a share that is not above zero, or a number that is not finite.
     Member {
         /// Its place in the problem.
@@ -58,9 +53,6 @@ impl fmt::Display for ProblemError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Step { h_s } => write!(f, "the step is {h_s} s; it must be finite and above zero"),
-            Self::Rebound { rebound_from_m_s } => {
-                write!(f, "contacts rebound from {rebound_from_m_s} m/s; it must not be below zero")
-            }
             Self::Member { member, reason } => write!(f, "member {member}: {reason}"),
             Self::NotPositiveDefinite { member, block } => {
                 write!(f, "member {member}: its matrix is not positive definite at block {block}")

@@ -8,6 +8,7 @@ use super::fronts::{Front, Fronts};
 use super::order::minimum_degree;
 use super::problem::Block;
 use super::tiles::{TILE, TILE_SIZE, eliminate, filled, solve_down, solve_up, triangle};
+use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
 
 /// Two blocks that are coupled, in either order; a block with itself is its diagonal.
@@ -73,6 +74,10 @@ pub(super) struct Cholesky {
     targets: Vec<Target>,
     /// The front of each place in the order.
     owners: Vec<usize>,
+    /// The couplings of the last matrix, where each is stored, and whether there is room for all.
+    known: Vec<Pair>,
+    places: Vec<Option<Place>>,
+    roomy: bool,
     /// The matrix, and the one before while a new one is filled in.
     base: Vec<f64>,
     before: Vec<f64>,
@@ -87,7 +92,8 @@ pub(super) struct Cholesky {
 impl Cholesky {
     /// Whether there is room for a matrix of `size` blocks with these couplings.
     pub fn fits(&self, size: usize, pairs: &[Pair]) -> bool {
-        self.fronts.rank.len() == size && pairs.iter().all(|&pair| self.place(pair).is_some())
+        let known = self.roomy && self.known == pairs;
+        self.fronts.rank.len() == size && (known || pairs.iter().all(|&pair| self.place(pair).is_some()))
     }
 
     /// Makes room for a matrix of `size` blocks with these couplings; returns whether the structure is a new one.
@@ -112,6 +118,8 @@ impl Cholesky {
             fronts
         });
         self.lay_out();
+        self.known.reserve(pairs.len());
+        self.places.reserve(pairs.len());
         true
     }
 
@@ -121,6 +129,8 @@ impl Cholesky {
         let count = fronts.fronts.len();
         layouts.clear();
         targets.clear();
+        self.known.clear();
+        self.roomy = false;
         *children = vec![Vec::new(); count];
         self.owners = vec![0; fronts.rank.len()];
         let mut next = Layout::default();
@@ -180,8 +190,9 @@ impl Cholesky {
             let mut entries = Entries::of(&mut self.base, layout);
             (3 * front.columns..layout.columns).for_each(|at| *entries.at(at, at) = 1.0);
         }
-        for block in blocks {
-            if let Some(place) = self.place(Pair { row: block.row, column: block.column }) {
+        self.find_places(blocks);
+        for (block, place) in blocks.iter().zip(&self.places) {
+            if let Some(place) = *place {
                 Entries::of(&mut self.base, &self.layouts[place.front]).add(place, &block.value);
             }
         }
@@ -189,6 +200,21 @@ impl Cholesky {
             // also where one is not a number
             *stale |= layout.of(&self.base) != layout.of(&self.before);
         }
+    }
+
+    /// Where these blocks are stored, found anew where they are not those of the last matrix.
+    fn find_places(&mut self, blocks: &[Block]) {
+        let pairs = || blocks.iter().map(|block| Pair { row: block.row, column: block.column });
+        if self.roomy && self.known.iter().copied().eq(pairs()) {
+            return;
+        }
+        self.known.clear();
+        self.known.extend(pairs());
+        let mut places = std::mem::take(&mut self.places);
+        places.clear();
+        places.extend(self.known.iter().map(|&pair| self.place(pair)));
+        self.roomy = places.iter().all(Option::is_some);
+        self.places = places;
     }
 
     /// Has a front factored again.
@@ -201,6 +227,7 @@ impl Cholesky {
     /// # Errors
     /// A block at which the matrix is not positive definite.
     pub fn factor(&mut self, mut more: impl FnMut(usize, &mut Entries<'_>)) -> Result<(), usize> {
+        let level = Level::new();
         for front in 0..self.layouts.len() {
             if !self.stale[front] {
                 continue;
@@ -211,7 +238,7 @@ impl Cholesky {
             more(front, &mut Entries::of(&mut self.lower, &layout));
             self.gather(front);
             let update = &mut self.update[layout.update..layout.update + triangle(layout.rows / TILE)];
-            if let Err(at) = eliminate(&mut self.lower[own], update, layout.columns) {
+            if let Err(at) = eliminate(level, &mut self.lower[own], update, layout.columns) {
                 self.stale.fill(true);
                 let rank = self.fronts.fronts[front].first + at / 3;
                 return Err(self.fronts.rank.iter().position(|&r| r == rank).unwrap_or_default());
@@ -256,6 +283,11 @@ impl Cholesky {
 
     /// Replaces the right side, one vector for each block, by the solution; the matrix must be factored.
     pub fn solve(&mut self, x: &mut [DVec3]) {
+        dispatch!(Level::new(), _ => self.solve_by(x));
+    }
+
+    #[inline(always)]
+    fn solve_by(&mut self, x: &mut [DVec3]) {
         let Self { fronts, layouts, lower, permuted, local, .. } = self;
         fronts.rank.iter().zip(&*x).for_each(|(&rank, value)| permuted[rank] = *value);
         for (front, layout) in fronts.fronts.iter().zip(&*layouts) {

@@ -9,13 +9,16 @@ use super::cone::{Form, Projection};
 use super::gradients::{Stiffness, Task};
 use super::problem::Member;
 use super::rows::{Point, Rows};
-use super::system::System;
+use super::skew::{Followed, Linear, Residuals, Skew, Sliding};
+use super::system::{StepForm, System};
 use glam::{DMat3, DVec3};
 
 /// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
 const LOOK_SHARE: f64 = 0.01;
 /// The share of impulses from which on unanswered ones are not rounding that keeps a solve from its goal.
 const UNANSWERED: f64 = 1e-6;
+/// The share of what an inexact step may leave that friction may be off by from what its pressure allows.
+const FOLLOW_SHARE: f64 = 0.1;
 
 /// Impulses λ of all rows, the change of velocity of all blocks, and the velocity u of all rows.
 #[derive(Debug, Clone, Default)]
@@ -37,8 +40,13 @@ pub(super) struct Iterate {
     pub step: State,
     /// G of each row.
     pub gains: Vec<DMat3>,
+    /// What friction that follows pressure adds to G of each row.
+    pub skews: Vec<Skew>,
+    residuals: Residuals,
     /// λ + c of each row: the impulse it would have if no velocity changed.
     pub pull: Vec<DVec3>,
+    /// Whether velocities are those that the impulses make, and not those of a step.
+    pub exact: bool,
     /// Newton steps so far.
     pub steps: usize,
     scratch: Vec<DVec3>,
@@ -99,6 +107,8 @@ impl Iterate {
         self.step.resize(rows, blocks);
         self.gains.clear();
         self.gains.resize(rows, DMat3::ZERO);
+        self.skews.clear();
+        self.skews.resize(rows, Skew::NONE);
         self.pull.clear();
         self.pull.resize(rows, DVec3::ZERO);
         self.scratch.clear();
@@ -112,6 +122,7 @@ impl Iterate {
         rows.scatter(&state.lambda, scratch);
         let goal = system.response_share * system.members.size_squared(scratch).sqrt();
         system.respond(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal });
+        self.exact = true;
         self.update_velocities();
     }
 
@@ -190,6 +201,22 @@ impl Iterate {
         self.gains[row] = image.along_axes(slopes * factor / scale);
         let missing = image.axes.mul_transpose_vec3(image.value - lambda);
         self.pull[row] = lambda + image.axes * (missing * factor);
+        self.skews[row] = Skew::NONE;
+    }
+
+    /// Whether steps know how friction follows its pressure: where a factor is at hand.
+    pub fn follows_pressure(&self) -> bool {
+        self.system.form == StepForm::Direct
+    }
+
+    /// Adds to a row's gain and pull how its friction follows its pressure (eq. 8b).
+    pub fn follow_pressure(&mut self, row: usize, form: Form, image: &Projection) {
+        let at = self.state.point(row);
+        let linear = Linear { image, gain: self.gains[row], pulled: self.pull[row] - at.impulse };
+        if let Some(Followed { skew, more }) = linear.follow(&self.rows.rows[row], form, at) {
+            self.skews[row] = skew;
+            self.pull[row] += more;
+        }
     }
 
     /// Jᵀ (λ + c) − ⊕A/f Δv into `scratch`.
@@ -221,6 +248,7 @@ impl Iterate {
 
     /// Takes the pulls as impulses, with the velocities that [`Self::look_ahead`] found.
     pub fn take_pulls(&mut self) {
+        self.exact = false;
         let Self { state, step, .. } = self;
         state.lambda.clone_from(&self.pull);
         state.left.clone_from(&step.left);
@@ -237,11 +265,16 @@ impl Iterate {
         let contacts = Stiffness { rows, gains: &self.gains };
         let solved =
             system.step(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
+        let sliding = Sliding { rows, skews: &self.skews, goal: FOLLOW_SHARE * goal };
+        self.residuals.correct(&sliding, &mut step.change, |x| system.solve_again(x));
         // what was left before is part of the right side, and goes
         step.left.iter_mut().zip(&state.left).for_each(|(left, before)| *left -= *before);
         rows.velocities(&step.change, &mut step.velocity);
         for row in 0..rows.len() {
             step.lambda[row] = self.pull[row] - self.gains[row] * step.velocity[row] - state.lambda[row];
+        }
+        for (row, impulse) in self.residuals.impulses(&self.skews) {
+            step.lambda[row] -= impulse;
         }
         let finite = solved && step.change.iter().all(|v| v.is_finite());
         if !finite {
@@ -268,6 +301,7 @@ impl Iterate {
 
     /// Goes a share of the step.
     pub fn advance(&mut self, share: f64) {
+        self.exact = false;
         let Self { state, step, .. } = self;
         let lists = [
             (&mut state.lambda, &step.lambda),

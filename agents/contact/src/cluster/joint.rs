@@ -40,8 +40,6 @@ pub enum Hold {
 /// A row of a joint, of an attachment, a stop or a drive. Velocities are those of side 0 against side 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointRow {
-    /// What the row is called from step to step; the solver only hands it on.
-    pub key: u64,
     /// The two points, or spins; one at least must move.
     pub sides: [Side; 2],
     /// In which directions, and how strongly.
@@ -117,8 +115,8 @@ impl Hold {
 impl JointRow {
     /// A row at rest, with the compliance of contacts and no impulse of a last step.
     #[must_use]
-    pub fn new(key: u64, sides: [Side; 2], hold: Hold) -> Self {
-        Self { key, sides, hold, target_m_s: DVec3::ZERO, compliance_per_kg: None, warm_n_s: DVec3::ZERO }
+    pub fn new(sides: [Side; 2], hold: Hold) -> Self {
+        Self { sides, hold, target_m_s: DVec3::ZERO, compliance_per_kg: None, warm_n_s: DVec3::ZERO }
     }
 
     /// The same row as a spring that is implicit at both ends (eq. 14).

@@ -13,6 +13,9 @@ use super::rows::Point;
 const STEPS_MAX: usize = 60;
 /// Steps in a row that may fail to halve the error.
 const STALE_MAX: usize = 20;
+/// Steps that are taken whole, though the sum of squares may rise: with exact slopes which contacts stick and slide is then found in a
+/// few, and a search along each would stop at every kink on the way.
+const BOLD_STEPS: usize = 15;
 /// Looks along a step: whole, and halved up to five times.
 const LOOKS: usize = 6;
 /// The shortest of them.
@@ -43,10 +46,18 @@ pub(super) struct Aim<'a> {
 pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
     let (mut least, mut stale, mut last) = (f64::INFINITY, 0, f64::INFINITY);
     let (mut leave, mut stuck) = (LEAVE_MOST, false);
+    // the cone's shift makes steps too far off to go on from
+    let bold = if aim.form == Form::Disc && iterate.follows_pressure() { BOLD_STEPS } else { 0 };
     for step in 0..=STEPS_MAX {
+        let mut missed = sum_of_squares(iterate, aim, 0.0).sqrt();
+        // the loads of a bold step that went astray would leave rows too hard for all that follows
+        if step > 0 && (step > bold || missed < last) {
+            harden(iterate, aim.yield_m_s);
+        }
         let mut miss = linearise(iterate, aim.form);
         if miss < aim.tolerance_m_s && iterate.refine(aim.form, aim.members) {
             miss = linearise(iterate, aim.form);
+            missed = sum_of_squares(iterate, aim, 0.0).sqrt();
         }
         if miss < aim.tolerance_m_s {
             return true;
@@ -55,18 +66,16 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
         if miss <= 0.5 * least {
             (least, stale) = (miss, 0);
         }
-        let missed = sum_of_squares(iterate, aim, 0.0).sqrt();
         leave = if missed > 0.5 * last { (LEAVE_LESS * leave).max(LEAVE_LEAST) } else { LEAVE_MOST };
         if step == STEPS_MAX || stale >= STALE_MAX || !miss.is_finite() || !iterate.take_step(leave * missed) {
             return false;
         }
         last = missed;
-        let share = share_of_step(iterate, aim);
+        let share = if step < bold { 1.0 } else { share_of_step(iterate, aim, missed * missed) };
         // a kink that no share gets past is gone over the second time
         let over = stuck && share <= SHARE_MIN;
         stuck = share <= SHARE_MIN && !over;
         iterate.advance(if over { 1.0 } else { share });
-        harden(iterate, aim.yield_m_s);
     }
     false
 }
@@ -88,13 +97,15 @@ fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
         let (image, scale) = (row.natural_map(form, at), row.scale);
         largest = worse(largest, row.miss(at.impulse, image.value));
         iterate.linearise(k, &image, scale);
+        if iterate.follows_pressure() {
+            iterate.follow_pressure(k, form, &image);
+        }
     }
     largest
 }
 
-/// How far to go: the whole step, or as many halves as make the sum of squares fall, or the best look.
-fn share_of_step(iterate: &Iterate, aim: &Aim<'_>) -> f64 {
-    let before = sum_of_squares(iterate, aim, 0.0);
+/// How far to go: the whole step, or as many halves as make the sum of squares fall that is `before`, or the best look.
+fn share_of_step(iterate: &Iterate, aim: &Aim<'_>, before: f64) -> f64 {
     let (mut share, mut best_share, mut best) = (1.0, 1.0, f64::INFINITY);
     for _ in 0..LOOKS {
         let here = sum_of_squares(iterate, aim, share);

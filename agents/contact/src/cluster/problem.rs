@@ -48,8 +48,6 @@ pub struct Member<'a> {
 /// A place where two sides may touch. Velocities are those of side 0 against side 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// What the place is called from step to step; the solver only hands it on.
-    pub key: u64,
     /// The two points; one at least must move.
     pub sides: [Side; 2],
     /// From side 1 to side 0, of length 1.
@@ -60,7 +58,7 @@ pub struct Contact {
     pub gap_m: f64,
     /// Coulomb's coefficient μ ≥ 0.
     pub friction: f64,
-    /// Newton's coefficient of restitution e, 0 to 1.
+    /// Newton's coefficient of restitution e, 0 to 1; 0 too for what is not to rebound in this step, as what rests would hop.
     pub restitution: f64,
     /// The speed at which the sides closed along the normal when the step began, that of the surface included, m/s; below zero where
     /// they parted. Without meaning where nothing rebounds.
@@ -85,9 +83,6 @@ pub struct Problem<'a> {
     pub contacts: &'a [Contact],
     /// Where they are joined.
     pub rows: &'a [JointRow],
-    /// Contacts that close more slowly than this do not rebound, m/s, ≥ 0: gravity over the longest step of a member, or what rests
-    /// hops.
-    pub rebound_from_m_s: f64,
 }
 
 impl Contact {
@@ -105,9 +100,9 @@ impl Contact {
         DVec3::new(normal, self.tangents[0].dot(owed), self.tangents[1].dot(owed))
     }
 
-    /// The speed at which the sides must part (eq. 3b): of a contact that closes within the step, and faster than what rests.
-    pub(super) fn rebound_m_s(&self, problem: &Problem<'_>) -> Option<f64> {
-        let closes = self.approach_m_s > problem.rebound_from_m_s && self.gap_m <= self.approach_m_s * problem.h_s;
+    /// The speed at which the sides must part (eq. 3b): of a contact that closes within the step.
+    pub(super) fn rebound_m_s(&self, h_s: f64) -> Option<f64> {
+        let closes = self.approach_m_s > 0.0 && self.gap_m <= self.approach_m_s * h_s;
         (closes && self.restitution > 0.0).then_some(self.restitution * self.approach_m_s)
     }
 

@@ -197,7 +197,7 @@ impl Rows {
         for k in 0..self.rows.len() {
             let moving = self.velocity(k, free) - self.rows[k].surface;
             let contact = problem.contacts.get(k);
-            let rebound = contact.and_then(|contact| Some((contact.approach_m_s, contact.rebound_m_s(problem)?)));
+            let rebound = contact.and_then(|contact| Some((contact.approach_m_s, contact.rebound_m_s(problem.h_s)?)));
             if let Some((approach_m_s, parting_m_s)) = rebound {
                 self.rows[k].rebound(parting_m_s, approach_m_s, moving.x);
             }

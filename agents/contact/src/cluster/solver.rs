@@ -179,7 +179,7 @@ impl Solver {
         let rigid = self.iterate.system.members.rigid.iter().all(|rigid| *rigid);
         let aim = Aim {
             members: problem.members,
-            form: if rigid { Form::Cone } else { Form::Disc },
+            form: if rigid && !self.iterate.follows_pressure() { Form::Cone } else { Form::Disc },
             tolerance_m_s: self.settings.tolerance_m_s,
             yield_m_s: self.settings.yield_m_s(problem.h_s),
         };
@@ -240,8 +240,7 @@ impl Solver {
 
     /// Impulses into their cones, and the velocities that these make; `false` where numbers have overflowed and there is no answer.
     fn settle(&mut self, members: &[Member<'_>]) -> bool {
-        // without a step they are those of the start
-        if self.iterate.allow() || self.iterate.steps > 0 {
+        if self.iterate.allow() || !self.iterate.exact {
             self.iterate.respond(members);
         }
         let State { lambda, velocity, .. } = &mut self.iterate.state;

@@ -120,6 +120,11 @@ impl System {
         true
     }
 
+    /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last step, where it was by a factor.
+    pub fn solve_again(&mut self, x: &mut [DVec3]) {
+        self.direct.solve(x);
+    }
+
     /// Factors of the coupled matrix for the members taken up last.
     pub fn factors(&self) -> usize {
         if self.form == StepForm::Direct { self.direct.factors } else { 0 }

@@ -1,9 +1,12 @@
 //! Dense kernels of a factor, over tiles of 4 × 4 numbers.
 //!
 //! In: columns of a front that are to be eliminated, and room for what they leave. Out: their factor and that rest. Never here: where
-//! numbers come from. Plain loops over tiles of fixed size, which compile to vector instructions and sum in one order everywhere.
+//! numbers come from. Plain loops over tiles of fixed size, compiled for the widest vectors that a processor has. Products and sums are
+//! rounded one by one and in one order whatever the width, so the bits are the same everywhere.
 //!
 //! Rows come in chunks of four; a chunk has its columns one after the other. Numbers that fill a chunk up are those of the identity.
+
+use fearless_simd::{Level, dispatch};
 
 /// Rows and columns of a tile.
 pub(super) const TILE: usize = 4;
@@ -26,7 +29,12 @@ pub(super) fn filled(size: usize) -> usize {
 ///
 /// # Errors
 /// The column at which the matrix is not positive definite.
-pub(super) fn eliminate(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+pub(super) fn eliminate(level: Level, lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+    dispatch!(level, _ => eliminate_by(lower, update, columns))
+}
+
+#[inline(always)]
+fn eliminate_by(lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
     let tiles = columns / TILE;
     if tiles == 0 {
         return Ok(());
@@ -38,17 +46,33 @@ pub(super) fn eliminate(lower: &mut [f64], update: &mut [f64], columns: usize) -
         let own = &mut own[0];
         subtract(own, left, left);
         invert_factor(own).map_err(|column| tile * TILE + column)?;
-        for row in below.chunks_exact_mut(tiles) {
-            let (before, here) = row.split_at_mut(tile);
-            subtract(&mut here[0], before, left);
-            divide(&mut here[0], own);
+        // two at a time keep more sums under way; loops, as closures would not be compiled for wide vectors
+        let mut pairs = below.chunks_exact_mut(2 * tiles);
+        for pair in &mut pairs {
+            let (first, second) = pair.split_at_mut(tiles);
+            let [(before, here), (other_before, there)] = [first, second].map(|row| row.split_at_mut(tile));
+            let (here, there) = (&mut here[0], &mut there[0]);
+            subtract_both([here, there], [before, other_before], [left, left]);
+            divide(here, own);
+            divide(there, own);
+        }
+        if let Some((before, [here, ..])) = pairs.into_remainder().split_at_mut_checked(tile) {
+            subtract(here, before, left);
+            divide(here, own);
         }
     }
     let below = &lower[tiles * tiles..];
     let mut update = update.as_chunks_mut::<TILE_SIZE>().0;
     for (row, a) in below.chunks_exact(tiles).enumerate() {
         let (here, rest) = update.split_at_mut(row + 1);
-        here.iter_mut().zip(below.chunks_exact(tiles)).for_each(|(tile, b)| subtract(tile, a, b));
+        let mut pairs = here.chunks_exact_mut(2);
+        let mut others = below.chunks_exact(tiles);
+        while let (Some([first, second]), Some(b), Some(c)) = (pairs.next(), others.next(), others.next()) {
+            subtract_both([first, second], [a, a], [b, c]);
+        }
+        if row % 2 == 0 {
+            subtract(&mut here[row], a, a);
+        }
         update = rest;
     }
     Ok(())
@@ -67,7 +91,32 @@ fn subtract(tile: &mut Tile, a: &[Tile], b: &[Tile]) {
             }
         }
     }
-    tile.iter_mut().zip(sums).for_each(|(value, sum)| *value -= sum);
+    for (value, sum) in tile.iter_mut().zip(sums) {
+        *value -= sum;
+    }
+}
+
+/// The same of two tiles.
+#[inline(always)]
+fn subtract_both(tiles: [&mut Tile; 2], a: [&[Tile]; 2], b: [&[Tile]; 2]) {
+    let mut sums = [[0.0; TILE_SIZE]; 2];
+    for ((a0, b0), (a1, b1)) in a[0].iter().zip(b[0]).zip(a[1].iter().zip(b[1])) {
+        let first = a0.as_chunks::<TILE>().0.iter().zip(b0.as_chunks::<TILE>().0);
+        let second = a1.as_chunks::<TILE>().0.iter().zip(b1.as_chunks::<TILE>().0);
+        for ((a0, b0), (a1, b1)) in first.zip(second) {
+            for column in 0..TILE {
+                for row in 0..TILE {
+                    sums[0][TILE * column + row] += a0[row] * b0[column];
+                    sums[1][TILE * column + row] += a1[row] * b1[column];
+                }
+            }
+        }
+    }
+    for (tile, sums) in tiles.into_iter().zip(sums) {
+        for (value, sum) in tile.iter_mut().zip(sums) {
+            *value -= sum;
+        }
+    }
 }
 
 /// tile ← tile L⁻ᵀ, of the inverse of a lower factor.
@@ -86,6 +135,7 @@ fn divide(tile: &mut Tile, inverse: &Tile) {
 }
 
 /// A symmetric tile, of which the lower half is read, becomes the inverse of its lower Cholesky factor.
+#[inline(always)]
 fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
     let mut l = [0.0; TILE_SIZE];
     let at = |row: usize, column: usize| TILE * column + row;
@@ -113,21 +163,28 @@ fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
 }
 
 /// x ← L⁻¹ x of the square, and what it takes from the rows below.
+#[inline(always)]
 pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
     for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate() {
         let own = row * TILE < columns;
         let length = if own { row * TILE } else { columns };
         let mut sums = [0.0; TILE];
         for (column, x) in chunk.as_chunks::<TILE>().0.iter().zip(&x[..length]) {
-            sums.iter_mut().zip(column).for_each(|(sum, l)| *sum += l * x);
+            for (sum, l) in sums.iter_mut().zip(column) {
+                *sum += l * x;
+            }
         }
         let here = &mut x[row * TILE..(row + 1) * TILE];
-        here.iter_mut().zip(sums).for_each(|(x, sum)| *x -= sum);
+        for (x, sum) in here.iter_mut().zip(sums) {
+            *x -= sum;
+        }
         if own {
             let inverse = &chunk[row * TILE_SIZE..(row + 1) * TILE_SIZE];
             let mut out = [0.0; TILE];
             for (column, x) in inverse.as_chunks::<TILE>().0.iter().zip(&*here) {
-                out.iter_mut().zip(column).for_each(|(out, l)| *out += l * x);
+                for (out, l) in out.iter_mut().zip(column) {
+                    *out += l * x;
+                }
             }
             here.copy_from_slice(&out);
         }
@@ -135,6 +192,7 @@ pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
 }
 
 /// x ← L⁻ᵀ x of the square, the rows below being known.
+#[inline(always)]
 pub(super) fn solve_up(lower: &[f64], columns: usize, x: &mut [f64]) {
     for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate().rev() {
         let own = row * TILE < columns;
@@ -147,7 +205,9 @@ pub(super) fn solve_up(lower: &[f64], columns: usize, x: &mut [f64]) {
         if own {
             let inverse = &chunk[row * TILE_SIZE..(row + 1) * TILE_SIZE];
             let mut out = [0.0; TILE];
-            out.iter_mut().zip(inverse.as_chunks::<TILE>().0).for_each(|(out, column)| *out = dot(column, here));
+            for (out, column) in out.iter_mut().zip(inverse.as_chunks::<TILE>().0) {
+                *out = dot(column, here);
+            }
             here.copy_from_slice(&out);
         }
         let length = if own { row * TILE } else { columns };

@@ -20,10 +20,6 @@ pub(super) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
     if !(h_s.is_finite() && h_s > 0.0) {
         return Err(ProblemError::Step { h_s });
     }
-    let rebound_from_m_s = problem.rebound_from_m_s;
-    if rebound_from_m_s.is_nan() || rebound_from_m_s < 0.0 {
-        return Err(ProblemError::Rebound { rebound_from_m_s });
-    }
     for (place, member) in problem.members.iter().enumerate() {
         named(member_fault(member), |reason| ProblemError::Member { member: place, reason })?;
     }

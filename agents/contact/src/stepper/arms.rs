@@ -77,7 +77,7 @@ impl Ties {
                 let row = JointRow {
                     target_m_s: pull.turns.velocity(&progress[pull.member].before),
                     compliance_per_kg: Some((pull.inertia_kg_m2 * lacking).recip()),
-                    ..JointRow::new(u64::from(pull.owner.key), [pull.turns, Side::FIXED], Hold::across(pull.axis))
+                    ..JointRow::new([pull.turns, Side::FIXED], Hold::across(pull.axis))
                 };
                 self.push(step, row, pull.owner);
             }

@@ -127,7 +127,7 @@ impl Joints {
         let mut key = 0;
         let mut push = |way: Way, sides: [Side; 2], hold: Hold| {
             let row = ties.rows.len();
-            ties.push(step, JointRow::new(u64::from(key), sides, hold), name.row(key, second));
+            ties.push(step, JointRow::new(sides, hold), name.row(key, second));
             if ties.rows.len() > row {
                 self.parts.push(Part { held, row, way });
             }

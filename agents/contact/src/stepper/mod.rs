@@ -415,8 +415,7 @@ impl ClusterStepper {
             share: f64::from(state.part),
         }));
         move_sides(search, ties, |member| progress[member].place);
-        let problem =
-            Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, rebound_from_m_s: 0.0 };
+        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = emptied(list);
         let places = &mut self.places;

@@ -392,7 +392,6 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {
-        key: 0,
         sides,
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],

@@ -116,7 +116,7 @@ impl Ties {
             stretch_m: turn_between(mine.rotation, rotation * clasp.rotation),
         };
         let sides = [mine.turns.of_member(member), side];
-        let row = JointRow::new(u64::from(TURN), sides, Hold::ALL).with_spring(law, step.h_s);
+        let row = JointRow::new(sides, Hold::ALL).with_spring(law, step.h_s);
         let row = JointRow { target_m_s: row.target_m_s + led_rad_s - mine.led_rad_s, ..row };
         let owner = Name { hold: None, ..name }.row(TURN, place);
         self.push(step, row, owner);
@@ -132,8 +132,7 @@ impl Ties {
             stretch_m: drive.point.position - drive.target_m,
         };
         let sides = [drive.point.side.of_member(member), Side::FIXED];
-        let row =
-            JointRow::new(u64::from(ALONG), sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
+        let row = JointRow::new(sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
         let target_m_s = row.target_m_s + drive.target_m_s - drive.point.led_m_s;
         let name = Name { member, partner: Partner::Drive, hold: None };
         self.push(step, JointRow { target_m_s, ..row }, name.row(ALONG, None));
@@ -147,7 +146,7 @@ impl Ties {
         let apart = a.point.position - b.point.position;
         let led_m_s = b.point.led_m_s - a.point.led_m_s;
         let mut push = |key: u32, hold: Hold, law: Spring| {
-            let row = JointRow::new(u64::from(key), sides, hold).with_spring(law, step.h_s);
+            let row = JointRow::new(sides, hold).with_spring(law, step.h_s);
             let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
             self.push(step, row, name.row(key, b.member));
         };

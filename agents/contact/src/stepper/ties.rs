@@ -67,7 +67,7 @@ impl Ties {
         }
         let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
         let warm_n_s = remembered.force_n * step.h_s;
-        self.rows.push(JointRow { key: u64::from(owner.key), warm_n_s, ..row });
+        self.rows.push(JointRow { warm_n_s, ..row });
         self.owners.push(owner);
     }
 

@@ -62,7 +62,8 @@ fn what_sticks_on_a_leaning_skin_creeps_by_no_more_than_a_hundredth_of_a_millime
     // tan 0.3 = 0.31, friction 0.5
     let rotation = DQuat::from_rotation_y(0.3);
     let up = rotation * DVec3::Z;
-    let grounds: [(&str, fn(DQuat) -> Placed); 2] = [
+    type Ground = fn(DQuat) -> Placed;
+    let grounds: [(&str, Ground); 2] = [
         ("slab", |rotation| {
             let spec = solid(DVec3::Z * 0.025, DVec3::new(0.2, 0.2, 0.05), [6, 6, 2], 1e5);
             placed(SoftBody::new(leaning(SoftSpec { held: vec![Side::Bottom], ..spec }, rotation)).unwrap(), true)

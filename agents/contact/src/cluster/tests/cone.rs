@@ -78,7 +78,7 @@ fn falling(push_m_s: f64) -> Iterate {
     let h_s = 0.01;
     let gap_m = -push_m_s * h_s / 0.2;
     let contacts = [Contact { gap_m, ..contact([Side::node(0, 0), Side::FIXED], DVec3::Z) }];
-    let problem = Problem { h_s, members: &members, contacts: &contacts, rows: &[], rebound_from_m_s: 0.0 };
+    let problem = Problem { h_s, members: &members, contacts: &contacts, rows: &[] };
     let mut iterate = Iterate::default();
     iterate.system.take_members(&problem, &[0]).unwrap();
     iterate.rows.gather(&problem, &[0], &FALL);

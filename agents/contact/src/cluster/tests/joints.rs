@@ -36,7 +36,7 @@ fn falling() -> (Body, DVec3) {
 }
 
 fn on_ground(side: Side, hold: Hold) -> JointRow {
-    JointRow::new(0, [side, Side::FIXED], hold)
+    JointRow::new([side, Side::FIXED], hold)
 }
 
 #[test]
@@ -82,8 +82,8 @@ fn two_boxes_held_in_all_directions_are_one_body() {
     boxes[0].free = vec![DVec3::Y * 3.0, DVec3::ZERO];
     let arm = DVec3::X * 0.1;
     let rows = vec![
-        JointRow::new(0, [Side::rigid(0, arm), Side::rigid(1, -arm)], Hold::ALL),
-        JointRow::new(1, [Side::node(0, SPIN), Side::node(1, SPIN)], Hold::ALL),
+        JointRow::new([Side::rigid(0, arm), Side::rigid(1, -arm)], Hold::ALL),
+        JointRow::new([Side::node(0, SPIN), Side::node(1, SPIN)], Hold::ALL),
     ];
     let solution = solved(&boxes, rows);
     let as_one = rigid(2.0, DVec3::new(0.2, 0.1, 0.1)).blocks[1].value.z_axis.z;

@@ -38,7 +38,7 @@ fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
         .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, share: 1.5, response: response(k) })
         .collect();
     let (contacts, rows) = (&case.contacts, &case.rows);
-    let problem = Problem { h_s: case.h_s, members: &members, contacts, rows, rebound_from_m_s: 0.0 };
+    let problem = Problem { h_s: case.h_s, members: &members, contacts, rows };
     let solution = Solver::new(settings).solve(&problem).unwrap().clone();
     (solution, lent.iter().map(|lent| lent.asked.load(Ordering::Relaxed)).sum())
 }

@@ -9,6 +9,7 @@ mod promises;
 mod random;
 mod rebounds;
 mod scenes;
+mod sliding;
 mod slow;
 
 use super::{Block, Contact, JointRow, Member, Problem, Side, SideTerm};
@@ -68,13 +69,7 @@ impl Case {
             .iter()
             .map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0, response: None })
             .collect();
-        work(&Problem {
-            h_s: self.h_s,
-            members: &members,
-            contacts: &self.contacts,
-            rows: &self.rows,
-            rebound_from_m_s: 0.0,
-        })
+        work(&Problem { h_s: self.h_s, members: &members, contacts: &self.contacts, rows: &self.rows })
     }
 }
 
@@ -130,7 +125,6 @@ impl Lattice {
 pub fn contact(sides: [Side; 2], normal: DVec3) -> Contact {
     let first = normal.any_orthonormal_vector();
     Contact {
-        key: 0,
         sides,
         normal,
         tangents: [first, normal.cross(first)],

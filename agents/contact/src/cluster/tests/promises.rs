@@ -28,8 +28,8 @@ fn what_is_wrong_is_named() {
         (refusal(|c| c.contacts[1].friction = -0.1), "contact 1: its friction"),
         (refusal(|c| c.contacts[1].restitution = 1.1), "contact 1: its restitution"),
         (refusal(|c| c.contacts[1].surface_m_s.x = f64::NAN), "contact 1: its approach or"),
-        (refusal(|c| c.rows = vec![JointRow::new(0, c.contacts[0].sides, Hold::along(DVec3::ONE))]), "row 0: its axis"),
-        (refusal(|c| c.rows = vec![JointRow::new(0, c.contacts[0].sides, Hold::motor(DVec3::X, -1.0))]), "row 0: zero"),
+        (refusal(|c| c.rows = vec![JointRow::new(c.contacts[0].sides, Hold::along(DVec3::ONE))]), "row 0: its axis"),
+        (refusal(|c| c.rows = vec![JointRow::new(c.contacts[0].sides, Hold::motor(DVec3::X, -1.0))]), "row 0: zero"),
         (refusal(|c| c.contacts[0].normal = DVec3::ZERO), "contact 0: normal and tangents"),
         (refusal(|c| c.contacts[0].sides = [Side::FIXED; 2]), "contact 0: neither side moves"),
         (refusal(|c| c.contacts[0].sides[0].member = 4), "contact 0: a side names a member"),
@@ -118,13 +118,7 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
             share,
             response: None,
         }];
-        let problem = crate::cluster::Problem {
-            h_s: 0.01,
-            members: &members,
-            contacts: &case.contacts,
-            rows: &[],
-            rebound_from_m_s: 0.0,
-        };
+        let problem = crate::cluster::Problem { h_s: 0.01, members: &members, contacts: &case.contacts, rows: &[] };
         Solver::default().solve(&problem).unwrap().contacts_n_s[0].z
     };
     assert!((impulse(1.0) / impulse(2.0) - 2.0).abs() < 1e-3, "{} {}", impulse(1.0), impulse(2.0));

@@ -18,7 +18,7 @@ pub fn random_case(seed: u64) -> Case {
         let sides = random_sides(&mut numbers, &bodies);
         let compliance_per_kg = Some(10.0_f64.powf(numbers.between(-5.0, -1.0)));
         let target_m_s = numbers.vector() * 0.1;
-        JointRow { target_m_s, compliance_per_kg, ..JointRow::new(0, sides, Hold::ALL) }
+        JointRow { target_m_s, compliance_per_kg, ..JointRow::new(sides, Hold::ALL) }
     });
     let rows = rows.collect();
     Case { h_s, bodies, contacts, rows }
@@ -252,23 +252,18 @@ fn a_problem_solved_again_from_its_own_impulses_takes_few_factors() {
 }
 
 #[test]
-fn zz_survey() {
-    let (mut factors, mut cut, mut beyond) = (0, Vec::new(), Vec::new());
-    for seed in 200..1000 {
+fn eight_hundred_more_problems_come_to_their_end() {
+    let (mut factors, mut convex, mut most) = (0, 0, 0);
+    for seed in COUNT..1000 {
         let case = random_case(seed);
         let solution = solved(&case, Settings::default());
-        factors += solution.report.factors;
-        if solution.report.cut {
-            cut.push((
-                seed,
-                case.contacts.len(),
-                case.bodies.len(),
-                solution.report.residual_m_s,
-                solution.report.factors,
-            ));
-        } else if miss(&case, &solution) > 2e-4 {
-            beyond.push((seed, miss(&case, &solution)));
-        }
+        let report = solution.report;
+        assert!(!report.cut && miss(&case, &solution) < 2e-4, "{seed}: {report:?}");
+        factors += report.factors;
+        convex += usize::from(report.passes > 0);
+        most = most.max(report.factors);
     }
-    println!("SURVEY {factors} factors; {} cut {cut:?}\n beyond {beyond:?}", cut.len());
+    println!("{factors} factors, {most} at most; {convex} needed convex passes");
+    // 33 each where steps leave out how friction follows its pressure
+    assert!(factors < 25 * 800, "{factors}");
 }

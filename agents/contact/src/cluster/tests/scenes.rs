@@ -63,7 +63,6 @@ impl Stack {
         let (high, high_z) = at(upper, -HALF);
         let index = 4 * upper + corner;
         Contact {
-            key: index as u64,
             gap_m: high_z - low_z,
             friction: self.friction,
             owed_slip_m: self.owed[index],
@@ -249,7 +248,7 @@ pub fn momentum_gained(case: &Case, solution: &Solution, nodes: usize) -> DVec3 
 fn tip(spring: Option<Spring>, limit_n_s: f64) -> (DVec3, DVec3) {
     let mut body = rigid(0.5, DVec3::splat(HALF));
     body.free[0] = DVec3::new(1.0, 0.0, 0.0);
-    let row = JointRow::new(0, [Side::rigid(0, DVec3::ZERO), Side::FIXED], Hold::All { limit_n_s });
+    let row = JointRow::new([Side::rigid(0, DVec3::ZERO), Side::FIXED], Hold::All { limit_n_s });
     let row = spring.map_or(row, |spring| row.with_spring(spring, 0.01));
     let case = Case { h_s: 0.01, bodies: vec![body], contacts: Vec::new(), rows: vec![row] };
     case.with(|problem| {
