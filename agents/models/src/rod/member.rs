@@ -4,6 +4,7 @@
 //! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 9.
 
 use super::banded_ldl::Row;
+use super::energy_limiter;
 use super::rest::RestDetector;
 use super::state::RodState;
 use super::step::{Divergence, Setting, TURN_MAX_RAD};
@@ -25,6 +26,8 @@ pub(super) struct Unknowns {
     /// Positions of its nodes where its skin is now, and the radius there, metres.
     places: Vec<DVec3>,
     radii_m: Vec<f64>,
+    /// By how much its free motion in the step begun raises its energy, J.
+    rise_j: f64,
     quiet_before: bool,
     kept: Kept,
 }
@@ -39,6 +42,9 @@ struct Kept {
     at_rest: bool,
     steps: u64,
 }
+
+/// The strain of a step in which its free motion raises its energy: it is made in two.
+const RISES: f64 = 2.0;
 
 impl Tube {
     /// Whether the node at this slot is held in place.
@@ -80,9 +86,10 @@ impl ClusterMember for Tube {
             assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut stepper.rows, &mut stepper.rhs);
             stepper.factor.factor(&stepper.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
             stepper.factor.solve(&mut stepper.rhs);
-            Ok(())
+            stepper.advance(now, &problem, true);
+            Ok(stepper.energy_rise(now, &problem))
         });
-        solved.map_err(|divergence| self.diverged(divergence, h_s))?;
+        self.unknowns.rise_j = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
         let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         let mut unknowns = std::mem::take(&mut self.unknowns);
         unknowns.take(&self.stepper.rows, &self.stepper.rhs, &self.now.x);
@@ -153,7 +160,9 @@ impl ClusterMember for Tube {
         let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
         // what a segment turns or stretches by, as a share of it
-        spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD
+        let changes = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
+        // an energy that is no number rises too
+        if self.unknowns.rise_j <= 0.0 { changes } else { changes.max(RISES) }
     }
 
     fn keep(&mut self) {
@@ -165,9 +174,11 @@ impl ClusterMember for Tube {
     }
 
     fn go_back(&mut self) {
-        let Self { now, rest, time, at_rest, steps, unknowns, .. } = self;
+        let Self { now, rest, time, at_rest, steps, unknowns, matter, division, .. } = self;
         let kept = &unknowns.kept;
         now.copy_from(&kept.now);
+        // a copy has no forces
+        now.strain(matter, division);
         rest.copy_from(&kept.rest);
         (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
     }
@@ -180,16 +191,26 @@ impl ClusterMember for Tube {
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        let unknowns = std::mem::take(&mut self.unknowns);
         let finite = self.step_by(h_s, |stepper, now, setting, _| {
-            stepper.rhs.clear();
-            stepper.rhs.extend_from_slice(v);
-            stepper.advance(now, &whole_step(setting, h_s), true);
+            let mut rise_j = unknowns.rise_j;
+            if v != unknowns.free {
+                let problem = whole_step(setting, h_s);
+                stepper.rhs.clear();
+                stepper.rhs.extend_from_slice(v);
+                stepper.advance(now, &problem, true);
+                rise_j = stepper.energy_rise(now, &problem) - work_j(&stepper.rows, v, &unknowns.free);
+            }
+            if rise_j > 0.0 {
+                energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
+            }
             let finite = stepper.next.is_finite();
             if finite {
                 std::mem::swap(now, &mut stepper.next);
             }
             finite
         });
+        self.unknowns = unknowns;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
@@ -219,6 +240,19 @@ impl ClusterMember for Tube {
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
     let Setting { matter, division, springs, integrator, .. } = *setting;
     SubstepProblem { matter, division, springs, ties: &[], h: h_s, until: h_s, integrator }
+}
+
+/// The work of the impulses that change the velocities of a step from `free` to `v`: (v − free)ᵀ A v, joules.
+fn work_j(rows: &[Row], v: &[DVec3], free: &[DVec3]) -> f64 {
+    let given = |row: usize| v[row] - free[row];
+    let of_row = |(row, numbers): (usize, &Row)| {
+        let (here, before) = (v[row], |back: usize| row.checked_sub(back));
+        let near = before(1)
+            .map_or(0.0, |at| given(row).dot(numbers.near * v[at]) + given(at).dot(numbers.near.transpose() * here));
+        let far = before(2).map_or(0.0, |at| given(row).dot(numbers.far * v[at]) + given(at).dot(numbers.far * here));
+        given(row).dot(numbers.diag * here) + near + far
+    };
+    rows.iter().enumerate().map(of_row).sum()
 }
 
 impl Unknowns {
