@@ -61,6 +61,12 @@ impl DoublingSchedule {
         made == STEPS
     }
 
+    /// The span of the present row's steps so far, seconds; zero before the first.
+    #[must_use]
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
     /// Ends the row `apart_m` away from the same span in halves, by a rule of this order: halves leave 2⁻ᵖ of the error (eq. 31).
     pub fn record(&mut self, apart_m: f64, order: i32) {
         let error_m = drift_m(apart_m, order, self.span_s);

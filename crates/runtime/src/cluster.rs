@@ -53,8 +53,6 @@ pub(super) struct ClusterSeat {
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
     doubling: Option<Box<StepDoubling>>,
-    /// The span of the repeated steps of the present row, seconds.
-    row_s: f64,
     /// How far the repeated steps of the present row left it from the finer ones, metres, and the error of the last row (control.md, eq. 31).
     apart_m: f64,
     drift_m: f64,
@@ -125,7 +123,6 @@ impl ClusterSeat {
             work: 0.0,
             schedule: DoublingSchedule::default(),
             doubling: None,
-            row_s: 0.0,
             apart_m: 0.0,
             drift_m: 0.0,
             state: None,
@@ -153,9 +150,7 @@ impl ClusterSeat {
 
     /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
     fn repeats(&mut self, steps: u64, me: AgentId) -> Option<Box<StepDoubling>> {
-        if self.schedule.begins(steps, me) {
-            self.row_s = 0.0;
-        }
+        self.schedule.begins(steps, me);
         self.schedule.is_on().then(|| self.doubling.take().unwrap_or_default())
     }
 
@@ -389,10 +384,8 @@ impl AgentRunner {
     /// Hands every member how far a step of `dt` is from the same in halves.
     fn note_errors(&mut self, doubling: Box<StepDoubling>, dt: SimSpan) {
         let Some(seat) = &mut self.cluster else { return };
-        let is_first = seat.row_s == 0.0;
-        seat.row_s += dt.as_secs_f64();
-        let ends = seat.schedule.finish_step(dt.as_secs_f64());
-        let span_s = ends.then_some(seat.row_s);
+        let is_first = seat.schedule.span_s() == 0.0;
+        let span_s = seat.schedule.finish_step(dt.as_secs_f64()).then_some(seat.schedule.span_s());
         if doubling.apart_m().is_empty() {
             seat.schedule.cancel();
         }

@@ -50,9 +50,8 @@ impl StepDoubling {
         Ok(report.work)
     }
 
-    /// Compares the members with where the finer step left them, after the same macro step, which took `dt`. How far each is from there,
-    /// metres; nothing where there was no finer step or one of another length.
-    pub fn compare(&mut self, all: &[Participant<'_>], dt: SimSpan) -> &[f64] {
+    /// Compares the members with where the finer step left them, after the same macro step, which took `dt`.
+    pub fn compare(&mut self, all: &[Participant<'_>], dt: SimSpan) {
         let Self { finer, made, now, apart_m, .. } = self;
         apart_m.clear();
         if made.take() == Some(dt) && finer.len() == all.len() {
@@ -61,17 +60,17 @@ impl StepDoubling {
                 farthest(now, finer)
             }));
         }
-        apart_m
     }
 
-    /// What [`Self::compare`] found last.
+    /// How far each member was from where the finer step left it when that was last compared, metres; empty where there was no finer step
+    /// or one of another length.
     #[must_use]
     pub fn apart_m(&self) -> &[f64] {
         &self.apart_m
     }
 }
 
-/// The points by which the place of a member is told: nodes, vertices, three points as far from its middle as the farthest of its shape.
+/// The points by which the places of a member are compared: nodes, vertices, three points as far from its middle as the farthest of its shape.
 fn probe(member: &dyn ClusterMember, into: &mut Vec<DVec3>) {
     into.clear();
     let Some(skin) = member.skin() else {

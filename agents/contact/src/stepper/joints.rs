@@ -12,6 +12,7 @@ use super::Participant;
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
 use super::scene::ClusterScene;
+use super::search::velocity;
 use super::springs::{End, Name, Pull};
 use super::ties::{FineStep, Ties, place_of};
 use crate::cluster::{Hold, JointRow, Side};
@@ -181,9 +182,7 @@ impl Joints {
             let row = &mut ties.rows[part.row];
             let wanted = part.way.wanted(part.way.off(&held.now, row), row, h_s);
             let miss = part.way.off(&off, row) - wanted;
-            let [a, b] = row
-                .sides
-                .map(|side| if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(velocities(side.member)) });
+            let [a, b] = row.sides.map(|side| velocity(&side, &velocities));
             row.target_m_s = a - b - miss / h_s;
             worst = worst.max(part.way.missed(miss, row));
         }

@@ -206,12 +206,12 @@ impl Search {
         let Round { all, h_s, .. } = *round;
         let Pair { member, against } = pair;
         let (Some(skin), Some(reach)) = (all[member].member.skin(), self.boxes.of(member)) else { return };
-        let (partner, other, bounds, their_m_s) = match against {
-            Against::Own => (Partner::Own, None, reach.skin, reach.speed_m_s),
-            Against::Static { number, solid } => (Partner::Static(number), None, solid.bounds(), 0.0),
+        let (partner, form, bounds, their_m_s) = match against {
+            Against::Own => (Partner::Own, skin.form, reach.skin, reach.speed_m_s),
+            Against::Static { number, solid } => (Partner::Static(number), &solid.form, solid.bounds(), 0.0),
             Against::Member(other) => {
-                let Some(there) = self.boxes.of(other) else { return };
-                (Partner::Agent(all[other].id), Some(other), there.skin, there.speed_m_s)
+                let (Some(skin), Some(there)) = (all[other].member.skin(), self.boxes.of(other)) else { return };
+                (Partner::Agent(all[other].id), skin.form, there.skin, there.speed_m_s)
             }
         };
         let way_m = (reach.speed_m_s + their_m_s) * h_s;
@@ -219,19 +219,12 @@ impl Search {
             return;
         }
         let reach_m = LOOK_M + way_m;
-        let owner = Owner { member, partner, other, key: TouchKey::default() };
-        let mut found = Found { owner, skins: [skin.form; 2], at: Meeting::default(), clear_m: reach_m };
         self.touches.clear();
-        if reach.skin.grown(reach_m).meets(bounds) {
-            found.at = self.touch(round, pair, reach_m);
-        }
-        found.clear_m = if found.at.after_s > 0.0 { 0.0 } else { reach_m };
-        match against {
-            Against::Static { solid, .. } => found.skins[1] = &solid.form,
-            Against::Member(other) => found.skins[1] = all[other].member.skin().map_or(skin.form, |skin| skin.form),
-            Against::Own => {}
-        }
-        self.take(round, pair, found);
+        let meets = reach.skin.grown(reach_m).meets(bounds);
+        let at = if meets { self.touch(round, pair, reach_m) } else { Meeting::default() };
+        let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
+        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default() };
+        self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
 
     /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
@@ -337,6 +330,15 @@ impl Search {
 }
 
 impl Pair<'_> {
+    /// The member on side 1; `None` for a static solid.
+    fn other(&self) -> Option<usize> {
+        match self.against {
+            Against::Member(other) => Some(other),
+            Against::Own => Some(self.member),
+            Against::Static { .. } => None,
+        }
+    }
+
     /// The sides of a touch between bodies that have gone as far as `ways`.
     fn facing(&self, round: &Round<'_, '_>, touch: &Touch, ways: [DVec3; 2]) -> Facing {
         let all = round.all;
@@ -349,11 +351,7 @@ impl Pair<'_> {
             all[member].member.side(place, contact).of_member(member)
         };
         let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
-        let other = match self.against {
-            Against::Member(other) => Some(other),
-            Against::Own => Some(self.member),
-            Against::Static { .. } => None,
-        };
+        let other = self.other();
         Facing {
             sides: [side(self.member, &on_a, first), other.map_or(Side::FIXED, |other| side(other, &on_b, second))],
             led_m_s: [

@@ -1,11 +1,13 @@
 //! What members of a cluster say of the error of their steps, against closed forms and finer steps; and that saying it changes nothing.
 
-use crate::bodies::{block, cloth, cube, rope, slab, tube};
-use crate::table::{GRAVITY, Placed, Table, plane};
+use crate::bodies::{block, cloth, cube, rigid, rope, slab, tube};
+use crate::table::{GRAVITY, Placed, Table, placed, plane};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::StepDoubling;
 use metachron_core::Snapshot;
 use metachron_core::step_doubling::{DRIFT_S, drift_m};
+use metachron_geometry::Solid;
+use metachron_models::rigid::{RigidBody, RigidSpec};
 
 fn watched(bodies: Vec<Placed>) -> Table {
     let mut table = Table::new(bodies);
@@ -13,8 +15,8 @@ fn watched(bodies: Vec<Placed>) -> Table {
     table
 }
 
-/// What the last step of a table said of a body: the error of a tenth of a second, metres.
-fn told_m(table: &Table, body: usize, step_s: f64) -> f64 {
+/// The error in a tenth of a second that the last step of a table estimates for a body, metres.
+fn drift_of_m(table: &Table, body: usize, step_s: f64) -> f64 {
     drift_m(table.doubling.as_ref().unwrap().apart_m()[body], 1, step_s)
 }
 
@@ -33,10 +35,10 @@ fn what_bends_and_falls_says_half_g_h_t_and_what_is_rigid_nothing() {
             let (_, step_s) = table.step();
             let exact_m = 0.5 * -GRAVITY.z * step_s * DRIFT_S;
             for body in [0, 1] {
-                let off = told_m(&table, body, step_s) / exact_m - 1.0;
+                let off = drift_of_m(&table, body, step_s) / exact_m - 1.0;
                 assert!(off.abs() < 1e-6, "{rate_hz} Hz, body {body}: off by {off}");
             }
-            assert!(told_m(&table, 2, step_s) < 1e-12);
+            assert!(drift_of_m(&table, 2, step_s) < 1e-12);
         }
     }
 }
@@ -47,19 +49,8 @@ fn a_box_that_slides_says_how_far_its_steps_lead_it_wrong() {
     let rotation = DQuat::from_rotation_y(0.3);
     let half_m = DVec3::splat(0.03);
     for rate_hz in [60.0, 240.0] {
-        let mut body = block(rotation * DVec3::Z * 0.03, half_m, 1.0, 0.0);
-        body.agent = Box::new(
-            metachron_models::rigid::RigidBody::new(metachron_models::rigid::RigidSpec {
-                rotation,
-                friction: 0.1,
-                ..crate::bodies::rigid(
-                    metachron_geometry::Solid::Box { half_extents_m: half_m },
-                    rotation * DVec3::Z * 0.03,
-                    1.0,
-                )
-            })
-            .unwrap(),
-        );
+        let spec = rigid(Solid::Box { half_extents_m: half_m }, rotation * DVec3::Z * 0.03, 1.0);
+        let body = placed(RigidBody::new(RigidSpec { rotation, friction: 0.1, ..spec }).unwrap(), false);
         let mut table = Table::among(vec![body], &[plane(rotation, 0.1)]).at_rates(rate_hz, rate_hz);
         table.doubling = Some(StepDoubling::default());
         let mut step_s = 0.0;
@@ -67,8 +58,8 @@ fn a_box_that_slides_says_how_far_its_steps_lead_it_wrong() {
             step_s = table.step().1;
         }
         let exact_m = 0.5 * -GRAVITY.z * (0.3_f64.sin() - 0.1 * 0.3_f64.cos()) * step_s * DRIFT_S;
-        let told_m = told_m(&table, 0, step_s);
-        assert!((told_m / exact_m - 1.0).abs() < 0.05, "{rate_hz} Hz: {told_m} of {exact_m}");
+        let drift_of_m = drift_of_m(&table, 0, step_s);
+        assert!((drift_of_m / exact_m - 1.0).abs() < 0.05, "{rate_hz} Hz: {drift_of_m} of {exact_m}");
     }
 }
 

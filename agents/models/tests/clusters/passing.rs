@@ -1,7 +1,7 @@
 //! What goes far in a step meets what is on its way, is not held by what is beside it, and does not pass through itself.
 
 use crate::bodies::{cloth, rigid, sheet, solid, tube};
-use crate::table::{GRAVITY, Table, placed};
+use crate::table::{GRAVITY, Placed, Table, placed};
 use glam::DVec3;
 use metachron_core::{Body, Snapshot};
 use metachron_geometry::Solid;
@@ -10,7 +10,7 @@ use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{Side, SoftBody, SoftSpec};
 
 /// A ball of 50 g that flies down from `above_m`.
-fn bullet(above_m: f64, speed_m_s: f64) -> crate::table::Placed {
+fn bullet(above_m: f64, speed_m_s: f64) -> Placed {
     let spec = rigid(Solid::Ball { radius_m: 0.01 }, DVec3::new(0.003, 0.0, above_m), 0.05);
     placed(RigidBody::new(RigidSpec { velocity: DVec3::Z * -speed_m_s, gravity: DVec3::ZERO, ..spec }).unwrap(), false)
 }
@@ -28,7 +28,7 @@ fn lowest_m(table: &mut Table) -> f64 {
 }
 
 /// Whether the bullet is still above what it flew at, 0.1 s later, at each pair of rates.
-fn stays_above(name: &str, target: impl Fn() -> crate::table::Placed, speed_m_s: f64) {
+fn stays_above(name: &str, target: impl Fn() -> Placed, speed_m_s: f64) {
     for rates in [(30.0, 240.0), (240.0, 60.0), (60.0, 60.0), (240.0, 240.0), (1000.0, 1000.0)] {
         let mut table = Table::among(vec![target(), bullet(0.5, speed_m_s)], &[]).at_rates(rates.0, rates.1);
         let made = table.play(0.1).gain_j;
@@ -94,7 +94,7 @@ fn what_bends_meets_what_flies_at_it_however_light() {
 }
 
 /// A soft tube of 1 m in two turns above each other, 5 mm apart.
-fn coil(segments: usize) -> crate::table::Placed {
+fn coil(segments: usize) -> Placed {
     let path_m: Vec<_> = (0..=64)
         .map(|i| {
             let turn = f64::from(i) / 64.0;

@@ -77,8 +77,8 @@ proptest! {
     fn a_sheet_over_or_under_a_slab_is_on_that_side_of_it(
         (x, y) in (-0.08_f64..0.08, -0.08_f64..0.08),
         turn in prop_oneof![Just(0.0), -1.6_f64..1.6],
-        // past the sheet's middle from half a millimetre on
-        gap_m in -6e-4_f64..3e-4,
+        // as far as the sheet's middle: past it edges may be found a tenth deeper, aside
+        gap_m in -5e-4_f64..3e-4,
         high_m in prop_oneof![Just(0.1), Just(0.004)],
         over in any::<bool>(),
     ) {

@@ -1,0 +1,135 @@
+//! The solve of a fine step: again with the places that bodies struck would pass, and until joints hold where bodies will be.
+//!
+//! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
+//! Theory: docs/theory/clusters.md, section 9.
+
+use super::progress::Progress;
+use super::search::{Judge, Round, Search};
+use super::ties::Ties;
+use super::{ClusterReport, ClusterScene, ClusterStepper, Participant};
+use crate::cluster::{Contact, Member, Problem, ProblemError};
+use glam::DVec3;
+use metachron_core::{StepError, recycled};
+
+/// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
+const ROUNDS_MAX: u32 = 6;
+/// Joints hold to this share of the depth of contacts, in metres and radians.
+const JOINT_SHARE: f64 = 0.25;
+
+impl ClusterStepper {
+    /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
+    /// its impulses (eq. 25).
+    pub(super) fn solve(
+        &mut self,
+        scene: &ClusterScene,
+        all: &[Participant<'_>],
+        h_s: f64,
+        report: &mut ClusterReport,
+    ) -> Result<(), StepError> {
+        report.contacts = 0;
+        if self.search.contacts.is_empty() && self.ties.rows.is_empty() {
+            // what touches nothing moves as it would
+            self.progress.iter_mut().for_each(Progress::go_on);
+            return Ok(());
+        }
+        let mut last_miss_m = f64::INFINITY;
+        for round in 1..=ROUNDS_MAX {
+            self.solve_once(all, h_s, report)?;
+            let Self { solver, search, ties, joints, progress, depth_m, rebounds, .. } = &mut *self;
+            let solution = solver.solution();
+            // the next solve starts from this one
+            for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
+                contact.warm_n_s = *impulse;
+            }
+            for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
+                row.warm_n_s = *impulse;
+            }
+            let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
+            let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
+            let look = Round { scene, all, progress, h_s, judge: Judge::Solved };
+            let passed = search.add_passed(&look);
+            // with other contacts joints start anew
+            last_miss_m = if passed { f64::INFINITY } else { miss_m };
+            if round == ROUNDS_MAX || !passed && joined {
+                break;
+            }
+            rebounds.choose(search, progress);
+        }
+        self.give(report);
+        Ok(())
+    }
+
+    fn solve_once(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        let Self { solver, search, ties, progress, members, .. } = self;
+        // what no row touches moves as it would, and makes no problem larger
+        let mut count = 0..;
+        progress.iter_mut().for_each(|state| state.place = None);
+        let sides = search.contacts.iter().flat_map(|c| &c.sides).chain(ties.rows.iter().flat_map(|row| &row.sides));
+        sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
+        let involved = progress.iter_mut().filter(|state| state.place.is_some());
+        involved.for_each(|state| state.place = count.next());
+        let mut list = recycled(std::mem::take(members));
+        let taking = all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
+        list.extend(taking.map(|(one, state)| Member {
+            blocks: one.member.blocks(),
+            response: one.member.response(),
+            free: &state.seen,
+            share: f64::from(state.part),
+        }));
+        move_sides(search, ties, |member| progress[member].place);
+        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows };
+        let outcome = solver.solve(&problem).map(|solution| solution.report);
+        *members = recycled(list);
+        let places = &mut self.places;
+        places.clear();
+        places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
+        move_sides(search, ties, |place| places.get(place).copied());
+        let took = outcome.map_err(|error| refused(&error, h_s))?;
+        for state in &mut *progress {
+            let Progress { solved, seen, place, .. } = state;
+            solved.clear();
+            solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
+        }
+        report.factors += took.factors as u32;
+        report.passes += took.passes as u32;
+        report.solves += 1;
+        report.convex += u32::from(took.passes > 0);
+        report.cut += u32::from(took.cut);
+        Ok(())
+    }
+
+    /// Gives every member the impulses found.
+    fn give(&mut self, report: &mut ClusterReport) {
+        let Self { solver, search, ties, progress, .. } = self;
+        let solution = solver.solution();
+        progress.iter_mut().for_each(Progress::take);
+        // a blow is over when the step begins: the flight after it is free
+        let lasting = |(contact, impulse): (&Contact, &DVec3)| *impulse != DVec3::ZERO && contact.restitution == 0.0;
+        for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
+            if lasting(both) {
+                let owner = &search.owners[k];
+                progress[owner.member].hold();
+                owner.other.into_iter().for_each(|other| progress[other].hold());
+            }
+        }
+        for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| **impulse != DVec3::ZERO) {
+            progress[owner.member].hold();
+            owner.other.into_iter().for_each(|other| progress[other].hold());
+        }
+        report.contacts = search.contacts.len() as u32;
+        report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
+    }
+}
+
+/// Counts the members of all sides anew.
+fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option<usize>) {
+    let contacts = search.contacts.iter_mut().flat_map(|contact| &mut contact.sides);
+    let sides = contacts.chain(ties.rows.iter_mut().flat_map(|row| &mut row.sides));
+    for side in sides.filter(|side| !side.terms().is_empty()) {
+        side.member = to(side.member).unwrap_or(side.member);
+    }
+}
+
+fn refused(error: &ProblemError, dt_s: f64) -> StepError {
+    StepError::Diverged { model: "cluster", dt_s, what: error.to_string() }
+}
