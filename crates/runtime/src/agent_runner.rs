@@ -164,13 +164,14 @@ impl AgentRunner {
         }
     }
 
-    /// Ends the turn that began: it took `work_s` seconds and it is wall time `wall`.
+    /// Ends the turn that began: it took `work_s` seconds of a core, those it leads included, and it is wall time `wall`.
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
         // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
+        let work_s = self.share_work(work_s);
         let mut published = self.record_step(&open, now, work_s);
-        published &= self.conclude_led(now, work_s);
+        published &= self.conclude_led(timeline, wall);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
             self.disband(timeline, wall);
@@ -250,14 +251,14 @@ impl AgentRunner {
         if self.waits(wall) || self.should_join() {
             return Ok((None, Effort { work: 0.0, steps: alone }));
         }
-        if self.governor.is_some() {
-            self.turn_period.record(timeline, wall);
-        }
-        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.metrics.steps());
+        self.record_period(timeline, wall);
+        let time = self.pace.time();
+        self.led.members_at(time).for_each(|actor| actor.record_period(timeline, wall));
+        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.metrics.turns());
         let is_met = self.peers.broad_phase.is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
-        let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
-        let led = self.led.members_at(self.pace.time()).count() as u32;
+        let resolution = self.resolution();
+        let led = self.led.members_at(time).count() as u32;
         let (StepOutcome { report, dt }, led) = match self.step_alone(Span::Wanted(wanted)) {
             Ok(outcome) => (outcome, led),
             Err(reason) if led == 0 => return Err(reason),
@@ -275,9 +276,25 @@ impl AgentRunner {
         let mut open = PendingTurn { start, dt, resolution, errors_m: [0.0; 2], rests };
         self.write_led(&open);
         self.write_snapshot(self.pace.time() + dt, rests)?;
-        open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
+        open.errors_m = self.errors_m();
         self.pace.advance_by(dt);
         Ok((Some(open), Effort { work: report.work, steps: 1 + led + alone }))
+    }
+
+    fn record_period(&mut self, timeline: &Timeline, wall: Duration) {
+        if self.governor.is_some() {
+            self.turn_period.record(timeline, wall);
+        }
+    }
+
+    /// Its resolution, if a governor needs it.
+    pub fn resolution(&self) -> Option<Resolution> {
+        self.governor.as_ref().and_then(|_| self.agent.resolution())
+    }
+
+    /// The error estimates of the state that was written last, metres: in all, and the part caused by its time steps.
+    pub fn errors_m(&self) -> [f64; 2] {
+        self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m])
     }
 
     /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
@@ -309,7 +326,8 @@ impl AgentRunner {
         self.hands.is_empty() && !self.shared.sleep.must_stay_awake(self.id(), now)
     }
 
-    fn run_governor(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
+    /// Lets its governor answer a turn that took `work_s` seconds of its own.
+    pub fn run_governor(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
         let Some(governor) = &mut self.governor else { return Ok(()) };
         let wanted_period_s = 1.0 / (self.shared.wanted_hz * timeline.speed());
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {

@@ -17,7 +17,7 @@ pub(super) use turn::Leap;
 
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
-use super::observation::Observer;
+use super::observation::{Observer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
@@ -48,8 +48,9 @@ pub(super) struct ClusterSeat {
     bonds: Vec<AgentId>,
     /// Of these the ones that rest: they are woken.
     sleepers: Vec<AgentId>,
-    /// Work of its own steps in the last turn, in the unit of its model.
+    /// Work of its own steps in the last turn, in the unit of its model, and its share of the time of that turn, seconds.
     work: f64,
+    work_s: f64,
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
     doubling: Option<Box<StepDoubling>>,
@@ -121,6 +122,7 @@ impl ClusterSeat {
             bonds: Vec::new(),
             sleepers: Vec::new(),
             work: 0.0,
+            work_s: 0.0,
             schedule: DoublingSchedule::default(),
             doubling: None,
             apart_m: 0.0,
@@ -155,14 +157,14 @@ impl ClusterSeat {
     }
 
     /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
-    fn bond(&mut self, observer: &Observer, links: &[Link], laws: &[(AgentId, Law)]) {
+    fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], laws: &[(AgentId, Law)]) {
         let is_apart = |id: AgentId| {
             let law = laws.binary_search_by_key(&id, |(other, _)| *other).ok().map(|at| laws[at].1);
             law.is_some_and(Law::is_asynchronous)
         };
         self.bonds.clear();
         self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
-        self.bonds.extend_from_slice(&self.jointed);
+        self.bonds.extend(self.jointed.iter().copied().chain(grasped));
         let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
         self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
         self.bonds.sort_unstable();
@@ -172,16 +174,17 @@ impl ClusterSeat {
         self.sleepers.extend(self.bonds.iter().copied().filter(rests));
     }
 
-    /// Notes what a pair gave each other in a step of `dt_s` seconds.
-    fn note_pair(&mut self, total: &PairTotal, with: AgentId, dt_s: f64) {
-        let at = self.pairs.iter().position(|pair| pair.with == with).unwrap_or_else(|| {
-            self.pairs.push(PairState::new(with, PairKind::Cluster));
+    /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
+    fn note_pair(&mut self, total: &PairTotal, (with, kind): (AgentId, PairKind), dt_s: f64) {
+        let at = self.pairs.iter().position(|pair| pair.with == with && pair.kind == kind).unwrap_or_else(|| {
+            self.pairs.push(PairState::new(with, kind));
             self.pairs.len() - 1
         });
         let pair = &mut self.pairs[at];
         let impulse_n_s = total.impulse_n_s.length();
-        (pair.contacts, pair.force_n) = (total.contacts, impulse_n_s / dt_s);
-        pair.penetration_m = total.depth_m;
+        pair.contacts += if kind == PairKind::Attachment { 1 } else { total.contacts };
+        pair.force_n += impulse_n_s / dt_s;
+        pair.penetration_m = pair.penetration_m.max(total.depth_m);
         pair.impulse_n_s += impulse_n_s;
     }
 }
@@ -225,7 +228,7 @@ impl AgentRunner {
     /// # Errors
     /// The reason why a member cannot go on: all that belong to the cluster stop with it.
     fn step_cluster(&mut self, span: Span) -> Result<StepOutcome, String> {
-        let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.steps());
+        let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.turns());
         self.led.note_membership(id, time);
         let (plan, dt) = self.plan(span)?;
         self.look(time, dt);
@@ -334,29 +337,26 @@ impl AgentRunner {
     /// Looks around before the first step: the agents with which it begins in one cluster.
     pub fn look_first(&mut self) -> &[AgentId] {
         let step = PlannedStep { start: self.pace.scene_time(), dt: self.pace.dt() };
-        let Self { observer, peers, writer, links, cluster, .. } = self;
-        let Some(seat) = cluster else { return &[] };
-        observer.update(peers, writer, step, &Membership::default());
-        seat.bond(observer, links, peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws));
-        &seat.bonds
+        self.look_among(step, &Membership::default());
+        self.cluster.as_ref().map_or(&[], |seat| &seat.bonds)
     }
 
     /// Looks around for itself and for all that step with it.
     fn look(&mut self, time: SimTime, dt: SimSpan) {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
-        let Self { observer, led, peers, writer, links, cluster, .. } = self;
-        observer.update(peers, writer, step, led.membership());
-        let laws = |observer: &Observer| peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws);
-        if let Some(seat) = cluster {
-            seat.bond(observer, links, laws(observer));
-        }
-        led.each_at(time, |actor, membership| {
-            let Self { observer, peers, writer, links, cluster, .. } = actor;
-            observer.update(peers, writer, step, membership);
-            if let Some(seat) = cluster {
-                seat.bond(observer, links, laws(observer));
-            }
-        });
+        let mut led = std::mem::take(&mut self.led);
+        self.look_among(step, led.membership());
+        led.each_at(time, |actor, membership| actor.look_among(step, membership));
+        self.led = led;
+    }
+
+    /// Looks around before a `step` that it makes with `members`.
+    fn look_among(&mut self, step: PlannedStep, members: &Membership) {
+        let Self { observer, peers, writer, links, cluster, .. } = self;
+        observer.update(peers, writer, step, members);
+        let Some(seat) = cluster else { return };
+        let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
+        seat.bond(observer, grasped, links, peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws));
     }
 
     /// Notes how the step was made and solved.
@@ -411,14 +411,17 @@ impl AgentRunner {
             let (me, Some(seat)) = (place, &mut actor.cluster) else { return };
             seat.pairs.retain_mut(|pair| {
                 (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
-                seat.memory.near(now).any(|id| id == pair.with)
+                pair.kind == PairKind::Attachment || seat.memory.near(now).any(|id| id == pair.with)
             });
             for total in stepper.totals().iter().filter(|total| total.member == me) {
                 let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
-                if let Partner::Agent(with) = total.partner
-                    && !apart(with)
-                {
-                    seat.note_pair(total, with, dt_s);
+                let pair = match total.partner {
+                    Partner::Agent(with) => Some((with, PairKind::Cluster)),
+                    Partner::Link(number) => actor.links.get(number as usize).map(|l| (l.other, PairKind::Attachment)),
+                    _ => None,
+                };
+                if let Some(pair) = pair.filter(|(with, _)| !apart(*with)) {
+                    seat.note_pair(total, pair, dt_s);
                 }
             }
             seat.work = stepper.work_of(me);

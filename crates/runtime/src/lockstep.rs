@@ -37,6 +37,8 @@ pub struct Lockstep {
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
+    /// Storage: the jobs of a turn.
+    jobs: Vec<Duration>,
 }
 
 /// An agent and the phase of its turns.
@@ -47,14 +49,25 @@ struct AgentEntry {
     turns: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Waiting,
-    /// In a turn that began at this time.
-    Busy(Duration),
+    /// In a turn.
+    Busy(Turn),
     Resting,
     Led,
     Parked,
+}
+
+/// A turn that goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Turn {
+    /// When it began.
+    since: Duration,
+    /// Its jobs that have not ended.
+    jobs: u32,
+    /// How many cores it keeps busy in the mean, ≥ 1.
+    cores: f64,
 }
 
 /// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
@@ -76,7 +89,8 @@ impl Lockstep {
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
         let (due, batch, unsettled) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default(), Vec::new());
         let now = Duration::ZERO;
-        let mut run = Self { machine, timeline, now, entries, due, cores, handles, sleep, batch, unsettled };
+        let jobs = Vec::new();
+        let mut run = Self { machine, timeline, now, entries, due, cores, handles, sleep, batch, unsettled, jobs };
         run.schedule_all();
         Ok(run)
     }
@@ -167,17 +181,21 @@ impl Lockstep {
         let Some(actor) = &mut entry.actor else { return };
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
-                let price = |model, work| self.machine.step_s(model, work, agent as u64, entry.turns);
-                // each member of a cluster costs what its model does
-                let seconds = if actor.cluster.is_some() && steps > 0 {
-                    actor.member_costs().map(|cost| price(cost.model, cost.work)).sum()
+                let slower = self.machine.slower(self.now);
+                let price =
+                    |model, work| duration(self.machine.step_s(model, work, agent as u64, entry.turns) * slower);
+                self.jobs.clear();
+                if actor.cluster.is_some() && steps > 0 {
+                    self.jobs.extend(actor.member_costs().map(|cost| price(cost.model, cost.work)));
+                    join(&mut self.jobs, self.machine.cores);
                 } else {
-                    f64::from(steps) * price(actor.shared.model, work)
-                };
-                let seconds = seconds * self.machine.slower(self.now);
-                self.cores.start(agent as u32, duration(seconds));
+                    self.jobs.push(price(actor.shared.model, work) * steps);
+                }
+                self.jobs.iter().for_each(|job| self.cores.start(agent as u32, *job));
+                let [all, longest] = [self.jobs.iter().sum(), self.jobs.iter().copied().max().unwrap_or_default()];
+                let cores = if longest.is_zero() { 1.0 } else { all.div_duration_f64(longest) };
                 entry.turns += 1;
-                entry.phase = Phase::Busy(self.now);
+                entry.phase = Phase::Busy(Turn { since: self.now, jobs: self.jobs.len() as u32, cores });
             }
             None => entry.phase = Phase::Parked,
         }
@@ -185,11 +203,15 @@ impl Lockstep {
     }
 
     fn finish(&mut self, agent: usize) {
+        let entry = &mut self.entries[agent];
+        let (Phase::Busy(turn), Some(actor)) = (&mut entry.phase, &mut entry.actor) else { return };
+        turn.jobs -= 1;
+        if turn.jobs > 0 {
+            return;
+        }
         self.batch.open();
         let started = Instant::now();
-        let entry = &mut self.entries[agent];
-        let (Phase::Busy(since), Some(actor)) = (entry.phase, &mut entry.actor) else { return };
-        let took = (self.now - since).as_secs_f64();
+        let took = (self.now - turn.since).as_secs_f64() * turn.cores;
         let next = actor.finish(&self.timeline, self.now, took);
         entry.phase = match next {
             Next::Due | Next::Join(_) => Phase::Waiting,
@@ -249,6 +271,20 @@ impl Drop for Lockstep {
     fn drop(&mut self) {
         self.end();
     }
+}
+
+/// Joins the steps of a cluster's members, side by side, to as many jobs as there are cores: the dearest first, each to the job that has
+/// least. The turn ends with the last job.
+fn join(jobs: &mut Vec<Duration>, cores: u32) {
+    let cores = cores.max(1) as usize;
+    jobs.sort_unstable_by_key(|job| Reverse(*job));
+    for at in cores..jobs.len() {
+        let more = jobs[at];
+        if let Some(least) = jobs[..cores].iter_mut().min() {
+            *least += more;
+        }
+    }
+    jobs.truncate(cores);
 }
 
 /// An event in virtual time.

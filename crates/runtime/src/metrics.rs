@@ -165,6 +165,7 @@ pub(super) const SMOOTHING: f64 = 0.125;
 /// The writing side of an agent's metrics, owned by the thread that makes its turns.
 #[derive(Debug)]
 pub(super) struct MetricsWriter {
+    turns: u64,
     steps: u64,
     misses: u64,
     late: Histogram,
@@ -176,6 +177,8 @@ pub(super) struct MetricsWriter {
 /// A turn, as recorded in the metrics.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
+    /// Steps of its own that it made.
+    pub steps: u32,
     /// Simulated time at the turn's end.
     pub now: SimTime,
     /// How late it began.
@@ -189,12 +192,12 @@ pub(super) struct Entry {
 impl MetricsWriter {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
-        Self { steps: 0, misses: 0, late: Histogram::default(), work_s: None, window, first_window: true }
+        Self { turns: 0, steps: 0, misses: 0, late: Histogram::default(), work_s: None, window, first_window: true }
     }
 
-    /// Steps recorded so far.
-    pub const fn steps(&self) -> u64 {
-        self.steps
+    /// Turns recorded so far.
+    pub const fn turns(&self) -> u64 {
+        self.turns
     }
 
     /// Reads a word of the memory that a turn will write to ([`crate::prefetch`]).
@@ -204,7 +207,8 @@ impl MetricsWriter {
 
     /// Records a turn.
     pub fn write(&mut self, gauges: &Metrics, pace: &AgentClock, entry: Entry) {
-        self.steps += 1;
+        self.turns += 1;
+        self.steps += u64::from(entry.steps);
         self.misses += u64::from(entry.missed);
         self.late.record(entry.late);
         let work_s = self.work_s.map_or(entry.work_s, |old| old + SMOOTHING * (entry.work_s - old));

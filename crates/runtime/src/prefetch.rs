@@ -18,7 +18,7 @@ impl AgentRunner {
             self.pace.time().as_nanos(),
             self.served.as_nanos(),
             self.dt_range.0.as_nanos(),
-            self.metrics.steps(),
+            self.metrics.turns(),
             self.faults.seed,
             self.unsettled_ns,
         ]);

@@ -13,10 +13,10 @@ impl AgentRunner {
     /// Records a step in the metrics and publishes its state; whether the state is visible.
     pub fn record_step(&mut self, open: &PendingTurn, now: SimTime, work_s: f64) -> bool {
         let missed = now > self.pace.scene_time();
-        let entry = Entry { now, late: open.start.late, missed, work_s };
+        let entry = Entry { steps: self.own_steps(), now, late: open.start.late, missed, work_s };
         // metrics first: a state that is visible is accounted for
         self.metrics.write(&self.shared.gauges, &self.pace, entry);
-        self.withheld = self.faults.loses(self.id(), self.metrics.steps());
+        self.withheld = self.faults.loses(self.id(), self.metrics.turns());
         !self.withheld && self.publish(now)
     }
 

@@ -117,16 +117,16 @@ pub struct ClusterReport {
     pub work: f64,
 }
 
-/// What a pair of bodies gave each other in a macro step.
+/// What a pair of bodies, or a link, gave in a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairTotal {
     /// The participant of lower number, by its place in the list.
     pub member: usize,
-    /// What it touched.
+    /// What it touched, or by which of its links it is held.
     pub partner: Partner,
     /// The impulse on the participant, world axes, N·s.
     pub impulse_n_s: DVec3,
-    /// Places that bore something, counted in every fine step.
+    /// Places that bore something, or rows of the link, counted in every fine step.
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
@@ -343,7 +343,7 @@ impl ClusterStepper {
         }
     }
 
-    /// What pairs gave each other in the last macro step, by participants and partners.
+    /// What pairs and links gave in the last macro step, by participants and partners.
     pub fn totals(&self) -> &[PairTotal] {
         &self.totals
     }
@@ -414,6 +414,9 @@ impl ClusterStepper {
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
             outside.note_line(owner, *impulse);
+            if let Partner::Link(_) = owner.partner {
+                add_up(&mut self.totals, owner.member, owner.partner, *impulse, 0.0);
+            }
             let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
@@ -455,7 +458,7 @@ fn times(strain: f64) -> u32 {
     times
 }
 
-/// Adds a contact's impulse to the total of its pair.
+/// Adds the impulse of a contact or a link's row to the total of its pair.
 fn add_up(totals: &mut Vec<PairTotal>, member: usize, partner: Partner, impulse_n_s: DVec3, depth_m: f64) {
     let order = |total: &PairTotal| (total.member, total.partner);
     let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {

@@ -12,6 +12,8 @@ use glam::DVec3;
 
 /// A span counts as flat on a block wherever its gap is above the lowest by at most this share of its radius.
 const FLAT_SHARE: f64 = 2e-3;
+/// What turns by more than this in a quarter of the way to the edge of a flat stretch is curved, radians: the lowest place bears it alone.
+const FLAT_RAD: f64 = 5e-4;
 /// The edges of a flat stretch count if they are at least this many radii from other places.
 const APART_RADII: f64 = 0.25;
 /// Halvings of the search for such an edge: a thousandth of a span.
@@ -144,7 +146,9 @@ impl StrandOnBlock<'_> {
                 None => off = 0.5 * (flat.0 + off),
             }
         }
-        ((to - flat.0).abs() > apart).then_some(flat)
+        let [quarter, half] = [0.25, 0.5].map(|part| at(from + (flat.0 - from) * part));
+        let is_curved = quarter?.1.normal.distance(half?.1.normal) > FLAT_RAD;
+        ((to - flat.0).abs() > apart && !is_curved).then_some(flat)
     }
 
     /// Adds a place, unless it is too far.

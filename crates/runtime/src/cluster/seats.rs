@@ -180,7 +180,7 @@ impl AgentRunner {
 
     /// Shows the last states of those it leads and lets them return: it makes no more turns.
     pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
-        self.conclude_led(timeline.sim_at(wall), 0.0);
+        self.conclude_led(timeline, wall);
         self.release_all();
     }
 

@@ -62,7 +62,13 @@ impl AgentRunner {
             self.write_snapshot(self.pace.time() + dt, false)?;
             self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();
-            let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
+            let entry = Entry {
+                steps: self.own_steps(),
+                now: timeline.sim_at(wall),
+                late: Duration::ZERO,
+                missed: false,
+                work_s,
+            };
             self.metrics.write(&self.shared.gauges, &self.pace, entry);
             steps += 1;
         }
@@ -93,7 +99,8 @@ impl AgentRunner {
             match contained(|| actor.write_snapshot(time + open.dt, open.rests)) {
                 Ok(()) => {
                     actor.pace.advance_by(open.dt);
-                    actor.open = Some(*open);
+                    let (resolution, errors_m) = (actor.resolution(), actor.errors_m());
+                    actor.open = Some(PendingTurn { resolution, errors_m, ..*open });
                 }
                 Err(reason) => actor.park(reason),
             }
@@ -101,15 +108,40 @@ impl AgentRunner {
         self.led.release_parked();
     }
 
-    /// Accounts for the steps of those that stepped with it and shows their states; whether all can be seen.
-    pub fn conclude_led(&mut self, now: SimTime, work_s: f64) -> bool {
-        let share_s = work_s / (1 + self.led.len()) as f64;
-        let mut published = true;
+    /// The steps of its own within the last turn.
+    pub fn own_steps(&self) -> u32 {
+        self.cluster.as_ref().and_then(|seat| seat.state).map_or(1, |state| state.parts)
+    }
+
+    /// Shares the time of a turn out among itself and those that stepped with it, by their work; its own share. Each governor answers for
+    /// its agent alone: of what bends in one cluster the one that is too fine gives way.
+    pub fn share_work(&mut self, work_s: f64) -> f64 {
+        let work = |actor: &Self| actor.cluster.as_ref().map_or(0.0, |seat| seat.work);
+        let own = work(self);
+        let all = own + self.led.all().filter(|actor| actor.open.is_some()).map(work).sum::<f64>();
+        let share_s = |part: f64| if all > 0.0 { work_s * part / all } else { work_s };
         self.led.each(|actor| {
-            if let Some(open) = actor.open.take() {
-                published &= actor.record_step(&open, now, share_s);
+            let part = work(actor);
+            if let Some(seat) = &mut actor.cluster {
+                seat.work_s = share_s(part);
             }
         });
+        share_s(own)
+    }
+
+    /// Accounts for the steps of those that stepped with it, lets their governors answer and shows their states; whether all can be seen.
+    pub fn conclude_led(&mut self, timeline: &Timeline, wall: Duration) -> bool {
+        let now = timeline.sim_at(wall);
+        let mut published = true;
+        self.led.each(|actor| {
+            let Some(open) = actor.open.take() else { return };
+            let work_s = actor.cluster.as_ref().map_or(0.0, |seat| seat.work_s);
+            published &= actor.record_step(&open, now, work_s);
+            if let Err(reason) = contained(|| actor.run_governor(timeline, &open, work_s)) {
+                actor.park(reason);
+            }
+        });
+        self.led.release_parked();
         published
     }
 }

@@ -29,6 +29,8 @@ const TOLERANCE: f64 = 0.05;
 /// Radii of the cylinder and of the tube, metres.
 const DRUM_M: f64 = 0.1;
 const TUBE_M: f64 = 0.001;
+/// How far a turn lies beside the one before, metres: they do not touch, and the angle of contact is that of a circle to 5e-5.
+const PITCH_M: f64 = 0.005;
 /// Straight part at each end, metres.
 const TAIL_M: f64 = 0.05;
 /// Segments per radian of wrap: 2.4° each.
@@ -138,7 +140,7 @@ impl Experiment for Capstan {
 /// The path: a tail along the tangent, the wrap, another tail. The cylinder's axis is y.
 fn path(wrap_rad: f64) -> Vec<DVec3> {
     let reach = DRUM_M + TUBE_M;
-    let on = |phi: f64| DVec3::new(libm::sin(phi), 0.0, libm::cos(phi)) * reach;
+    let on = |phi: f64| DVec3::new(libm::sin(phi) * reach, PITCH_M * phi / TAU, libm::cos(phi) * reach);
     let along = |phi: f64| DVec3::new(libm::cos(phi), 0.0, -libm::sin(phi));
     let count = libm::ceil(wrap_rad / 0.1) as u32;
     let mut path = vec![on(0.0) - along(0.0) * TAIL_M, on(0.0) - along(0.0) * 0.5 * TAIL_M];
