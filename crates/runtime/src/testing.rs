@@ -133,8 +133,9 @@ pub(super) struct Dummy {
     /// Position of its matter along z.
     pub z: f64,
     pub form: Option<Arc<CollisionShape>>,
-    /// Its macro step, until it is written.
-    pub step: Mutex<Option<RecordedStep>>,
+    /// What its steps as a member look like, and those of the macro step until it is written.
+    pub next: Option<RecordedStep>,
+    pub made: Mutex<Vec<RecordedStep>>,
     pub kept: Kept,
 }
 
@@ -171,7 +172,8 @@ impl Dummy {
             time: SimTime::ZERO,
             z: 0.0,
             form: None,
-            step: Mutex::new(None),
+            next: None,
+            made: Mutex::default(),
             kept: Kept::default(),
         }
     }
@@ -286,9 +288,9 @@ impl Agent for Dummy {
             Bounds { low: centre - half, high: centre + half, speed_m_s: self.speed_m_s() }
         });
         self.ledgers.write(into);
-        let step = self.step.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let (Some(log), Some(step)) = (&self.log, step) {
-            log.lock().unwrap_or_else(PoisonError::into_inner).push(step);
+        if let Some(log) = &self.log {
+            let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+            log.lock().unwrap_or_else(PoisonError::into_inner).append(&mut made);
         }
     }
 
@@ -316,8 +318,9 @@ impl ClusterMember for Dummy {
 
     fn look(&mut self, context: &StepContext<'_>, _dt_s: f64) {
         (self.me, self.time, self.kept.after_s) = (context.me, context.time, 0.0);
+        self.made.lock().unwrap().clear();
         if self.log.is_some() {
-            *self.step.lock().unwrap() = Some(recorded(context));
+            self.next = Some(recorded(context));
         }
     }
 
@@ -364,21 +367,22 @@ impl ClusterMember for Dummy {
 
     fn go_back(&mut self) {
         (self.steps, self.x, self.z, self.kept.after_s) = (self.kept.steps, self.kept.x, self.kept.z, 0.0);
+        self.made.lock().unwrap().clear();
     }
 
     fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {}
 
     fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
-        // the macro step counts as one
-        self.steps += u64::from(self.kept.after_s == 0.0);
+        self.steps += 1;
+        let from = self.time + SimSpan::from_secs_f64(self.kept.after_s).unwrap();
         self.kept.after_s += h_s;
         self.x += h_s;
         let now = self.time + SimSpan::from_secs_f64(self.kept.after_s).unwrap();
         if let Some(Swing { reach_m, rate_hz, phase }) = self.swing {
             self.z = reach_m * libm::sin(TAU * (now.as_secs_f64() * rate_hz + phase));
         }
-        if let Some(step) = &mut *self.step.lock().unwrap() {
-            step.to = now;
+        if let Some(step) = &self.next {
+            self.made.lock().unwrap().push(RecordedStep { from, to: now, ..step.clone() });
         }
         Ok(())
     }

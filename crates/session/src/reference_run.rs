@@ -288,10 +288,10 @@ mod tests {
         let (sim_s, interrupted, pairs) = until(0.4);
         assert!(interrupted && (0.3..0.5).contains(&sim_s), "{sim_s} s");
         let [pair] = &pairs[..] else { panic!("only one pair has met: {pairs:?}") };
-        // equal masses that bounce without loss exchange their 1 m/s
+        // equal masses that bounce without loss exchange their 1 m/s; a solve is done at 5e-6 m/s
         let exchanged = [pair.impulse_n_s, pair.impulse_oracle_n_s];
         assert!(
-            (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 1e-6),
+            (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 5e-6),
             "{pair:?}"
         );
         let (sim_s, interrupted, pairs) = until(2.0);
