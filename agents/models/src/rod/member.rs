@@ -10,7 +10,7 @@ use super::method::Integrator;
 use super::rest::RestDetector;
 use super::state::RodState;
 use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
-use super::system::{Iterate, SubstepProblem, assemble};
+use super::system::SubstepProblem;
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
@@ -88,16 +88,13 @@ impl ClusterMember for Tube {
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let solved = self.step_by(h_s, |stepper, now, setting, _| {
             let problem = whole_step(setting, h_s);
-            assemble(&problem, &Iterate { start: now, at: now, first: true }, &mut stepper.rows, &mut stepper.rhs);
-            stepper.factor.factor(&stepper.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
-            stepper.factor.solve(&mut stepper.rhs);
-            stepper.advance(now, &problem, true);
-            Ok(stepper.energy_rise(now, &problem))
+            stepper.solve(now, &problem, true)?;
+            stepper.follow(now, &problem)
         });
         self.unknowns.rise_j = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
         let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         let mut unknowns = std::mem::take(&mut self.unknowns);
-        unknowns.take(&self.stepper.rows, &self.stepper.rhs, &self.now.x);
+        unknowns.take(&self.stepper.rows, &self.stepper.next.u, &self.now.x);
         unknowns.radii_m.clear();
         unknowns.radii_m.extend(self.division.arc_m.iter().map(|&arc_m| self.radius_at_time_m(arc_m, then)));
         self.unknowns = unknowns;

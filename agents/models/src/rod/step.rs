@@ -159,16 +159,7 @@ impl Stepper {
         if trial.bounds_turns && self.fastest_spin() * problem.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
-        self.advance(now, problem, true);
-        let mut rise = self.energy_rise(now, problem);
-        for _ in 0..ITERATIONS_MORE {
-            // a state far out may have no next iterate: then the best so far is judged
-            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, problem, false).is_err() {
-                break;
-            }
-            self.advance(now, problem, false);
-            rise = self.energy_rise(now, problem);
-        }
+        let rise = self.follow(now, problem)?;
         let finite = self.next.is_finite();
         if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
@@ -179,8 +170,30 @@ impl Stepper {
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
+    /// Moves along the solution of the first system, and along those about where that leads while the energy rises; by how much it still does.
+    ///
+    /// # Errors
+    /// Where the first system cannot be factored.
+    pub(super) fn follow(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> Result<f64, Divergence> {
+        self.advance(now, problem, true);
+        let mut rise_j = self.energy_rise(now, problem);
+        for _ in 0..ITERATIONS_MORE {
+            if rise_j <= 0.0 || !self.next.is_finite() {
+                break;
+            }
+            // a state far out may have no next iterate: then the best so far is judged, with the first system
+            if self.solve(now, problem, false).is_err() {
+                self.solve(now, problem, true)?;
+                break;
+            }
+            self.advance(now, problem, false);
+            rise_j = self.energy_rise(now, problem);
+        }
+        Ok(rise_j)
+    }
+
     /// Builds and solves the system about the iterate; leaves the change of velocities in `rhs` (eq. 11).
-    fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
+    pub(super) fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
         assemble(problem, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
         self.factor_and_solve()
