@@ -55,13 +55,13 @@ fn came_to(outcome: &Outcome) -> (f64, f64) {
 }
 
 #[test]
-fn steps_that_get_dear_are_paid_for_by_the_picture_and_by_steps() {
-    // next to nothing; as much as there is time for beside a smaller picture; four times that
-    let [light, dear, dearest] = [0.05, 12.5, 50.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us, ""), 480)));
+fn steps_that_get_four_times_as_dear_are_paid_for_by_steps_and_by_the_picture() {
+    // next to nothing; two cores; eight: of two that draw as well
+    let [light, dear, dearest] = [0.05, 50.0, 200.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us, ""), 480)));
     let told = format!("{light:?} {dear:?} {dearest:?}");
     assert!((light.0 / 0.005 - 1.0).abs() < 0.01, "{told}");
-    assert!(dearest.0 > 1.3 * dear.0 && dear.0 >= light.0, "steps: {told}");
-    assert!(dearest.1 < 1.01 * dear.1 && dear.1 < 0.98 * light.1, "picture: {told}");
+    assert!(dearest.0 > 1.3 * dear.0 && dear.0 > 1.05 * light.0, "steps: {told}");
+    assert!(dearest.1 < 0.95 * dear.1 && dear.1 < 0.98 * light.1, "picture: {told}");
     // neither bears it alone: steps could be forty times as coarse, and the picture gone
     assert!(dearest.0 < 20.0 * light.0 && dearest.1 > 0.2 * light.1, "{told}");
 }
