@@ -193,7 +193,12 @@ impl Stepper {
     }
 
     /// Builds and solves the system about the iterate; leaves the change of velocities in `rhs` (eq. 11).
-    pub(super) fn solve(&mut self, now: &RodState, problem: &SubstepProblem<'_>, first: bool) -> Result<(), Divergence> {
+    pub(super) fn solve(
+        &mut self,
+        now: &RodState,
+        problem: &SubstepProblem<'_>,
+        first: bool,
+    ) -> Result<(), Divergence> {
         let at = if first { now } else { &self.next };
         assemble(problem, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
         self.factor_and_solve()
