@@ -99,6 +99,11 @@ impl BarycentricPoint {
         terms.sum()
     }
 
+    /// Whether it is a point of this triangle, its border included.
+    fn is_on(self, triangle: &[u32; 3]) -> bool {
+        self.vertices.into_iter().zip(self.shares).all(|(vertex, share)| share == 0.0 || triangle.contains(&vertex))
+    }
+
     /// Whether it is a point of a triangle, not of a vertex or an edge.
     fn is_of_triangle(self) -> bool {
         self.vertices[1] != self.vertices[2]

@@ -288,3 +288,22 @@ fn nothing_is_allocated_by_a_search_along_a_motion_once_everything_is_known() {
         }
     }
 }
+
+/// The faces of a block that meet at a corner count alike, however large they are: by the mean of their areas this one was pierced already.
+#[test]
+fn a_tool_touches_a_corner_between_faces_of_unlike_size() {
+    let (one, (block, corners)) = (tool(), block_skin());
+    let turned = DQuat::from_axis_angle(DVec3::new(0.346_251, -0.840_598, 0.507_502).normalize(), -0.166_478);
+    let [r, s] = [
+        DQuat::from_xyzw(0.317_076, -0.776_302, -0.541_731, 0.057_829).normalize(),
+        DQuat::from_xyzw(-0.219_208, 0.783_336, 0.058_398, 0.578_724).normalize(),
+    ];
+    let (p, u) = (DVec3::new(0.076_829, 0.086_832, -0.139_582), DVec3::new(-0.221_428, -0.258_621, -0.097_869));
+    let (q, v) = (DVec3::new(-0.036_336, -0.103_761, -0.036_688), DVec3::new(-0.185_962, 0.0, -0.133_802));
+    let at = |by: DVec3, turn: DQuat| corners.iter().map(|x| by + turn * *x).collect::<Vec<_>>();
+    let (b0, b1) = (at(q, s), at(q + v, turned.conjugate() * s));
+    let a = swept(placed(&one, &[], &[], (p, r)), placed(&one, &[], &[], (p + u, turned * r)));
+    let b = swept(placed(&block, &b0, &[], (q, s)), placed(&block, &b1, &[], (q + v, turned.conjugate() * s)));
+    let (_, touches) = first(&a, &b, 8e-4).expect("they meet");
+    assert!(touches.iter().any(|touch| touch.gap_m < 9e-4), "{touches:?}");
+}
