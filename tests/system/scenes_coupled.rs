@@ -463,3 +463,23 @@ fn nobody_falls_asleep_under_a_tool_that_presses() {
         }
     }
 }
+
+/// In the last of the solves of a step no more contacts are added: what is not solved has no impulse to remember.
+#[test]
+fn eight_boxes_in_one_place_come_apart() {
+    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\n".to_owned();
+    let cube = |k: u32| {
+        format!(
+            "[[object]]\nname = \"b{k}\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.05, 0.05, 0.05]\n\
+             position_m = [0.0, 0.0, {}]\nmass_kg = 1.0\n",
+            0.05 + 0.001 * f64::from(k)
+        )
+    };
+    let scene = Folder::with(&(0..8).map(cube).fold(floor, |text, more| text + &more));
+    let done =
+        metachron(&["run", scene.scene(), "--headless", "--executor", "lockstep", "--seconds", "1", "--json", "-q"]);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && !said.contains("panicked"), "{said}");
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(report["agents"].as_array().unwrap().iter().all(|agent| agent["parked"] == false), "{}", report["agents"]);
+}

@@ -300,6 +300,8 @@ impl AgentRunner {
         wishes.extend(self.led.members_at(time).filter_map(Self::wish));
         let plan = Plan::of(wishes.iter().map(|wish| (wish.role, wish.step_s)));
         let macro_s = match span {
+            // who is alone goes as far as its clock lets it
+            Span::Wanted(span) if wishes.len() == 1 => span.as_secs_f64(),
             Span::Wanted(span) => {
                 let factor = (span.as_secs_f64() / self.pace.wanted().as_secs_f64()).max(1.0);
                 (plan.macro_s * factor).min(plan.macro_s.max(STRETCHED_MAX_S))

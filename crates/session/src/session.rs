@@ -326,10 +326,12 @@ impl Session {
         }
     }
 
-    /// Starts real time.
+    /// Starts real time, and virtual time that was paused for a window.
     pub fn begin(&mut self) {
         if !self.is_virtual() {
             self.begun = self.now();
+        }
+        if !self.world.timeline().runs_at(self.now()) {
             self.world.drive(TimelineCommand::Run);
         }
     }

@@ -182,10 +182,8 @@ impl<'a> WindowSimulation<'a> {
 
     /// Starts time, unless the user has paused it.
     fn begin(&mut self) {
-        match (self.running, self.session.is_virtual()) {
-            (true, true) => self.session.drive(TimelineCommand::Run),
-            (true, false) => self.session.begin(),
-            (false, _) => {}
+        if self.running {
+            self.session.begin();
         }
     }
 

@@ -176,3 +176,14 @@ fn a_run_begins_when_its_first_picture_is_there() {
     let report = report_of(scene.scene(), &["--seconds", "0.02"]);
     assert!(report["frames"].as_u64().unwrap() >= 1 && number(&report, "/sim_s") >= 0.02, "{report}");
 }
+
+#[test]
+fn virtual_time_that_waits_for_a_window_passes_without_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = ["run", "stack", "--executor", "lockstep", "--seconds", "0.2", "--report", "report.json", "-q"];
+    let done = program().args(arguments).current_dir(folder.path()).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let text = std::fs::read_to_string(folder.path().join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(number(&report, "/agents/0/steps") > 40.0, "{}", report["agents"][0]);
+}

@@ -47,7 +47,8 @@ impl ClusterStepper {
             let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             let look = Round { scene, all, progress, h_s, judge: Judge::Solved };
-            let passed = search.add_passed(&look);
+            // what is added is solved
+            let passed = round < ROUNDS_MAX && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
             if round == ROUNDS_MAX || !passed && joined {

@@ -197,14 +197,19 @@ fn dropped_time_lowers_the_real_time_factor() {
         assert!((on_time - 1.0).abs() < 0.02, "{on_time}");
     });
     let mut plan = plan("pendulum");
-    // a step that becomes 50 ms long at most takes 100
-    plan.overrides.push(("machine.step.tube.base_us".to_owned(), "100000".to_owned()));
+    // a step that becomes 1/60 s long at most, as the tube swings past the ball, takes twice that
+    plan.overrides.push(("machine.step.tube.base_us".to_owned(), "33000".to_owned()));
     let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     let simulation = &mut WindowSimulation::new(session, plan, &mut go_on);
-    (0..240).for_each(|_| frame(simulation, None));
-    let Status { real_time_factor, speed, agents, .. } = simulation.status();
-    assert!((0.3..0.7).contains(real_time_factor) && *speed == 1.0, "{real_time_factor}");
+    let mut sum = 0.0;
+    for _ in 0..240 {
+        frame(simulation, None);
+        sum += simulation.status().real_time_factor;
+    }
+    let Status { speed, agents, .. } = simulation.status();
+    let mean = sum / 240.0;
+    assert!((0.3..0.7).contains(&mean) && *speed == 1.0, "{mean}");
     let dropped: Vec<f64> = agents.iter().map(|agent| agent.dropped_s).collect();
-    assert!(dropped[0] > 1.0 && dropped[1] == 0.0, "{dropped:?}");
+    assert!(dropped[0] > 1.0, "{dropped:?}");
 }
