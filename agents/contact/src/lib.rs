@@ -17,8 +17,7 @@
 //! ];
 //! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
 //! let members = [Member { blocks: &blocks, free: &free, share: 1.0, response: None }];
-//! let corner = |key, x, y| Contact {
-//!     key,
+//! let corner = |x, y| Contact {
 //!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
 //!     normal: DVec3::Z,
 //!     tangents: [DVec3::X, DVec3::Y],
@@ -30,10 +29,9 @@
 //!     owed_slip_m: DVec3::ZERO,
 //!     warm_n_s: DVec3::ZERO,
 //! };
-//! let contacts = [corner(0, -0.1, -0.1), corner(1, 0.1, -0.1), corner(2, -0.1, 0.1), corner(3, 0.1, 0.1)];
+//! let contacts = [corner(-0.1, -0.1), corner(0.1, -0.1), corner(-0.1, 0.1), corner(0.1, 0.1)];
 //! let mut solver = Solver::default();
-//! let (members, rebound_from_m_s) = (&members, 9.81 * h_s);
-//! let solution = solver.solve(&Problem { h_s, members, contacts: &contacts, rows: &[], rebound_from_m_s })?;
+//! let solution = solver.solve(&Problem { h_s, members: &members, contacts: &contacts, rows: &[] })?;
 //!
 //! let given: DVec3 = solution.contacts_n_s.iter().sum();
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …

@@ -48,8 +48,10 @@ pub enum CouplingLaw {
     /// it in its next step from a ledger. Momentum is conserved for any clocks.
     Ledger,
     /// Refused: penalty laws stay in the laboratory.
+    #[schemars(skip)]
     Penalty,
     /// Refused: penalty laws stay in the laboratory.
+    #[schemars(skip)]
     PenaltyExtrapolated,
     /// Asynchronous by transmission line modelling: passive for any delay, at the cost of a parasitic mass.
     Tlm,
