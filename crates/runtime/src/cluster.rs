@@ -17,7 +17,7 @@ pub(super) use turn::Leap;
 
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
-use super::observation::{Observer, newest};
+use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
@@ -157,11 +157,8 @@ impl ClusterSeat {
     }
 
     /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
-    fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], laws: &[(AgentId, Law)]) {
-        let is_apart = |id: AgentId| {
-            let law = laws.binary_search_by_key(&id, |(other, _)| *other).ok().map(|at| laws[at].1);
-            law.is_some_and(Law::is_asynchronous)
-        };
+    fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], mine: Option<&Peer>) {
+        let is_apart = |id: AgentId| mine.is_some_and(|mine| mine.law(id).is_asynchronous());
         self.bonds.clear();
         self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
         self.bonds.extend(self.jointed.iter().copied().chain(grasped));
@@ -175,7 +172,7 @@ impl ClusterSeat {
     }
 
     /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
-    fn note_pair(&mut self, total: &PairTotal, (with, kind): (AgentId, PairKind), dt_s: f64) {
+    fn note_pair(&mut self, total: &PairTotal, with: AgentId, kind: PairKind, dt_s: f64) {
         let at = self.pairs.iter().position(|pair| pair.with == with && pair.kind == kind).unwrap_or_else(|| {
             self.pairs.push(PairState::new(with, kind));
             self.pairs.len() - 1
@@ -207,7 +204,7 @@ impl AgentRunner {
         let (Span::Wanted(dt) | Span::AtMost(dt)) = span;
         let time = self.pace.time();
         let step = PlannedStep { start: self.pace.scene_time(), dt };
-        self.observer.update(&self.peers, &self.writer, step, &Membership::default());
+        self.observe(step, &Membership::default());
         let (me, neighbours) = (self.shared.id, self.observer.neighbours());
         let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
         let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
@@ -352,13 +349,18 @@ impl AgentRunner {
         self.led = led;
     }
 
-    /// Looks around before a `step` that it makes with `members`.
+    /// Reads its neighbours before a `step` that it makes with `members`.
+    fn observe(&mut self, step: PlannedStep, members: &Membership) {
+        self.observer.update(&self.peers, &self.writer, step, members);
+    }
+
+    /// The same, and notes with whom it belongs into one cluster.
     fn look_among(&mut self, step: PlannedStep, members: &Membership) {
+        self.observe(step, members);
         let Self { observer, peers, writer, links, cluster, .. } = self;
-        observer.update(peers, writer, step, members);
         let Some(seat) = cluster else { return };
         let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
-        seat.bond(observer, grasped, links, peers.get(observer.me()).map_or(&[][..], |peer| &peer.laws));
+        seat.bond(observer, grasped, links, peers.get(observer.me()));
     }
 
     /// Notes how the step was made and solved.
@@ -422,8 +424,8 @@ impl AgentRunner {
                     Partner::Link(number) => actor.links.get(number as usize).map(|l| (l.other, PairKind::Attachment)),
                     _ => None,
                 };
-                if let Some(pair) = pair.filter(|(with, _)| !apart(*with)) {
-                    seat.note_pair(total, pair, dt_s);
+                if let Some((with, kind)) = pair.filter(|(with, _)| !apart(*with)) {
+                    seat.note_pair(total, with, kind, dt_s);
                 }
             }
             seat.work = stepper.work_of(me);

@@ -66,7 +66,8 @@ impl Peer {
         PairClock { id: self.shared.id, step_s: self.shared.wanted_hz.recip() }
     }
 
-    fn law(&self, other: AgentId) -> Law {
+    /// The law of its pair with `other`.
+    pub fn law(&self, other: AgentId) -> Law {
         self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Cluster, |at| self.laws[at].1)
     }
 

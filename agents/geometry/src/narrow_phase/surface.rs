@@ -200,6 +200,12 @@ impl Surface<'_> {
         triangle.map(|vertex| self.at(vertex))
     }
 
+    /// The normal of a triangle, out of a closed skin; `None` for one without area.
+    fn out(&self, triangle: [u32; 3]) -> Option<DVec3> {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).try_normalize()
+    }
+
     fn edge(&self, number: u32) -> Edge {
         let vertices = self.form.edges[number as usize];
         Edge { number, vertices, ends: vertices.map(|vertex| self.at(vertex)) }
@@ -476,8 +482,7 @@ impl SurfaceQuery<'_> {
 
     /// The normal of the triangle of a spot; `None` for a vertex or an edge.
     fn out_of(&self, spot: BarycentricPoint) -> Option<DVec3> {
-        let [a, b, c] = self.surface.corners(spot.vertices);
-        (b - a).cross(c - a).try_normalize()
+        self.surface.out(spot.vertices)
     }
 }
 

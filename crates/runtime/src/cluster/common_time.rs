@@ -115,14 +115,14 @@ impl AgentRunner {
         let (time, moment, dt) = (self.pace.time(), self.pace.scene_time(), self.pace.dt());
         let step = PlannedStep { start: moment, dt };
         if self.led.is_empty() {
-            self.observer.update(&self.peers, &self.writer, step, &Membership::default());
+            self.observe(step, &Membership::default());
             return;
         }
-        self.led.note_membership(self.shared.id, time);
-        self.observer.update(&self.peers, &self.writer, step, self.led.membership());
-        self.led.each_at(time, |actor, membership| {
-            actor.observer.update(&actor.peers, &actor.writer, step, membership);
-        });
+        let mut led = std::mem::take(&mut self.led);
+        led.note_membership(self.shared.id, time);
+        self.observe(step, led.membership());
+        led.each_at(time, |actor, membership| actor.observe(step, membership));
+        self.led = led;
     }
 
     /// Those near it, or near one it leads of whom `which` is true, that do not step with it.

@@ -231,10 +231,7 @@ impl SurfaceQuery<'_> {
     /// face that meets there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
         let mut faces = self.surface.form.triangles.iter().filter(|triangle| spot.is_on(triangle));
-        let faces_it = |triangle: &[u32; 3]| {
-            let [a, b, c] = self.surface.corners(*triangle);
-            (b - a).cross(c - a).try_normalize().is_some_and(|out| out.dot(normal) <= PIERCED)
-        };
+        let faces_it = |triangle: &[u32; 3]| self.surface.out(*triangle).is_some_and(|out| out.dot(normal) <= PIERCED);
         self.surface.form.closed && !faces.any(faces_it)
     }
 }
