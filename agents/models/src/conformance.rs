@@ -24,7 +24,9 @@
 use glam::DVec3;
 use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_core::{AgentId, Body, DT_MAX_S, Grip, HASH_START, Resolution, SimSpan, SimTime, Snapshot, StepError};
+use metachron_core::{
+    AgentId, Body, DT_MAX_S, Grip, HASH_START, PlainLoop, Resolution, SimSpan, SimTime, Snapshot, StepError,
+};
 
 mod bits;
 mod physics;
@@ -181,7 +183,7 @@ impl Cluster {
         let Self { scene, stepper, memory, grips } = self;
         let Some(member) = agent.member() else { return Ok(()) };
         let mut all = [Participant { id: ME, member, context, laws: &[], memory, parts: 1, grips }];
-        stepper.step(scene, &mut all, dt).map(drop)
+        stepper.step(scene, &mut all, dt, &PlainLoop).map(drop)
     }
 }
 

@@ -14,6 +14,7 @@ use super::cluster::{ClusterSeat, Leap, Led, Span};
 use super::faults::Faults;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
+use super::helpers::Helped;
 use super::metrics::{MetricsWriter, SMOOTHING};
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
@@ -164,8 +165,9 @@ impl AgentRunner {
         }
     }
 
-    /// Ends the turn that began: it took `work_s` seconds of a core, those it leads included, and it is wall time `wall`.
+    /// Ends the turn that began: it took `work_s` seconds of the caller, those it leads included, and it is wall time `wall`.
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
+        let work_s = self.cluster.as_ref().map_or(work_s, |seat| seat.helped().core_s(work_s));
         // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
@@ -194,20 +196,31 @@ impl AgentRunner {
         true
     }
 
-    /// Accounts for the wall time of a turn, shared equally with the agents it leads.
+    /// Accounts for a turn that took `wall` time of the caller, shared equally with the agents it leads.
     pub fn count(&mut self, wall: Duration) {
-        let share = if self.led.is_empty() { wall } else { wall / (1 + self.led.len() as u32) };
-        let share_ns = share.as_nanos() as u64;
-        self.unsettled_ns += share_ns;
-        self.led.each(|seat| seat.unsettled_ns += share_ns);
+        let Helped { waited, cpu } = self.cluster.as_mut().map_or_else(Helped::default, |seat| seat.take_helped());
+        let members = 1 + self.led.len() as u32;
+        let own_ns = (wall.saturating_sub(waited) / members).as_nanos() as u64;
+        let helpers_ns = (cpu / members).as_nanos() as u64;
+        self.count_ns(own_ns, helpers_ns);
+        self.led.each(|actor| actor.count_ns(own_ns, helpers_ns));
+    }
+
+    fn count_ns(&mut self, wall_ns: u64, cpu_ns: u64) {
+        self.unsettled_ns += wall_ns;
+        self.add_cpu(cpu_ns);
+    }
+
+    fn add_cpu(&self, nanos: u64) {
+        let cpu = &self.shared.gauges.cpu_nanos;
+        // no other thread writes: an atomic exchange would cost more
+        cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
     }
 
     /// Accounts for the CPU time of the turns since the last call: the fraction `share` of their wall time.
     pub fn settle(&mut self, share: f64) {
         let nanos = (std::mem::take(&mut self.unsettled_ns) as f64 * share) as u64;
-        let cpu = &self.shared.gauges.cpu_nanos;
-        // no other thread writes: an atomic exchange would cost more
-        cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
+        self.add_cpu(nanos);
         self.led.each(|seat| seat.settle(share));
     }
 

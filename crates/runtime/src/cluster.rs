@@ -17,6 +17,7 @@ pub(super) use turn::Leap;
 
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
+use super::helpers::Helped;
 use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
@@ -51,6 +52,8 @@ pub(super) struct ClusterSeat {
     /// Work of its own steps in the last turn, in the unit of its model, and its share of the time of that turn, seconds.
     work: f64,
     work_s: f64,
+    /// What the turns that it leads took on helpers, as far as it is not accounted for.
+    helped: Helped,
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
     doubling: Option<Box<StepDoubling>>,
@@ -123,6 +126,7 @@ impl ClusterSeat {
             sleepers: Vec::new(),
             work: 0.0,
             work_s: 0.0,
+            helped: Helped::default(),
             schedule: DoublingSchedule::default(),
             doubling: None,
             apart_m: 0.0,
@@ -148,6 +152,16 @@ impl ClusterSeat {
         if let Some(pairs) = &self.asynchronous {
             pairs.write(into);
         }
+    }
+
+    /// What the turns that it leads took on helpers, as far as it is not accounted for.
+    pub const fn helped(&self) -> Helped {
+        self.helped
+    }
+
+    /// The same, which is accounted for now.
+    pub fn take_helped(&mut self) -> Helped {
+        std::mem::take(&mut self.helped)
     }
 
     /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
@@ -236,7 +250,7 @@ impl AgentRunner {
         let mut stepper = seat.stepper.take().unwrap_or_default();
         let mut doubling = seat.repeats(steps, id);
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
-        let mut led = std::mem::take(&mut self.led);
+        let (mut led, peers) = (std::mem::take(&mut self.led), Arc::clone(&self.peers));
         let all = std::iter::once(&mut *self).chain(led.members_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
         for (actor, parts) in all.zip(parts) {
@@ -246,23 +260,26 @@ impl AgentRunner {
             }
         }
         let meets = sides.iter().any(Option::is_some);
+        let (size, mut helped) = (list.iter().map(Participant::size).sum(), Helped::default());
         let outcome = contained(|| {
-            // a finer step that diverges says nothing of this one; what partners give is given once
-            let repeated = doubling.as_mut().filter(|_| !meets);
-            let extra = repeated.and_then(|doubling| doubling.foresee(&scene, &mut list, dt).ok());
-            if meets {
-                let step = MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts };
-                remotes.get_or_insert_default().join(&mut list, &mut sides, &mut stepper, step);
-            }
-            let report = stepper.step(&scene, &mut list, dt).map_err(|error| error.to_string())?;
-            if meets {
-                part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
-            }
-            if let Some(doubling) = &mut doubling {
-                doubling.compare(&list, report.dt);
-            }
-            let calm = list.iter().all(|one| one.member.is_calm());
-            Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
+            peers.helpers.make(size, &mut helped, |threads| {
+                // a finer step that diverges says nothing of this one; what partners give is given once
+                let repeated = doubling.as_mut().filter(|_| !meets);
+                let extra = repeated.and_then(|doubling| doubling.foresee(&scene, &mut list, dt, threads).ok());
+                if meets {
+                    let step = MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts };
+                    remotes.get_or_insert_default().join(&mut list, &mut sides, &mut stepper, step);
+                }
+                let report = stepper.step(&scene, &mut list, dt, threads).map_err(|error| error.to_string())?;
+                if meets {
+                    part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
+                }
+                if let Some(doubling) = &mut doubling {
+                    doubling.compare(&list, report.dt);
+                }
+                let calm = list.iter().all(|one| one.member.is_calm());
+                Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
+            })
         });
         let (list, sides) = (recycled(list), recycled(sides));
         // a panic of one member must not end the others
@@ -270,6 +287,8 @@ impl AgentRunner {
         if let Some(seat) = &mut self.cluster {
             (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
             seat.remotes = remotes;
+            seat.helped.waited += helped.waited;
+            seat.helped.cpu += helped.cpu;
         }
         let (report, extra, at_rest) = outcome?;
         let dt = report.dt;

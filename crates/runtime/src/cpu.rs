@@ -102,7 +102,7 @@ impl CpuShare {
 }
 
 /// The CPU time of this thread.
-fn thread_time() -> Option<Duration> {
+pub(super) fn thread_time() -> Option<Duration> {
     ThreadTime::try_now().ok().map(|t| t.as_duration())
 }
 

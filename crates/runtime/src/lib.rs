@@ -35,6 +35,7 @@ mod dirty_set;
 mod faults;
 mod governor;
 mod handle;
+mod helpers;
 mod histogram;
 #[cfg(test)]
 mod live_tests;

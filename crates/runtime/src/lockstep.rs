@@ -12,6 +12,7 @@ use super::agent_runner::{AgentRunner, Effort, Next};
 use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
+use super::helpers::Helpers;
 use super::machine::{Machine, duration};
 use super::metrics::AgentStats;
 use super::sleep::SleepRegistry;
@@ -79,7 +80,7 @@ impl Lockstep {
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::none())?;
         let phase = |actor: &Option<Box<AgentRunner>>| match actor {
             None => Phase::Led,
             Some(actor) if actor.is_parked() => Phase::Parked,

@@ -7,6 +7,7 @@
 use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
 use super::cluster::Membership;
 use super::handle::Shared;
+use super::helpers::Helpers;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
 use metachron_contact::asynchronous::{PairClock, computes};
@@ -21,6 +22,8 @@ pub(super) struct Peers {
     pub all: Vec<Peer>,
     /// `None` if no two agents could touch: then no agent searches for peers.
     pub broad_phase: Option<BroadPhase>,
+    /// Who helps with the turns of large clusters.
+    pub helpers: Helpers,
 }
 
 /// Data of one agent for its peers.

@@ -15,6 +15,7 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::clock::Clock;
 use super::handle::AgentHandle;
+use super::helpers::Helpers;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
@@ -55,7 +56,7 @@ impl Pool {
         patience: Duration,
         priority: Priority,
     ) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::one_per_core(priority))?;
         let workers = workers.clamp(1, handles.len().max(1));
         sleep.set_workers(workers);
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));

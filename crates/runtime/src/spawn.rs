@@ -10,6 +10,7 @@ use super::cluster::{ClusterSeat, Handover, Led, assign_leaders};
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
+use super::helpers::Helpers;
 use super::histogram::Histogram;
 use super::mailbox::Mailbox;
 use super::metrics::{Metrics, MetricsWriter};
@@ -149,13 +150,13 @@ pub(super) struct AssembledRun {
     pub sleep: Arc<SleepRegistry>,
 }
 
-/// Assembles all agents; each has published its initial state, at simulated time zero.
-pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<AssembledRun, RunError> {
+/// Assembles all agents; `helpers` help with the turns of their large clusters. Each has published its initial state, at simulated time zero.
+pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<AssembledRun, RunError> {
     let count = spawns.len();
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
     let sleep = Arc::new(SleepRegistry::new(count));
-    let (peers, writers) = peers(&mut spawns, &sleep);
+    let (peers, writers) = peers(&mut spawns, &sleep, helpers);
     let peers = Arc::new(peers);
     let mut jointed = jointed(&spawns);
     let ids = (0..).map(AgentId);
@@ -208,7 +209,11 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 }
 
 /// The data fixed at the start, and the writer of each agent.
-fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+fn peers(
+    spawns: &mut [AgentSpawn],
+    sleep: &Arc<SleepRegistry>,
+    helpers: Helpers,
+) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
     let members: Vec<_> = spawns.iter_mut().map(|spawn| spawn.agent.member().is_some()).collect();
     let any_lead = members.iter().filter(|is_member| **is_member).count() > 1;
@@ -222,7 +227,7 @@ fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>) -> (Peers, Vec<S
     }
     store_laws(spawns, &mut all);
     let broad_phase = may_any_touch(&all).then(|| BroadPhase::new(all.len()));
-    (Peers { all, broad_phase }, writers)
+    (Peers { all, broad_phase, helpers }, writers)
 }
 
 /// For each agent those that joints hold it to.
@@ -355,7 +360,7 @@ mod tests {
     /// Whether a broad phase is set up, and how many agents can lead or be led.
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
         let sleep = Arc::new(SleepRegistry::new(spawns.len()));
-        let (peers, _) = peers(&mut spawns, &sleep);
+        let (peers, _) = peers(&mut spawns, &sleep, Helpers::none());
         (peers.broad_phase.is_some(), peers.all.iter().filter(|peer| peer.shared.handover.is_some()).count())
     }
 

@@ -11,6 +11,7 @@ use super::clock::{Clock, wait_until};
 use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
+use super::helpers::Helpers;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::sleep::SleepRegistry;
@@ -52,7 +53,7 @@ impl Threads {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
         }
-        let AssembledRun { actors, handles, sleep } = assemble(spawns)?;
+        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::one_per_core(priority))?;
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (sender, ended) = channel();

@@ -6,7 +6,7 @@
 use super::{ClusterMember, ClusterScene, ClusterStepper, Participant};
 use glam::DVec3;
 use metachron_core::step_doubling::farthest;
-use metachron_core::{SimSpan, StepError};
+use metachron_core::{ParallelFor, SimSpan, StepError};
 use metachron_geometry::{ShapeKind, ShapePose};
 
 /// A macro step in twice as many parts.
@@ -33,12 +33,13 @@ impl StepDoubling {
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         dt: SimSpan,
+        threads: &dyn ParallelFor,
     ) -> Result<f64, StepError> {
         let Self { stepper, finer, made, .. } = self;
         *made = None;
         stepper.keep(all);
         all.iter_mut().for_each(|one| one.parts *= 2);
-        let outcome = stepper.step(scene, all, dt);
+        let outcome = stepper.step(scene, all, dt, threads);
         if outcome.is_ok() {
             finer.resize_with(all.len(), Vec::new);
             all.iter().zip(finer).for_each(|(one, places)| probe(&*one.member, places));

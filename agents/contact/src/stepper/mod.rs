@@ -44,7 +44,8 @@ pub use matter::Matter;
 pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
-use metachron_core::{AgentId, Grip, SimSpan, StepError, check_span};
+use metachron_core::parallel::for_each;
+use metachron_core::{AgentId, Grip, ParallelFor, SimSpan, StepError, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
@@ -78,7 +79,20 @@ pub struct Participant<'a> {
     pub grips: &'a mut Vec<Grip>,
 }
 
+/// Where and by whom a macro step is made.
+#[derive(Clone, Copy)]
+struct On<'a> {
+    scene: &'a ClusterScene,
+    threads: &'a dyn ParallelFor,
+}
+
 impl Participant<'_> {
+    /// How many blocks of three velocities it has.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.member.velocities().len()
+    }
+
     /// Whether it touches `other` where the two meet. An asynchronous pair whose sides have come into one cluster has one clock in it.
     fn may_touch(&self, other: &Self) -> bool {
         let law = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).ok().map(|at| self.laws[at].1);
@@ -198,7 +212,8 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it after, from the start of the macro step.
+    /// solve makes of it after, from the start of the macro step. What members do by themselves they do on `threads`, if there are enough of
+    /// them; the bits are the same on however many.
     ///
     /// # Errors
     /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: those
@@ -208,23 +223,23 @@ impl ClusterStepper {
         scene: &ClusterScene,
         all: &mut [Participant<'_>],
         dt: SimSpan,
+        threads: &dyn ParallelFor,
     ) -> Result<ClusterReport, StepError> {
         check_span(dt)?;
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport { dt, ..ClusterReport::default() };
         self.macro_s = dt.as_secs_f64();
-        self.foresee(all, self.macro_s)?;
-        let blow = self.first_blow(scene, all, dt.as_secs_f64())?;
+        self.foresee(all, self.macro_s, threads)?;
+        let blow = self.first_blow(On { scene, threads }, all, dt.as_secs_f64())?;
         if let Some(cut) = blow.and_then(SimSpan::from_secs_f64) {
             report.dt = cut.clamp(SHORTEST.min(dt), dt);
             self.macro_s = report.dt.as_secs_f64();
-            self.foresee(all, report.dt.as_secs_f64())?;
+            self.foresee(all, report.dt.as_secs_f64(), threads)?;
         }
         self.keep(all);
-        let asked_s = dt.as_secs_f64();
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
-        while !self.advance(scene, all, asked_s, &mut report)? {
+        while !self.advance(On { scene, threads }, all, dt.as_secs_f64(), &mut report)? {
             self.go_back(all);
         }
         report.work = self.progress.iter().map(|state| state.work).sum();
@@ -232,28 +247,29 @@ impl ClusterStepper {
     }
 
     /// Begins the first step of every member, in as many parts as its free motion needs.
-    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64) -> Result<(), StepError> {
-        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
+        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let own_s = dt_s / f64::from(one.parts);
             one.member.look(&one.context, dt_s);
-            state.begin(one.member, own_s)?;
+            state.begin(one.member, own_s);
             let more = times(one.member.strain(one.member.free(), own_s));
             state.parts = one.parts * more;
             state.begun_s = if more == 1 { own_s } else { 0.0 };
-        }
-        Ok(())
+        });
+        self.first_failure()
+    }
+
+    /// The failure of the first participant that has failed in what all did at the same time.
+    fn first_failure(&mut self) -> Result<(), StepError> {
+        let failures = self.progress.iter_mut().map(|state| state.failure.take());
+        failures.fold(None, Option::or).map_or(Ok(()), Err)
     }
 
     /// When the first contact closes that rebounds, seconds from the start of a macro step that all members make in one piece.
-    fn first_blow(
-        &mut self,
-        scene: &ClusterScene,
-        all: &mut [Participant<'_>],
-        dt_s: f64,
-    ) -> Result<Option<f64>, StepError> {
+    fn first_blow(&mut self, on: On<'_>, all: &mut [Participant<'_>], dt_s: f64) -> Result<Option<f64>, StepError> {
         let rigid = all.iter().filter(|one| one.member.role() != Role::Deformable);
         let mut skins = rigid.filter_map(|one| one.member.skin());
-        let floors = scene.statics().iter().any(|solid| solid.form.restitution > 0.0);
+        let floors = on.scene.statics().iter().any(|solid| solid.form.restitution > 0.0);
         let any = skins.next().is_some_and(|first| {
             floors || first.form.restitution > 0.0 || skins.any(|skin| skin.form.restitution > 0.0)
         });
@@ -261,8 +277,8 @@ impl ClusterStepper {
             return Ok(None);
         }
         self.progress.iter_mut().for_each(|state| (state.share, state.part) = (1, 0));
-        self.begin(all, dt_s)?;
-        self.search.find(scene, all, &self.progress, dt_s);
+        self.begin(all, dt_s, on.threads)?;
+        self.search.find(on.scene, all, &self.progress, dt_s);
         // the steps begun are still those that are made where nothing rebounds
         self.progress.iter_mut().for_each(|state| state.begun_s = dt_s);
         Ok(Rebounds { macro_s: dt_s, step_s: dt_s, is_even: true }.first(&self.search, &self.progress))
@@ -271,11 +287,12 @@ impl ClusterStepper {
     /// Makes all fine steps of a macro step; false where it was left because a member needs shorter steps.
     fn advance(
         &mut self,
-        scene: &ClusterScene,
+        on: On<'_>,
         all: &mut [Participant<'_>],
         asked_s: f64,
         report: &mut ClusterReport,
     ) -> Result<bool, StepError> {
+        let On { scene, threads } = on;
         let dt = report.dt;
         let bent = |one: &Participant<'_>| one.member.role() == Role::Deformable;
         let parts = self.progress.iter().map(|state| state.parts).max().unwrap_or(1);
@@ -293,7 +310,7 @@ impl ClusterStepper {
         self.fine_s = h_s;
         for fine in 0..parts {
             self.outside.after_s = f64::from(fine) * h_s;
-            self.begin(all, h_s)?;
+            self.begin(all, h_s, threads)?;
             self.search.find(scene, all, &self.progress, h_s);
             self.rebounds.choose(&mut self.search, &self.progress);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
@@ -303,7 +320,7 @@ impl ClusterStepper {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
-            self.end(all, h_s)?;
+            self.end(all, h_s, threads)?;
         }
         Ok(true)
     }
@@ -360,13 +377,17 @@ impl ClusterStepper {
     }
 
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
-    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
+    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
+        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
+            let own_s = h_s * f64::from(state.share);
+            if state.part == 0 && state.begun_s != own_s {
+                state.begin(one.member, own_s);
+            }
+        });
+        self.first_failure()?;
         for (place, (one, state)) in all.iter_mut().zip(&mut self.progress).enumerate() {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
-                if state.begun_s != own_s {
-                    state.begin(one.member, own_s)?;
-                }
                 state.begun_s = 0.0;
                 state.start(one.member.velocities(), one.member.free());
                 state.push(self.outside.answer(place, one.member, own_s / self.macro_s));
@@ -435,17 +456,17 @@ impl ClusterStepper {
     }
 
     /// Moves all members; the step of some ends (eq. 26).
-    fn end(&mut self, all: &mut [Participant<'_>], h_s: f64) -> Result<(), StepError> {
-        for (one, state) in all.iter_mut().zip(&mut self.progress) {
+    fn end(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
+        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let since_s = h_s * f64::from(state.part);
             if state.part < state.share {
                 one.member.move_to(&state.before, since_s);
             } else {
-                one.member.end(&state.before, since_s, state.touched)?;
+                state.failure = one.member.end(&state.before, since_s, state.touched).err();
                 state.part = 0;
             }
-        }
-        Ok(())
+        });
+        self.first_failure()
     }
 }
 

@@ -40,14 +40,15 @@ pub(super) struct Progress {
     pub held: bool,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
+    /// Why its last begin or end failed, where nobody has asked since.
+    pub failure: Option<StepError>,
 }
 
 impl Progress {
     /// Lets a member begin a step, and counts its work.
-    pub fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) -> Result<(), StepError> {
-        member.begin(own_s)?;
+    pub fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) {
+        self.failure = member.begin(own_s).err();
         self.work += member.work();
-        Ok(())
     }
 
     /// Begins a step from velocities `now` that would be `free` at its end.

@@ -4,7 +4,7 @@ use glam::DVec3;
 use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
 use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Body, Grip, Ledger, RigidState, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, Grip, Ledger, PlainLoop, RigidState, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Obstacle;
 use std::sync::Arc;
 
@@ -131,7 +131,7 @@ impl Clocks {
             let (mut list, mut sides) = (list, sides);
             let sides = &mut sides[..];
             remotes.join(&mut list, sides, stepper, MacroStep { dt_s: dt.as_secs_f64(), parts: 1 });
-            *made_here = stepper.step(scene, &mut list, dt).unwrap().dt;
+            *made_here = stepper.step(scene, &mut list, dt, &PlainLoop).unwrap().dt;
             part(&list, sides, stepper, made_here.as_secs_f64());
         };
         *allocations = allocation_counter::measure(round).count_total;

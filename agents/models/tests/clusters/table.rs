@@ -6,7 +6,7 @@ use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan, StepDoubling,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Anchor, Grip, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
 
@@ -177,9 +177,9 @@ impl Table {
         }
         let mut report = ClusterReport::default();
         if let Some(doubling) = &mut self.doubling {
-            doubling.foresee(&self.scene, &mut all, dt).unwrap();
+            doubling.foresee(&self.scene, &mut all, dt, &PlainLoop).unwrap();
         }
-        let mut advance = || report = self.stepper.step(&self.scene, &mut all, dt).unwrap();
+        let mut advance = || report = self.stepper.step(&self.scene, &mut all, dt, &PlainLoop).unwrap();
         self.allocations = allocation_counter::measure(&mut advance).count_total;
         if let Some(doubling) = &mut self.doubling {
             doubling.compare(&all, report.dt);

@@ -8,7 +8,7 @@ use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
 };
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
-use metachron_core::{AgentId, Grip, SimSpan, SimTime, Snapshot, StepError, recycled};
+use metachron_core::{AgentId, Grip, PlainLoop, SimSpan, SimTime, Snapshot, StepError, recycled};
 use metachron_geometry::Obstacle;
 
 /// Agents of one cluster.
@@ -176,7 +176,7 @@ impl StepHarness {
                 grips,
             }));
         }
-        let outcome = stepper.step(scene, &mut all, dt);
+        let outcome = stepper.step(scene, &mut all, dt, &PlainLoop);
         *participants = recycled(all);
         self.report = outcome?;
         self.time += self.report.dt;

@@ -2,6 +2,7 @@
 
 use super::super::cluster::Span;
 use super::super::faults::Faults;
+use super::super::helpers::Helpers;
 use super::super::lockstep::Lockstep;
 use super::super::spawn::{AgentSpawn, assemble};
 use super::super::testing::{Dummy, Log, RecordedStep, eventually, on_every_executor, system};
@@ -29,7 +30,7 @@ fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
 }
 
 fn crowded(spawns: Vec<AgentSpawn>) -> bool {
-    let run = assemble(spawns).unwrap();
+    let run = assemble(spawns, Helpers::none()).unwrap();
     run.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
 }
 
@@ -113,7 +114,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
         law: Law::Cluster,
     };
     spawns[1].attached = vec![link];
-    let mut run = assemble(spawns).unwrap();
+    let mut run = assemble(spawns, Helpers::none()).unwrap();
     let mut seen = |id: usize| {
         let actor = run.actors[id].as_mut().unwrap();
         actor.step_alone(Span::AtMost(SimSpan::from_nanos(4_000_000))).unwrap();

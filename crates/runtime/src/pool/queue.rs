@@ -173,6 +173,7 @@ impl<T> Ord for Place<T> {
 #[cfg(test)]
 mod tests {
     use super::super::super::agent_clock::TimelineCommand;
+    use super::super::super::helpers::Helpers;
     use super::super::super::spawn::{AgentSpawn, assemble};
     use super::super::super::testing::Dummy;
     use super::*;
@@ -181,7 +182,7 @@ mod tests {
 
     fn queue(spawns: Vec<AgentSpawn>) -> Queue {
         let mut queue = Queue::default();
-        let actors = assemble(spawns).unwrap().actors.into_iter().flatten();
+        let actors = assemble(spawns, Helpers::none()).unwrap().actors.into_iter().flatten();
         actors.for_each(|actor| queue.put(actor, Duration::ZERO));
         queue
     }

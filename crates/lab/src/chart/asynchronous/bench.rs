@@ -10,7 +10,7 @@ use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, comp
 use metachron_contact::audit::Member;
 use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Body, Grip, SimSpan, Snapshot, StepError};
+use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, Snapshot, StepError};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
 
@@ -254,7 +254,7 @@ impl Cluster {
                 overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
             }
         }
-        let made = stepper.step(scene, &mut list, dt)?.dt;
+        let made = stepper.step(scene, &mut list, dt, &PlainLoop)?.dt;
         part(&list, sides, stepper, made.as_secs_f64());
         Ok(made)
     }
