@@ -7,6 +7,7 @@
 
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, SideTerm, Solver};
+use metachron_core::PlainLoop;
 use std::time::{Duration, Instant};
 
 const H_S: f64 = 1.0 / 240.0;
@@ -69,7 +70,7 @@ fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_conta
         .map(|body| Member { blocks: &body.blocks, free: &body.free, share: 1.0, response: None })
         .collect();
     let (members, contacts) = (&members, &scene.contacts);
-    let problem = Problem { h_s: H_S, members, contacts, rows: &[] };
+    let problem = Problem { h_s: H_S, members, contacts, rows: &[], threads: &PlainLoop };
     of(solver.solve(&problem).expect("a problem"))
 }
 

@@ -6,6 +6,7 @@
 //!
 //! ```
 //! use glam::{DMat3, DVec3};
+//! use metachron_core::PlainLoop;
 //! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
 //!
 //! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
@@ -31,7 +32,7 @@
 //! };
 //! let contacts = [corner(-0.1, -0.1), corner(0.1, -0.1), corner(-0.1, 0.1), corner(0.1, 0.1)];
 //! let mut solver = Solver::default();
-//! let solution = solver.solve(&Problem { h_s, members: &members, contacts: &contacts, rows: &[] })?;
+//! let solution = solver.solve(&Problem { h_s, members: &members, contacts: &contacts, rows: &[], threads: &PlainLoop })?;
 //!
 //! let given: DVec3 = solution.contacts_n_s.iter().sum();
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …

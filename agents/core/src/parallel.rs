@@ -3,8 +3,10 @@
 //! In: two lists, what is done with each pair of their elements. Out: the same bits whoever makes which round: rounds write to their own
 //! elements only. Never here: threads; those who have some implement [`ParallelFor`].
 
+use std::fmt;
+
 /// Runs two jobs, at the same time where it has a thread to spare.
-pub trait ParallelFor: Sync {
+pub trait ParallelFor: fmt::Debug + Sync {
     /// Runs both jobs, and returns when both have ended.
     fn join(&self, first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send));
 }
@@ -63,6 +65,7 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     /// A new thread for every second job.
+    #[derive(Debug)]
     struct Scoped {
         jobs: AtomicUsize,
     }

@@ -246,7 +246,7 @@ impl AgentRunner {
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
         let mut list = recycled(std::mem::take(&mut seat.participants));
         let mut sides = recycled(std::mem::take(&mut seat.sides));
-        let mut remotes = seat.remotes.take();
+        let (mut remotes, mut helped) = (seat.remotes.take(), seat.helped);
         let mut stepper = seat.stepper.take().unwrap_or_default();
         let mut doubling = seat.repeats(steps, id);
         let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
@@ -260,7 +260,7 @@ impl AgentRunner {
             }
         }
         let meets = sides.iter().any(Option::is_some);
-        let (size, mut helped) = (list.iter().map(Participant::size).sum(), Helped::default());
+        let size = list.iter().map(Participant::size).sum();
         let outcome = contained(|| {
             peers.helpers.make(size, &mut helped, |threads| {
                 // a finer step that diverges says nothing of this one; what partners give is given once
@@ -286,9 +286,7 @@ impl AgentRunner {
         self.led = led;
         if let Some(seat) = &mut self.cluster {
             (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
-            seat.remotes = remotes;
-            seat.helped.waited += helped.waited;
-            seat.helped.cpu += helped.cpu;
+            (seat.remotes, seat.helped) = (remotes, helped);
         }
         let (report, extra, at_rest) = outcome?;
         let dt = report.dt;

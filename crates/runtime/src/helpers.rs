@@ -39,7 +39,7 @@ impl Helped {
 }
 
 /// One turn that is made by helpers.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Turn {
     cpu_ns: AtomicU64,
 }

@@ -9,6 +9,7 @@ use super::newton::{Aim, harden, largest_miss};
 use super::problem::Member;
 use super::shifts::Shifts;
 use glam::DVec3;
+use metachron_core::ParallelFor;
 
 /// Most steps of the first pass from the last step's impulses: it knows the answer or it does not.
 const WARM_STEPS: usize = 6;
@@ -56,12 +57,18 @@ struct Pass<'a> {
     members: &'a [Member<'a>],
     steps: usize,
     tolerance_m_s: f64,
+    threads: &'a dyn ParallelFor,
 }
 
 /// Solves by up to `passes_max` passes. The iterate holds the impulses of the last finished one, or of a softer problem.
 pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, passes_max: usize) -> Passes {
     stores.shifts.reset(iterate.rows.len());
-    let first = Pass { members: aim.members, steps: WARM_STEPS, tolerance_m_s: PASS_TOLERANCE * aim.tolerance_m_s };
+    let first = Pass {
+        members: aim.members,
+        steps: WARM_STEPS,
+        tolerance_m_s: PASS_TOLERANCE * aim.tolerance_m_s,
+        threads: aim.threads,
+    };
     let later = Pass { steps: FULL_STEPS, ..first };
     if !descend(iterate, &stores.shifts.values, first) && !restart(iterate, stores, later) {
         return Passes { finished: 0, settled: false };
@@ -119,7 +126,7 @@ fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass<'_>) -> bool {
             iterate.take_pulls();
             return true;
         }
-        if step == pass.steps || !led.off.is_finite() || !iterate.take_step(LEAVE * led.gradient) {
+        if step == pass.steps || !led.off.is_finite() || !iterate.take_step(LEAVE * led.gradient, pass.threads) {
             return false;
         }
         let share = line_search(iterate, shifts);

@@ -4,10 +4,12 @@
 //! near its diagonal). Theory: `docs/theory/clusters.md`, eq. 8.
 
 use super::factor::{Cholesky, Pair, Place};
+use super::gradients::Stiffness;
 use super::problem::Block;
 use super::rows::Rows;
 use glam::DMat3;
 use glam::DVec3;
+use metachron_core::ParallelFor;
 
 /// A matrix, where rows add to it, and its factor.
 #[derive(Debug, Clone, Default)]
@@ -125,12 +127,13 @@ impl Coupled {
     ///
     /// # Errors
     /// A block at which it is not positive definite.
-    pub fn factor_members(&mut self) -> Result<(), usize> {
-        self.factor.factor(|_, _| ())
+    pub fn factor_members(&mut self, threads: &dyn ParallelFor) -> Result<(), usize> {
+        self.factor.factor(threads, |_, _| ())
     }
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
-    pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
+    pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
+        let Stiffness { rows, gains, threads } = contacts;
         let Self { factor, meetings, of_fronts, fronts, starts, gains: known, active, pushed, .. } = self;
         let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
@@ -139,7 +142,7 @@ impl Coupled {
             *known = *gain;
             active[row] = *gain != DMat3::ZERO;
         }
-        let done = factor.factor(|front, entries| {
+        let done = factor.factor(threads, |front, entries| {
             let here = meetings[of_fronts[front]..of_fronts[front + 1]].iter();
             let mut sum: Option<(Place, DMat3)> = None;
             for &Meeting { left, right, place, .. } in here.filter(|meeting| active[meeting.row]) {

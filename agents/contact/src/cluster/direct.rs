@@ -5,10 +5,12 @@
 
 use super::coupled::Coupled;
 use super::factor::{Cholesky, Pair};
+use super::gradients::Stiffness;
 use super::members::Members;
 use super::problem::Block;
 use super::rows::Rows;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
+use metachron_core::ParallelFor;
 
 /// Both matrices, each with its factor.
 #[derive(Debug, Clone, Default)]
@@ -30,7 +32,7 @@ impl Direct {
     ///
     /// # Errors
     /// The block at which one is not positive definite.
-    pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
+    pub fn take_members(&mut self, members: &Members, threads: &dyn ParallelFor) -> Result<(), usize> {
         self.factors = 0;
         let Self { own, lone, blocks, pairs, x, .. } = self;
         lone.clear();
@@ -50,7 +52,7 @@ impl Direct {
         x.resize(lone.len(), DVec3::ZERO);
         own.shape(lone.len(), pairs);
         own.set(blocks);
-        own.factor(|_, _| ()).map_err(|block| lone[block])
+        own.factor(threads, |_, _| ()).map_err(|block| lone[block])
     }
 
     /// Takes up where rows couple blocks: the structure of a Newton step.
@@ -62,9 +64,9 @@ impl Direct {
     }
 
     /// Factors ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without a factor.
-    pub fn factor(&mut self, rows: &Rows, gains: &[DMat3]) -> bool {
+    pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
         self.factors += 1;
-        self.coupled.factor(rows, gains)
+        self.coupled.factor(contacts)
     }
 
     /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last factor.

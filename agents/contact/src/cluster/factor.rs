@@ -2,7 +2,7 @@
 //!
 //! In: which blocks there are, then their numbers. Out: solutions. Never here: where the matrix comes from.
 //! The order and the fronts are kept while all blocks lie in them, fill included; numbers then change without allocation, and only
-//! the fronts are factored again in or below which a number has changed.
+//! the fronts are factored again in or below which a number has changed. Trees of fronts that are dear enough are made side by side.
 
 use super::fronts::{Front, Fronts};
 use super::order::minimum_degree;
@@ -10,6 +10,8 @@ use super::problem::Block;
 use super::tiles::{TILE, TILE_SIZE, eliminate, filled, solve_down, solve_up, triangle};
 use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
+use metachron_core::ParallelFor;
+use std::ops::Range;
 
 /// Two blocks that are coupled, in either order; a block with itself is its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +39,8 @@ pub(super) struct Entries<'a> {
     chunk: usize,
 }
 
+/// Trees of fronts that cost less together are not divided: some 50 µs, in multiplications.
+const JOB_MIN: f64 = 2e5;
 /// An order made for an earlier structure is kept while its factor costs up to this many times as much as it did then.
 const KEEP_ORDER: f64 = 1.5;
 
@@ -71,6 +75,8 @@ pub(super) struct Cholesky {
     fronts: Fronts,
     layouts: Vec<Layout>,
     children: Vec<Vec<usize>>,
+    /// The first front of the tree below each, which ends with it.
+    trees: Vec<usize>,
     targets: Vec<Target>,
     /// The front of each place in the order.
     owners: Vec<usize>,
@@ -85,6 +91,8 @@ pub(super) struct Cholesky {
     update: Vec<f64>,
     /// Fronts whose numbers are no longer those of the matrix.
     stale: Vec<bool>,
+    /// What such fronts cost before each front, and in all.
+    costs: Vec<f64>,
     permuted: Vec<DVec3>,
     local: Vec<f64>,
 }
@@ -125,7 +133,7 @@ impl Cholesky {
 
     /// Storage for the fronts as they are.
     fn lay_out(&mut self) {
-        let Self { fronts, layouts, children, targets, .. } = self;
+        let Self { fronts, layouts, children, trees, targets, .. } = self;
         let count = fronts.fronts.len();
         layouts.clear();
         targets.clear();
@@ -133,6 +141,7 @@ impl Cholesky {
         self.roomy = false;
         *children = vec![Vec::new(); count];
         self.owners = vec![0; fronts.rank.len()];
+        trees.clear();
         let mut next = Layout::default();
         for (k, front) in fronts.fronts.iter().enumerate() {
             self.owners[front.first..front.first + front.columns].fill(k);
@@ -144,6 +153,7 @@ impl Cholesky {
             if let Some(parent) = front.parent {
                 children[parent].push(k);
             }
+            trees.push(children[k].first().map_or(k, |&child| trees[child]));
         }
         targets.reserve(next.targets);
         for k in 0..count {
@@ -163,6 +173,7 @@ impl Cholesky {
         self.lower = vec![0.0; next.lower];
         self.update = vec![0.0; next.update];
         self.stale = vec![true; count];
+        self.costs = vec![0.0; count + 1];
         self.permuted = vec![DVec3::ZERO; self.owners.len()];
     }
 
@@ -226,59 +237,41 @@ impl Cholesky {
     ///
     /// # Errors
     /// A block at which the matrix is not positive definite.
-    pub fn factor(&mut self, mut more: impl FnMut(usize, &mut Entries<'_>)) -> Result<(), usize> {
-        let level = Level::new();
-        for front in 0..self.layouts.len() {
-            if !self.stale[front] {
-                continue;
-            }
-            let layout = self.layouts[front];
-            let own = layout.lower..layout.lower + layout.columns * (layout.columns + layout.rows);
-            self.lower[own.clone()].copy_from_slice(&self.base[own.clone()]);
-            more(front, &mut Entries::of(&mut self.lower, &layout));
-            self.gather(front);
-            let update = &mut self.update[layout.update..layout.update + triangle(layout.rows / TILE)];
-            if let Err(at) = eliminate(level, &mut self.lower[own], update, layout.columns) {
-                self.stale.fill(true);
-                let rank = self.fronts.fronts[front].first + at / 3;
-                return Err(self.fronts.rank.iter().position(|&r| r == rank).unwrap_or_default());
-            }
-            self.stale[front] = false;
-            if let Some(parent) = self.fronts.fronts[front].parent {
-                self.stale[parent] = true;
+    pub fn factor(
+        &mut self,
+        threads: &dyn ParallelFor,
+        more: impl Fn(usize, &mut Entries<'_>) + Sync,
+    ) -> Result<(), usize> {
+        let count = self.layouts.len();
+        if count == 0 {
+            return Ok(());
+        }
+        let mut cost = 0.0;
+        for (front, of) in self.fronts.fronts.iter().enumerate() {
+            self.costs[front] = cost;
+            if self.stale[front] {
+                cost += of.cost;
+                of.parent.into_iter().for_each(|parent| self.stale[parent] = true);
             }
         }
-        Ok(())
-    }
-
-    /// Adds what the fronts right below one have left for it.
-    fn gather(&mut self, front: usize) {
-        let Self { fronts, layouts, children, targets, lower, update, .. } = self;
-        let layout = layouts[front];
-        let (below, own) = update.split_at_mut(layout.update);
-        let own = &mut own[..triangle(layout.rows / TILE)];
-        own.fill(0.0);
-        let lower = &mut lower[layout.lower..];
-        for child in &children[front] {
-            let Layout { rows, update, targets: start, inner, .. } = layouts[*child];
-            let count = 3 * fronts.fronts[*child].rows.len();
-            let goals = &targets[start..start + count];
-            for row in 0..rows / TILE {
-                let tiles = &below[update + triangle(row)..update + triangle(row + 1)];
-                let here = &goals[row * TILE..count.min((row + 1) * TILE)];
-                for (column, values) in tiles.as_chunks::<TILE>().0.iter().enumerate() {
-                    // of the tile on the diagonal the lower half alone
-                    let start = column.saturating_sub(row * TILE);
-                    let Some(goal) = goals.get(column) else { break };
-                    let pairs = here.iter().zip(values).skip(start);
-                    if column < inner {
-                        pairs.for_each(|(target, value)| lower[target.near + goal.column] += value);
-                    } else {
-                        pairs.for_each(|(target, value)| own[target.far + goal.column] += value);
-                    }
-                }
-            }
-        }
+        self.costs[count] = cost;
+        let mut all = Part { fronts: 0..count, lower: &mut self.lower, update: &mut self.update };
+        let pass = Pass {
+            level: Level::new(),
+            fronts: &self.fronts.fronts,
+            layouts: &self.layouts,
+            children: &self.children,
+            trees: &self.trees,
+            targets: &self.targets,
+            base: &self.base,
+            stale: &self.stale,
+            costs: &self.costs,
+            more: &more,
+            threads,
+        };
+        let made = pass.make(&mut all);
+        self.stale.fill(made.is_err());
+        made.map_err(|rank| self.fronts.rank.iter().position(|&r| r == rank).unwrap_or_default())
     }
 
     /// Replaces the right side, one vector for each block, by the solution; the matrix must be factored.
@@ -314,6 +307,131 @@ impl Cholesky {
     }
 }
 
+/// One pass over the fronts that are to be factored again.
+struct Pass<'a> {
+    level: Level,
+    fronts: &'a [Front],
+    layouts: &'a [Layout],
+    children: &'a [Vec<usize>],
+    trees: &'a [usize],
+    targets: &'a [Target],
+    base: &'a [f64],
+    stale: &'a [bool],
+    costs: &'a [f64],
+    more: &'a (dyn Fn(usize, &mut Entries<'_>) + Sync),
+    threads: &'a dyn ParallelFor,
+}
+
+/// Fronts that follow each other, all that is below any of them included, and where their numbers are.
+struct Part<'a> {
+    fronts: Range<usize>,
+    lower: &'a mut [f64],
+    update: &'a mut [f64],
+}
+
+impl Pass<'_> {
+    /// Factors a part. Fails with the first place in the order at which it is not positive definite.
+    fn make(&self, part: &mut Part<'_>) -> Result<(), usize> {
+        let Range { start, end } = part.fronts;
+        if self.cost(start..end) < 2.0 * JOB_MIN {
+            return (start..end).try_for_each(|front| self.make_front(front, part));
+        }
+        // fronts that all others are below come last
+        let mut top = end;
+        while top > start && self.trees[top - 1] == start {
+            top -= 1;
+        }
+        if let Some(at) = self.middle(start..top) {
+            let [mut first, mut second] = part.split(at, top, self.layouts);
+            let [mut one, mut other] = [Ok(()); 2];
+            self.threads.join(&mut || one = self.make(&mut first), &mut || other = self.make(&mut second));
+            one.and(other)?;
+        }
+        (top..end).try_for_each(|front| self.make_front(front, part))
+    }
+
+    /// What the fronts cost that are to be made.
+    fn cost(&self, fronts: Range<usize>) -> f64 {
+        self.costs[fronts.end] - self.costs[fronts.start]
+    }
+
+    /// Where a tree begins such that those before it cost about as much as it does with those that follow; `None` of one tree or none.
+    fn middle(&self, fronts: Range<usize>) -> Option<usize> {
+        let Range { start, end } = fronts;
+        let off = |at: usize| (self.cost(start..at) - self.cost(at..end)).abs();
+        let mut best = self.trees[..end].last().copied().filter(|&at| at > start)?;
+        let mut at = best;
+        while at > start {
+            if off(at) < off(best) {
+                best = at;
+            }
+            at = self.trees[at - 1];
+        }
+        Some(best)
+    }
+
+    fn make_front(&self, front: usize, part: &mut Part<'_>) -> Result<(), usize> {
+        if !self.stale[front] {
+            return Ok(());
+        }
+        let (layout, first) = (&self.layouts[front], &self.layouts[part.fronts.start]);
+        let own = layout.lower - first.lower..layout.lower - first.lower + layout.size();
+        part.lower[own.clone()].copy_from_slice(layout.of(self.base));
+        (self.more)(front, &mut Entries { values: &mut part.lower[own.clone()], chunk: TILE * layout.columns });
+        let (below, update) = part.update.split_at_mut(layout.update - first.update);
+        let update = &mut update[..triangle(layout.rows / TILE)];
+        let lower = &mut part.lower[own];
+        self.gather(front, Goal { lower, update }, |child| &below[self.layouts[child].update - first.update..]);
+        eliminate(self.level, lower, update, layout.columns).map_err(|at| self.fronts[front].first + at / 3)
+    }
+
+    /// Adds what the fronts right below one have left for it; `of` is what begins with the numbers of a child.
+    fn gather<'b>(&self, front: usize, goal: Goal<'_>, of: impl Fn(usize) -> &'b [f64]) {
+        let Goal { lower, update: own } = goal;
+        own.fill(0.0);
+        for &child in &self.children[front] {
+            let Layout { rows, targets: start, inner, .. } = self.layouts[child];
+            let count = 3 * self.fronts[child].rows.len();
+            let (goals, update) = (&self.targets[start..start + count], of(child));
+            for row in 0..rows / TILE {
+                let tiles = &update[triangle(row)..triangle(row + 1)];
+                let here = &goals[row * TILE..count.min((row + 1) * TILE)];
+                for (column, values) in tiles.as_chunks::<TILE>().0.iter().enumerate() {
+                    // of the tile on the diagonal the lower half alone
+                    let start = column.saturating_sub(row * TILE);
+                    let Some(goal) = goals.get(column) else { break };
+                    let pairs = here.iter().zip(values).skip(start);
+                    if column < inner {
+                        pairs.for_each(|(target, value)| lower[target.near + goal.column] += value);
+                    } else {
+                        pairs.for_each(|(target, value)| own[target.far + goal.column] += value);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The numbers of a front: its columns, and what it hands on.
+struct Goal<'a> {
+    lower: &'a mut [f64],
+    update: &'a mut [f64],
+}
+
+impl Part<'_> {
+    /// Its fronts before `at`, and those from there to `end`.
+    fn split(&mut self, at: usize, end: usize, layouts: &[Layout]) -> [Part<'_>; 2] {
+        let Self { fronts, lower, update } = self;
+        let (first, middle) = (&layouts[fronts.start], &layouts[at]);
+        let lower = lower.split_at_mut(middle.lower - first.lower);
+        let update = update.split_at_mut(middle.update - first.update);
+        [
+            Part { fronts: fronts.start..at, lower: lower.0, update: update.0 },
+            Part { fronts: at..end, lower: lower.1, update: update.1 },
+        ]
+    }
+}
+
 impl Front {
     /// The first row of numbers of a block, by its place in the order, where eliminated columns have this room.
     fn coordinate(&self, rank: usize, room: usize) -> Option<usize> {
@@ -335,8 +453,13 @@ impl Front {
 }
 
 impl Layout {
+    /// How many numbers its columns have.
+    fn size(&self) -> usize {
+        self.columns * (self.columns + self.rows)
+    }
+
     fn of<'a>(&self, lower: &'a [f64]) -> &'a [f64] {
-        &lower[self.lower..self.lower + self.columns * (self.columns + self.rows)]
+        &lower[self.lower..self.lower + self.size()]
     }
 }
 

@@ -13,6 +13,8 @@ pub(super) struct Front {
     pub rows: Vec<usize>,
     /// The front that takes up what is left of this one.
     pub parent: Option<usize>,
+    /// What it costs, about in multiplications.
+    pub cost: f64,
 }
 
 /// All fronts of a matrix.
@@ -143,12 +145,13 @@ impl Tree {
         }
         for &last in listed {
             let size = self.size(last);
-            found.cost += size.cost();
+            let cost = size.cost();
+            found.cost += cost;
             let mut rows: Vec<_> = self.rows[last].iter().map(|&row| ranks[row]).collect();
             rows.sort_unstable();
             let parent = self.rows[last].iter().min().map(|&row| fronts[row]);
             let first = ranks[self.columns[last][0]];
-            found.fronts.push(Front { first, columns: size.columns, rows, parent });
+            found.fronts.push(Front { first, columns: size.columns, rows, parent, cost });
         }
         found
     }

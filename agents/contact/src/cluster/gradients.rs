@@ -8,6 +8,7 @@ use super::factor::Pair;
 use super::members::Members;
 use super::rows::Rows;
 use glam::{DMat3, DVec3};
+use metachron_core::ParallelFor;
 
 /// Starts from the true residual: what is summed up along the way differs from it by rounding.
 const ROUNDS: usize = 3;
@@ -43,6 +44,8 @@ pub(super) struct Operator<'a> {
 pub(super) struct Stiffness<'a> {
     pub rows: &'a Rows,
     pub gains: &'a [DMat3],
+    /// Who factors it.
+    pub threads: &'a dyn ParallelFor,
 }
 
 /// The preconditioner and the storage of conjugate gradients.
@@ -60,7 +63,7 @@ pub(super) struct Gradients {
 impl Operator<'_> {
     fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
         self.members.multiply(x, out);
-        let Some(Stiffness { rows, gains }) = self.contacts else { return };
+        let Some(Stiffness { rows, gains, .. }) = self.contacts else { return };
         for (row, gain) in gains.iter().enumerate().filter(|(_, gain)| **gain != DMat3::ZERO) {
             let impulse = *gain * rows.velocity(row, x);
             for term in rows.terms(row) {
@@ -75,7 +78,7 @@ impl Gradients {
     ///
     /// # Errors
     /// A block that is not positive definite.
-    pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
+    pub fn take_members(&mut self, members: &Members, threads: &dyn ParallelFor) -> Result<(), usize> {
         let size = members.size();
         self.products = 0;
         for list in [&mut self.direction, &mut self.image] {
@@ -91,7 +94,7 @@ impl Gradients {
             }
         }
         self.near.take(size, &members.blocks, &mut self.pairs, None);
-        self.near.factor_members()
+        self.near.factor_members(threads)
     }
 
     /// Takes up which blocks the rows move.
@@ -101,7 +104,7 @@ impl Gradients {
 
     /// Makes the preconditioner that of ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without an inverse.
     pub fn precondition(&mut self, contacts: Stiffness<'_>) -> bool {
-        self.near.factor(contacts.rows, contacts.gains)
+        self.near.factor(contacts)
     }
 
     /// Solves until what is left is at its goal, or as far as products reach.

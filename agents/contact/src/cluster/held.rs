@@ -8,6 +8,7 @@ use super::gradients::{Stiffness, Task};
 use super::newton::linearise;
 use super::solver::Solver;
 use glam::{DMat3, DVec3};
+use metachron_core::PlainLoop;
 
 /// The share of an impulse that a solve without a factor may leave.
 const LEFT_SHARE: f64 = 1e-6;
@@ -32,7 +33,7 @@ impl Solver {
                 x.fill(DVec3::ZERO);
                 let goal = LEFT_SHARE * system.members.size_squared(right).sqrt();
                 let mut task = Task { right, x, left, goal };
-                if !system.step(Stiffness { rows, gains }, &mut task) {
+                if !system.step(Stiffness { rows, gains, threads: &PlainLoop }, &mut task) {
                     return false;
                 }
                 for (row, &block) in blocks.iter().enumerate() {

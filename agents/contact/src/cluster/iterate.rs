@@ -12,6 +12,7 @@ use super::rows::{Point, Rows};
 use super::skew::{Followed, Linear, Residuals, Skew, Sliding};
 use super::system::{StepForm, System};
 use glam::{DMat3, DVec3};
+use metachron_core::ParallelFor;
 
 /// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
 const LOOK_SHARE: f64 = 0.01;
@@ -257,12 +258,12 @@ impl Iterate {
     }
 
     /// The step of eq. 8 from gains and pulls, of which up to `goal` may be left, in √J; `false` where there is none.
-    pub fn take_step(&mut self, goal: f64) -> bool {
+    pub fn take_step(&mut self, goal: f64, threads: &dyn ParallelFor) -> bool {
         self.steps += 1;
         self.pull_on_members();
         let Self { rows, system, state, step, scratch, .. } = self;
         step.change.fill(DVec3::ZERO);
-        let contacts = Stiffness { rows, gains: &self.gains };
+        let contacts = Stiffness { rows, gains: &self.gains, threads };
         let solved =
             system.step(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
         let sliding = Sliding { rows, skews: &self.skews, goal: FOLLOW_SHARE * goal };

@@ -8,6 +8,7 @@ use super::iterate::Iterate;
 use super::members::worse;
 use super::problem::Member;
 use super::rows::Point;
+use metachron_core::ParallelFor;
 
 /// The most steps: where the pressure of what slides is not known it is found at a rate of about a half a step.
 const STEPS_MAX: usize = 60;
@@ -40,6 +41,8 @@ pub(super) struct Aim<'a> {
     pub tolerance_m_s: f64,
     /// What a contact gives way by, m/s (eq. 5).
     pub yield_m_s: f64,
+    /// Who makes large factors.
+    pub threads: &'a dyn ParallelFor,
 }
 
 /// Iterates until all laws hold; `false` where it gave up, the iterate being of no use then.
@@ -67,7 +70,11 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
             (least, stale) = (miss, 0);
         }
         leave = if missed > 0.5 * last { (LEAVE_LESS * leave).max(LEAVE_LEAST) } else { LEAVE_MOST };
-        if step == STEPS_MAX || stale >= STALE_MAX || !miss.is_finite() || !iterate.take_step(leave * missed) {
+        if step == STEPS_MAX
+            || stale >= STALE_MAX
+            || !miss.is_finite()
+            || !iterate.take_step(leave * missed, aim.threads)
+        {
             return false;
         }
         last = missed;

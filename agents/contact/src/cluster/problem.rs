@@ -7,6 +7,7 @@ use super::joint::JointRow;
 use super::side::Side;
 use crate::push_out::push_out_m_s;
 use glam::{DMat3, DVec3};
+use metachron_core::ParallelFor;
 use std::fmt;
 
 /// The share of the slip owed that one step takes back.
@@ -83,6 +84,8 @@ pub struct Problem<'a> {
     pub contacts: &'a [Contact],
     /// Where they are joined.
     pub rows: &'a [JointRow],
+    /// Who makes large factors: the answer has the same bits by however many.
+    pub threads: &'a dyn ParallelFor,
 }
 
 impl Contact {

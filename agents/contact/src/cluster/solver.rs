@@ -184,6 +184,7 @@ impl Solver {
             form: if rigid && !self.iterate.follows_pressure() { Form::Cone } else { Form::Disc },
             tolerance_m_s: self.settings.tolerance_m_s,
             yield_m_s: self.settings.yield_m_s(problem.h_s),
+            threads: problem.threads,
         };
         let mut refused = 0;
         let mut report = loop {

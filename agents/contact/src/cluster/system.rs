@@ -49,8 +49,8 @@ impl System {
         self.members.take(problem, offsets);
         self.coupled = false;
         let taken = match self.form {
-            StepForm::Direct => self.direct.take_members(&self.members),
-            StepForm::Iterative => self.gradients.take_members(&self.members),
+            StepForm::Direct => self.direct.take_members(&self.members, problem.threads),
+            StepForm::Iterative => self.gradients.take_members(&self.members, problem.threads),
         };
         taken.map_err(|block| {
             let member = self.members.owners[block];
@@ -102,7 +102,7 @@ impl System {
         }
         match self.form {
             StepForm::Direct => {
-                if !self.direct.factor(contacts.rows, contacts.gains) {
+                if !self.direct.factor(contacts) {
                     return false;
                 }
                 task.x.copy_from_slice(task.right);

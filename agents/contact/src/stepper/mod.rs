@@ -315,7 +315,7 @@ impl ClusterStepper {
             self.rebounds.choose(&mut self.search, &self.progress);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.solve(scene, all, h_s, report)?;
+            self.solve(on, all, h_s, report)?;
             if self.divide(all, h_s) {
                 return Ok(false);
             }

@@ -6,10 +6,10 @@
 use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
-use super::{ClusterReport, ClusterScene, ClusterStepper, Participant};
+use super::{ClusterReport, ClusterStepper, On, Participant};
 use crate::cluster::{Contact, Member, Problem, ProblemError};
 use glam::DVec3;
-use metachron_core::{StepError, recycled};
+use metachron_core::{ParallelFor, StepError, recycled};
 
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
@@ -21,7 +21,7 @@ impl ClusterStepper {
     /// its impulses (eq. 25).
     pub(super) fn solve(
         &mut self,
-        scene: &ClusterScene,
+        on: On<'_>,
         all: &[Participant<'_>],
         h_s: f64,
         report: &mut ClusterReport,
@@ -34,7 +34,7 @@ impl ClusterStepper {
         }
         let mut last_miss_m = f64::INFINITY;
         for round in 1..=ROUNDS_MAX {
-            self.solve_once(all, h_s, report)?;
+            self.solve_once(all, h_s, on.threads, report)?;
             let Self { solver, search, ties, joints, progress, depth_m, rebounds, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
@@ -46,7 +46,7 @@ impl ClusterStepper {
             }
             let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
-            let look = Round { scene, all, progress, h_s, judge: Judge::Solved };
+            let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
             let passed = round < ROUNDS_MAX && search.add_passed(&look);
             // with other contacts joints start anew
@@ -60,7 +60,13 @@ impl ClusterStepper {
         Ok(())
     }
 
-    fn solve_once(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+    fn solve_once(
+        &mut self,
+        all: &[Participant<'_>],
+        h_s: f64,
+        threads: &dyn ParallelFor,
+        report: &mut ClusterReport,
+    ) -> Result<(), StepError> {
         let Self { solver, search, ties, progress, members, .. } = self;
         // what no row touches moves as it would, and makes no problem larger
         let mut count = 0..;
@@ -78,7 +84,7 @@ impl ClusterStepper {
             share: f64::from(state.part),
         }));
         move_sides(search, ties, |member| progress[member].place);
-        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows };
+        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = recycled(list);
         let places = &mut self.places;

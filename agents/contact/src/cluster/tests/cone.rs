@@ -6,6 +6,7 @@ use crate::cluster::iterate::Iterate;
 use crate::cluster::passivity::guard;
 use crate::cluster::{Contact, Member, Problem, Side};
 use glam::{DMat3, DVec3};
+use metachron_core::PlainLoop;
 
 const COUNT: usize = 1000;
 
@@ -78,7 +79,7 @@ fn falling(push_m_s: f64) -> Iterate {
     let h_s = 0.01;
     let gap_m = -push_m_s * h_s / 0.2;
     let contacts = [Contact { gap_m, ..contact([Side::node(0, 0), Side::FIXED], DVec3::Z) }];
-    let problem = Problem { h_s, members: &members, contacts: &contacts, rows: &[] };
+    let problem = Problem { h_s, members: &members, contacts: &contacts, rows: &[], threads: &PlainLoop };
     let mut iterate = Iterate::default();
     iterate.system.take_members(&problem, &[0]).unwrap();
     iterate.rows.gather(&problem, &[0], &FALL);

@@ -7,6 +7,8 @@ use crate::cluster::factor::{Cholesky, Pair};
 use crate::cluster::tiles::eliminate;
 use fearless_simd::Level;
 use glam::{DMat3, DVec3};
+use metachron_core::{ParallelFor, PlainLoop};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A random symmetric positive definite matrix of blocks: its couplings, and all of it.
 fn random_matrix(size: usize, seed: u64) -> (Vec<Pair>, Dense) {
@@ -61,7 +63,7 @@ fn the_sparse_factor_solves_what_the_dense_one_solves() {
         let mut numbers = Seeded::new(77);
         let mut x: Vec<_> = (0..size).map(|_| numbers.vector()).collect();
         let mut y: Vec<_> = x.iter().flat_map(|v| v.to_array()).collect();
-        sparse.factor(|_, _| ()).unwrap();
+        sparse.factor(&PlainLoop, |_, _| ()).unwrap();
         sparse.solve(&mut x);
         dense.factored().solve(&mut y);
         for (a, b) in x.iter().flat_map(|v| v.to_array()).zip(y) {
@@ -94,7 +96,7 @@ fn a_structure_that_grows_is_solved_as_well() {
         }
         sparse.shape(50, &pairs);
         sparse.set(&blocks(&pairs, &mut dense));
-        sparse.factor(|_, _| ()).unwrap();
+        sparse.factor(&PlainLoop, |_, _| ()).unwrap();
         let mut x: Vec<_> = (0..50).map(|i| DVec3::new(1.0, f64::from(i), -1.0)).collect();
         let mut y: Vec<_> = x.iter().flat_map(|v| v.to_array()).collect();
         sparse.solve(&mut x);
@@ -131,7 +133,7 @@ fn refactoring_and_solving_allocate_nothing() {
         for values in [&first, &second, &first] {
             assert!(!sparse.shape(40, &[Pair { row: 3, column: 3 }]));
             sparse.set(values);
-            sparse.factor(|_, _| ()).unwrap();
+            sparse.factor(&PlainLoop, |_, _| ()).unwrap();
             sparse.solve(&mut x);
         }
     });
@@ -151,7 +153,7 @@ fn what_is_factored_again_in_part_has_the_bits_of_a_whole_factor() {
         let [partly, wholly] = [&mut kept, &mut whole].map(|matrix| {
             let mut x: Vec<_> = (0..60).map(|i| DVec3::new(1.0, f64::from(i), -2.0)).collect();
             matrix.set(&values);
-            matrix.factor(|_, _| ()).unwrap();
+            matrix.factor(&PlainLoop, |_, _| ()).unwrap();
             matrix.solve(&mut x);
             x
         });
@@ -166,12 +168,12 @@ fn what_is_added_to_a_front_is_part_of_the_matrix() {
     let mut values = blocks(&pairs, &mut dense);
     [&mut added, &mut given].into_iter().for_each(|matrix| assert!(matrix.shape(20, &pairs)));
     added.set(&values);
-    added.factor(|_, _| ()).unwrap();
+    added.factor(&PlainLoop, |_, _| ()).unwrap();
     let more = DMat3::from_cols(DVec3::new(3.0, 1.0, 0.0), DVec3::new(1.0, 2.0, 0.5), DVec3::new(0.0, 0.5, 4.0));
     let place = added.place(Pair { row: 11, column: 11 }).unwrap();
     added.spoil(place.front);
     added
-        .factor(|front, entries| {
+        .factor(&PlainLoop, |front, entries| {
             if front == place.front {
                 entries.add(place, &more)
             }
@@ -179,7 +181,7 @@ fn what_is_added_to_a_front_is_part_of_the_matrix() {
         .unwrap();
     values.push(Block { row: 11, column: 11, value: more });
     given.set(&values);
-    given.factor(|_, _| ()).unwrap();
+    given.factor(&PlainLoop, |_, _| ()).unwrap();
     let [a, b] = [added, given].map(|mut matrix| {
         let mut x = vec![DVec3::new(1.0, 2.0, 3.0); 20];
         matrix.solve(&mut x);
@@ -200,5 +202,75 @@ fn an_indefinite_matrix_is_refused_at_its_block() {
         .map(|(k, value)| Block { row: k, column: k, value: DMat3::from_diagonal(DVec3::splat(*value)) })
         .collect();
     sparse.set(&values);
-    assert_eq!(sparse.factor(|_, _| ()), Err(1));
+    assert_eq!(sparse.factor(&PlainLoop, |_, _| ()), Err(1));
+}
+
+/// A new thread for every second job; counts them.
+#[derive(Debug, Default)]
+struct Scoped {
+    jobs: AtomicUsize,
+}
+
+impl ParallelFor for Scoped {
+    fn join(&self, first: &mut (dyn FnMut() + Send), second: &mut (dyn FnMut() + Send)) {
+        self.jobs.fetch_add(1, Ordering::Relaxed);
+        std::thread::scope(|scope| {
+            scope.spawn(second);
+            first();
+        });
+    }
+}
+
+#[test]
+fn trees_of_fronts_have_the_same_bits_side_by_side() {
+    // three lattices of 7 x 7 x 5, of which one stands alone
+    let (sides, count) = ([7, 7, 5], 245);
+    let at = |i: usize| [i % sides[0], i / sides[0] % sides[1], i / (sides[0] * sides[1])];
+    let mut values = Vec::new();
+    for lattice in 0..3 {
+        for row in 0..count {
+            for column in 0..=row {
+                let apart: usize = at(row).iter().zip(at(column)).map(|(a, b)| a.abs_diff(b)).sum();
+                let value = [30.0, -2.0 - lattice as f64, 0.3].get(apart).copied().unwrap_or_default();
+                if value != 0.0 {
+                    let (row, column) = (count * lattice + row, count * lattice + column);
+                    values.push(Block { row, column, value: DMat3::from_diagonal(DVec3::new(value, 30.0, value)) });
+                }
+            }
+        }
+    }
+    values.iter_mut().filter(|block| block.row != block.column).for_each(|block| block.value.y_axis.y = 0.0);
+    values.push(Block { row: 300, column: 10, value: DMat3::IDENTITY });
+    let pairs: Vec<_> = values.iter().map(|block| Pair { row: block.row, column: block.column }).collect();
+    let solved = |threads: &dyn ParallelFor, values: &[Block]| {
+        let mut matrix = Cholesky::default();
+        matrix.shape(3 * count, &pairs);
+        matrix.set(values);
+        let made = matrix.factor(threads, |_, _| ());
+        let mut x: Vec<_> = (0..3 * count).map(|i| DVec3::new(1.0, i as f64, -2.0)).collect();
+        matrix.solve(&mut x);
+        (made, x)
+    };
+    let scoped = Scoped::default();
+    let (made, x) = solved(&scoped, &values);
+    assert_eq!((made, x.clone()), solved(&PlainLoop, &values));
+    assert!(made.is_ok() && scoped.jobs.into_inner() > 2);
+    // the product with the matrix is the right side again
+    let mut back = vec![DVec3::ZERO; 3 * count];
+    for block in &values {
+        back[block.row] += block.value * x[block.column];
+        if block.row != block.column {
+            back[block.column] += block.value.transpose() * x[block.row];
+        }
+    }
+    let apart = (0..3 * count).map(|i| back[i].distance(DVec3::new(1.0, i as f64, -2.0))).fold(0.0, f64::max);
+    assert!(apart < 1e-10, "{apart}");
+    // of several bad blocks the same one is named
+    for bad in [100, 400, 700] {
+        let at = values.iter().position(|block| block.row == bad && block.column == bad).unwrap();
+        values[at].value = -DMat3::IDENTITY;
+    }
+    let refused = solved(&PlainLoop, &values).0;
+    assert!(refused.is_err());
+    assert_eq!(solved(&Scoped::default(), &values).0, refused);
 }

@@ -5,6 +5,7 @@ use super::slow::Dense;
 use super::{Body, Case};
 use crate::cluster::{Member, Problem, Response, Settings, Solution, Solver, StepForm};
 use glam::DVec3;
+use metachron_core::PlainLoop;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A dense factor that counts how often it is asked.
@@ -38,7 +39,7 @@ fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
         .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, share: 1.5, response: response(k) })
         .collect();
     let (contacts, rows) = (&case.contacts, &case.rows);
-    let problem = Problem { h_s: case.h_s, members: &members, contacts, rows };
+    let problem = Problem { h_s: case.h_s, members: &members, contacts, rows, threads: &PlainLoop };
     let solution = Solver::new(settings).solve(&problem).unwrap().clone();
     (solution, lent.iter().map(|lent| lent.asked.load(Ordering::Relaxed)).sum())
 }

@@ -14,6 +14,7 @@ mod slow;
 
 use super::{Block, Contact, JointRow, Member, Problem, Side, SideTerm};
 use glam::{DMat3, DVec3};
+use metachron_core::PlainLoop;
 
 /// Numbers of a fixed seed: xorshift.
 pub struct Seeded(u64);
@@ -69,7 +70,13 @@ impl Case {
             .iter()
             .map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0, response: None })
             .collect();
-        work(&Problem { h_s: self.h_s, members: &members, contacts: &self.contacts, rows: &self.rows })
+        work(&Problem {
+            h_s: self.h_s,
+            members: &members,
+            contacts: &self.contacts,
+            rows: &self.rows,
+            threads: &PlainLoop,
+        })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::{Case, contact, rigid};
 use crate::cluster::{Block, Hold, JointRow, ProblemError, Side, SideTerm, Solver, Way};
 use glam::{DMat3, DVec3};
+use metachron_core::PlainLoop;
 
 /// A box that falls on the floor on three points.
 fn case() -> Case {
@@ -118,7 +119,13 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
             share,
             response: None,
         }];
-        let problem = crate::cluster::Problem { h_s: 0.01, members: &members, contacts: &case.contacts, rows: &[] };
+        let problem = crate::cluster::Problem {
+            h_s: 0.01,
+            members: &members,
+            contacts: &case.contacts,
+            rows: &[],
+            threads: &PlainLoop,
+        };
         Solver::default().solve(&problem).unwrap().contacts_n_s[0].z
     };
     assert!((impulse(1.0) / impulse(2.0) - 2.0).abs() < 1e-3, "{} {}", impulse(1.0), impulse(2.0));
