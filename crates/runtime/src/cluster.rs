@@ -272,10 +272,10 @@ impl AgentRunner {
                 }
                 let report = stepper.step(&scene, &mut list, dt, threads).map_err(|error| error.to_string())?;
                 if meets {
-                    part(&list, &mut sides, &mut stepper, report.dt.as_secs_f64());
+                    part(&list, &mut sides, &mut stepper, dt.as_secs_f64());
                 }
                 if let Some(doubling) = &mut doubling {
-                    doubling.compare(&list, report.dt);
+                    doubling.compare(&list);
                 }
                 let calm = list.iter().all(|one| one.member.is_calm());
                 Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
@@ -289,7 +289,6 @@ impl AgentRunner {
             (seat.remotes, seat.helped) = (remotes, helped);
         }
         let (report, extra, at_rest) = outcome?;
-        let dt = report.dt;
         if let Some(doubling) = doubling {
             self.note_errors(doubling, dt);
         }

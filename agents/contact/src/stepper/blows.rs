@@ -1,69 +1,122 @@
-//! Blows: contacts that rebound, each at its own time.
+//! Blows: contacts that rebound, each at its own time within a fine step.
 //!
-//! In: the places of a macro step. Out: when the first of them that rebounds closes; which contacts rebound now. Never here: how a
-//! rebound is solved ([`crate::cluster`]). Theory: docs/theory/clusters.md, section 9.
+//! In: the places of a fine step, what a solve gave. Out: which of them rebound and when, by how much later than the step's start each
+//! impulse acts. Never here: how a rebound is solved ([`crate::cluster`]). Theory: docs/theory/clusters.md, section 9.
 //!
-//! A macro step that a blow falls into ends where the sides meet, so that the blow acts there and not where they were before. In the fine
-//! steps of unlike members a blow acts at the start of its fine step: that is a sixteenth of the longest step off at most.
+//! A blow is solved with the speed at which its sides meet, and changes velocities from the start of the step. A body that nothing else
+//! holds is then carried to where the blow at its own time would have left it (eq. 27), so its flight is exact on both sides of it.
+//! A body rebounds once in a fine step: what it would meet later it does not know yet, and what it would then pass through stops it.
 
 use super::Progress;
-use super::search::{Search, velocity};
+use super::memory::Partner;
+use super::search::{Judge, Owner, Search, velocity};
 use crate::cluster::{Contact, Side};
-
-/// Sides that are closer than this have met, metres: a millionth of what any picture shows.
-const MET_M: f64 = 1e-6;
+use glam::DVec3;
 
 /// What decides whether a contact rebounds.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Rebounds {
-    /// The macro step that was asked for, and the fine step that is made, seconds.
-    pub macro_s: f64,
-    pub step_s: f64,
-    /// Whether all members make steps of one length: then a blow waits for its time.
-    pub is_even: bool,
+    /// The macro step and the fine step that are made, seconds.
+    macro_s: f64,
+    step_s: f64,
+    /// The first blow of each participant in the fine step.
+    first: Vec<Option<First>>,
+    /// Those of them that were known when it was last decided.
+    known: Vec<Option<First>>,
+}
+
+/// The first blow of a participant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct First {
+    meets_s: f64,
+    /// The pair that it belongs to: all its places rebound together.
+    pair: (usize, Partner),
+}
+
+/// Two sides that close.
+struct Meeting {
+    after_s: f64,
+    approach_m_s: f64,
 }
 
 impl Rebounds {
-    /// Whether the sides of a contact that closes at this speed part for long enough.
-    fn flies(&self, contact: &Contact, approach_m_s: f64, progress: &[Progress]) -> bool {
-        // what both gain, as they fall, is not what drives them together where one of them lies on something
-        let [a, b] = contact.sides.each_ref().map(|side| gain_m_s(side, progress, contact));
-        let driven_m_s2 = (b - a).max(b).max(-a) / self.step_s;
-        // what parts for less than a macro step would hop at every step
-        2.0 * contact.restitution * approach_m_s > driven_m_s2 * self.macro_s
+    /// Begins a fine step of so many participants.
+    pub fn begin(&mut self, macro_s: f64, step_s: f64, participants: usize) {
+        (self.macro_s, self.step_s) = (macro_s, step_s);
+        self.first.clear();
+        self.first.resize(participants, None);
     }
 
-    /// When the first contact that will rebound closes, seconds from now; `None` for none within the macro step.
-    pub fn first(&self, search: &Search, progress: &[Progress]) -> Option<f64> {
-        let closing = search.contacts.iter().filter_map(|contact| self.closes_at(contact, progress));
-        closing.filter(|closes_s| *closes_s < self.macro_s).reduce(f64::min)
-    }
-
-    /// When a contact closes that then rebounds; `None` for one that has met already.
-    fn closes_at(&self, contact: &Contact, progress: &[Progress]) -> Option<f64> {
-        if contact.restitution <= 0.0 || contact.gap_m <= MET_M {
-            return None;
-        }
-        let [a, b] = contact.sides.each_ref().map(|side| gain_m_s(side, progress, contact));
-        let gain_m_s2 = (b - a) / self.step_s;
-        let closes_s = first_root(contact.gap_m, contact.approach_m_s, gain_m_s2)?;
-        let approach_m_s = contact.approach_m_s + gain_m_s2 * closes_s;
-        self.flies(contact, approach_m_s, progress).then_some(closes_s)
-    }
-
-    /// Leaves out contacts whose blow is still to come, and takes the restitution of those that do not rebound.
-    pub fn choose(&self, search: &mut Search, progress: &[Progress]) {
+    /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that close too late to do so.
+    pub fn choose(&mut self, search: &mut Search, progress: &[Progress], judge: Judge) {
         if search.contacts.iter().all(|contact| contact.restitution <= 0.0) {
             return;
         }
-        if self.is_even {
-            // the step ends no later than they close: nothing acts before
-            search.retain(|contact| self.closes_at(contact, progress).is_none());
-        }
-        for contact in &mut search.contacts {
-            let met = !self.is_even || contact.gap_m <= MET_M;
-            if !(met && self.flies(contact, contact.approach_m_s, progress)) {
+        self.known.clone_from(&self.first);
+        for (contact, owner) in search.contacts.iter_mut().zip(&mut search.owners) {
+            if contact.restitution <= 0.0 || owner.meets_s.is_some() {
+                continue;
+            }
+            let Some(Meeting { after_s, approach_m_s }) = self.meeting(contact, progress) else {
                 contact.restitution = 0.0;
+                continue;
+            };
+            owner.meets_s = Some(after_s);
+            contact.approach_m_s = approach_m_s;
+            let pair = (owner.member, owner.partner);
+            for member in owner.movers(contact) {
+                let first = &mut self.first[member];
+                if self.known[member].is_none() && first.is_none_or(|first| after_s < first.meets_s) {
+                    *first = Some(First { meets_s: after_s, pair });
+                }
+            }
+        }
+        let foresees = matches!(judge, Judge::Foreseen);
+        search.retain(|contact, owner| self.settle(contact, owner) || !foresees);
+    }
+
+    /// Lets a contact rebound whose blow is the first of both its sides, and takes the restitution of one whose is not; returns whether the
+    /// contact is part of the problem before the solve.
+    fn settle(&self, contact: &mut Contact, owner: &Owner) -> bool {
+        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0) else { return true };
+        let pair = (owner.member, owner.partner);
+        let is_first = |member: usize| self.first[member].is_some_and(|first| first.pair == pair);
+        let rebounds = meets_s < self.step_s && owner.movers(contact).all(is_first);
+        if rebounds {
+            // it acts where the sides meet
+            contact.gap_m = 0.0;
+        } else {
+            contact.restitution = 0.0;
+        }
+        rebounds
+    }
+
+    /// When the sides of a contact meet that then rebound, seconds from now: before now where they are in each other.
+    fn meeting(&self, contact: &Contact, progress: &[Progress]) -> Option<Meeting> {
+        let [a, b] = contact.sides.each_ref().map(|side| gain_m_s(side, progress, contact));
+        let gain_m_s2 = (b - a) / self.step_s;
+        let after_s = first_root(contact.gap_m, contact.approach_m_s, gain_m_s2)?.max(-self.step_s);
+        let approach_m_s = contact.approach_m_s + gain_m_s2 * after_s;
+        // what both gain, as they fall, is not what drives them together where one of them lies on something
+        let driven_m_s2 = (b - a).max(b).max(-a) / self.step_s;
+        // what parts for less than a macro step would hop at every step
+        let flies = 2.0 * contact.restitution * approach_m_s > driven_m_s2 * self.macro_s;
+        // what meets in a later step is decided then
+        (flies || after_s >= self.step_s).then_some(Meeting { after_s, approach_m_s })
+    }
+}
+
+/// Adds to what each participant is carried by, N·s²: what blows gave, times the seconds since they acted (eq. 27).
+pub(super) fn note_late(search: &Search, impulses_n_s: &[DVec3], progress: &mut [Progress]) {
+    for ((contact, owner), impulse) in search.contacts.iter().zip(&search.owners).zip(impulses_n_s) {
+        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0 && *impulse != DVec3::ZERO) else {
+            continue;
+        };
+        for (side, sign) in contact.sides.iter().zip([1.0, -1.0]).filter(|(side, _)| !side.terms().is_empty()) {
+            let state = &mut progress[side.member];
+            state.late.resize(state.start.len(), DVec3::ZERO);
+            for term in side.terms() {
+                state.late[term.block] -= term.map.mul_transpose_vec3(*impulse) * (sign * meets_s);
             }
         }
     }
@@ -75,7 +128,7 @@ fn gain_m_s(side: &Side, progress: &[Progress], contact: &Contact) -> f64 {
     (velocity(side, |member| &progress[member].seen) - now).dot(contact.normal)
 }
 
-/// When a gap g closes that does so at a speed v, which grows by a: the least t ≥ 0 with g = v t + ½ a t².
+/// When a gap g closes that does so at a speed v, which grows by a: the root t of g = v t + ½ a t² at which it closes, t < 0 for g < 0.
 fn first_root(gap: f64, speed: f64, gain: f64) -> Option<f64> {
     let inside = speed * speed + 2.0 * gain * gap;
     // the form that loses no digits where the gain is small
@@ -93,6 +146,8 @@ mod tests {
         assert!((t - (2.0_f64 / 9.81).sqrt()).abs() < 1e-15);
         assert_eq!(first_root(1.0, -1.0, 0.0), None, "it parts");
         assert_eq!(first_root(0.5, 2.0, 0.0), Some(0.25));
+        assert_eq!(first_root(-0.5, 2.0, 0.0), Some(-0.25), "it has met");
         assert_eq!(first_root(1.0, 1.0, -1.0), None, "it turns before");
+        assert_eq!(first_root(-2e-5, 0.0, 9.81), None, "it lies");
     }
 }

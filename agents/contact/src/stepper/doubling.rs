@@ -16,8 +16,8 @@ pub struct StepDoubling {
     stepper: ClusterStepper,
     /// Where the finer step left the members.
     finer: Vec<Vec<DVec3>>,
-    /// How long that was; `None` where there was none.
-    made: Option<SimSpan>,
+    /// Whether there was one.
+    made: bool,
     now: Vec<DVec3>,
     apart_m: Vec<f64>,
 }
@@ -36,7 +36,7 @@ impl StepDoubling {
         threads: &dyn ParallelFor,
     ) -> Result<f64, StepError> {
         let Self { stepper, finer, made, .. } = self;
-        *made = None;
+        *made = false;
         stepper.keep(all);
         all.iter_mut().for_each(|one| one.parts *= 2);
         let outcome = stepper.step(scene, all, dt, threads);
@@ -47,15 +47,15 @@ impl StepDoubling {
         all.iter_mut().for_each(|one| one.parts /= 2);
         stepper.go_back(all);
         let report = outcome?;
-        *made = Some(report.dt);
+        *made = true;
         Ok(report.work)
     }
 
-    /// Compares the members with where the finer step left them, after the same macro step, which took `dt`.
-    pub fn compare(&mut self, all: &[Participant<'_>], dt: SimSpan) {
+    /// Compares the members with where the finer step left them, after the same macro step.
+    pub fn compare(&mut self, all: &[Participant<'_>]) {
         let Self { finer, made, now, apart_m, .. } = self;
         apart_m.clear();
-        if made.take() == Some(dt) && finer.len() == all.len() {
+        if std::mem::take(made) && finer.len() == all.len() {
             apart_m.extend(all.iter().zip(finer).map(|(one, finer)| {
                 probe(&*one.member, now);
                 farthest(now, finer)
@@ -63,8 +63,7 @@ impl StepDoubling {
         }
     }
 
-    /// How far each member was from where the finer step left it when that was last compared, metres; empty where there was no finer step
-    /// or one of another length.
+    /// How far each member was from where the finer step left it when that was last compared, metres; empty where there was no finer step.
     #[must_use]
     pub fn apart_m(&self) -> &[f64] {
         &self.apart_m

@@ -51,11 +51,9 @@ pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
-use search::Search;
+use search::{Judge, Search};
 use ties::{FineStep, Ties, place_key};
 
-/// No macro step is cut shorter than this: clocks count nanoseconds.
-const SHORTEST: SimSpan = SimSpan::from_nanos(1000);
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
@@ -109,8 +107,6 @@ impl Participant<'_> {
 /// What a macro step was.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ClusterReport {
-    /// Its length: shorter than asked for where something rebounds within it.
-    pub dt: SimSpan,
     /// Fine steps that it was made in.
     pub fine_steps: u32,
     /// Contacts of the last fine step, those that bear nothing included.
@@ -228,18 +224,12 @@ impl ClusterStepper {
         check_span(dt)?;
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
-        let mut report = ClusterReport { dt, ..ClusterReport::default() };
+        let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
         self.foresee(all, self.macro_s, threads)?;
-        let blow = self.first_blow(On { scene, threads }, all, dt.as_secs_f64())?;
-        if let Some(cut) = blow.and_then(SimSpan::from_secs_f64) {
-            report.dt = cut.clamp(SHORTEST.min(dt), dt);
-            self.macro_s = report.dt.as_secs_f64();
-            self.foresee(all, report.dt.as_secs_f64(), threads)?;
-        }
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
-        while !self.advance(On { scene, threads }, all, dt.as_secs_f64(), &mut report)? {
+        while !self.advance(On { scene, threads }, all, dt, &mut report)? {
             self.go_back(all);
         }
         report.work = self.progress.iter().map(|state| state.work).sum();
@@ -265,35 +255,15 @@ impl ClusterStepper {
         failures.fold(None, Option::or).map_or(Ok(()), Err)
     }
 
-    /// When the first contact closes that rebounds, seconds from the start of a macro step that all members make in one piece.
-    fn first_blow(&mut self, on: On<'_>, all: &mut [Participant<'_>], dt_s: f64) -> Result<Option<f64>, StepError> {
-        let rigid = all.iter().filter(|one| one.member.role() != Role::Deformable);
-        let mut skins = rigid.filter_map(|one| one.member.skin());
-        let floors = on.scene.statics().iter().any(|solid| solid.form.restitution > 0.0);
-        let any = skins.next().is_some_and(|first| {
-            floors || first.form.restitution > 0.0 || skins.any(|skin| skin.form.restitution > 0.0)
-        });
-        if !any || self.progress.iter().any(|state| state.parts > 1) {
-            return Ok(None);
-        }
-        self.progress.iter_mut().for_each(|state| (state.share, state.part) = (1, 0));
-        self.begin(all, dt_s, on.threads)?;
-        self.search.find(on.scene, all, &self.progress, dt_s);
-        // the steps begun are still those that are made where nothing rebounds
-        self.progress.iter_mut().for_each(|state| state.begun_s = dt_s);
-        Ok(Rebounds { macro_s: dt_s, step_s: dt_s, is_even: true }.first(&self.search, &self.progress))
-    }
-
     /// Makes all fine steps of a macro step; false where it was left because a member needs shorter steps.
     fn advance(
         &mut self,
         on: On<'_>,
         all: &mut [Participant<'_>],
-        asked_s: f64,
+        dt: SimSpan,
         report: &mut ClusterReport,
     ) -> Result<bool, StepError> {
         let On { scene, threads } = on;
-        let dt = report.dt;
         let bent = |one: &Participant<'_>| one.member.role() == Role::Deformable;
         let parts = self.progress.iter().map(|state| state.parts).max().unwrap_or(1);
         let h_s = dt.as_secs_f64() / f64::from(parts);
@@ -306,13 +276,13 @@ impl ClusterStepper {
         self.outside.begin();
         report.fine_steps = parts;
         report.depth_m = 0.0;
-        self.rebounds = Rebounds { macro_s: asked_s, step_s: h_s, is_even: parts == 1 };
         self.fine_s = h_s;
         for fine in 0..parts {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
             self.search.find(scene, all, &self.progress, h_s);
-            self.rebounds.choose(&mut self.search, &self.progress);
+            self.rebounds.begin(self.macro_s, h_s, all.len());
+            self.rebounds.choose(&mut self.search, &self.progress, Judge::Foreseen);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(on, all, h_s, report)?;
@@ -455,7 +425,7 @@ impl ClusterStepper {
         }
     }
 
-    /// Moves all members; the step of some ends (eq. 26).
+    /// Moves all members; the step of some ends (eq. 26, 27).
     fn end(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let since_s = h_s * f64::from(state.part);
@@ -463,6 +433,9 @@ impl ClusterStepper {
                 one.member.move_to(&state.before, since_s);
             } else {
                 state.failure = one.member.end(&state.before, since_s, state.touched).err();
+                if !state.held && state.failure.is_none() && !state.late.is_empty() {
+                    one.member.carry(&state.late);
+                }
                 state.part = 0;
             }
         });

@@ -31,13 +31,19 @@ pub(super) struct Progress {
     pub known: Vec<DVec3>,
     /// û: the velocity at which its place moves in this fine step, without the impulses sought.
     pub seen: Vec<DVec3>,
-    /// û with the impulses that the last solve found.
+    /// û with the impulses that the last solve found, and the velocity at which its place moves by it: in the mean of the fine step, of a
+    /// body that flies.
     pub solved: Vec<DVec3>,
+    pub going: Vec<DVec3>,
     /// Its place in the problem; `None` where no row touches it.
     pub place: Option<usize>,
-    /// Whether anything has acted on it for a while since its step began, and whether a contact or row of the problem has.
+    /// Whether anything has acted on it for a while since its step began, whether a contact or row of the problem has, and whether one does
+    /// by the last solve.
     pub touched: bool,
     pub held: bool,
+    pub bears: bool,
+    /// What blows gave each of its blocks since its step began, times the seconds since they acted, N·s²; empty for none.
+    pub late: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
     /// Why its last begin or end failed, where nobody has asked since.
@@ -60,6 +66,7 @@ impl Progress {
         self.given.clear();
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
+        self.late.clear();
         (self.touched, self.held) = (false, false);
     }
 
@@ -84,6 +91,14 @@ impl Progress {
         known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
         seen.clear();
         seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
+    }
+
+    /// Finds how its place moves by the last solve, of a body whose flight is free of it where `flies`.
+    pub fn go(&mut self, flies: bool) {
+        self.going.clone_from(&self.solved);
+        if flies && !self.touched && !self.bears {
+            self.going.iter_mut().zip(&self.gain).for_each(|(going, gain)| *going -= *gain * 0.5);
+        }
     }
 
     /// Takes the velocities that it has without impulses.

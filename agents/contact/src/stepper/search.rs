@@ -23,7 +23,7 @@ const LOOK_M: f64 = 4e-4;
 const NEAR_STEPS: f64 = 2.0;
 
 /// Where a contact belongs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Owner {
     /// The participant that remembers it: the lower number, side 0.
     pub member: usize,
@@ -32,11 +32,24 @@ pub(super) struct Owner {
     pub other: Option<usize>,
     /// The name of the place within its pair.
     pub key: TouchKey,
+    /// When its sides meet, seconds from the start of the fine step; `None` where they do not rebound, or where that is not decided yet.
+    pub meets_s: Option<f64>,
 }
 
 impl Owner {
     fn name(&self) -> (usize, Partner, TouchKey) {
         (self.member, self.partner, self.key)
+    }
+
+    /// Its participants.
+    pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
+        std::iter::once(self.member).chain(self.other)
+    }
+
+    /// The participants that its contact moves.
+    pub fn movers(&self, contact: &Contact) -> impl Iterator<Item = usize> + use<> {
+        let [here, there] = contact.sides.each_ref().map(|side| !side.terms().is_empty());
+        here.then_some(self.member).into_iter().chain(self.other.filter(|_| there))
     }
 }
 
@@ -86,7 +99,7 @@ impl<'a> Round<'a, '_> {
     /// The velocities at which a member's place moves, as far as this round knows.
     fn moved(&self, member: usize) -> &'a [DVec3] {
         let state = &self.progress[member];
-        if self.foresees() { &state.seen } else { &state.solved }
+        if self.foresees() { &state.seen } else { &state.going }
     }
 }
 
@@ -223,7 +236,7 @@ impl Search {
         let meets = reach.skin.grown(reach_m).meets(bounds);
         let at = if meets { self.touch(round, pair, reach_m) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
-        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default() };
+        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), meets_s: None };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
 
@@ -282,6 +295,7 @@ impl Search {
                     Ok(at) if swept && ends_m < -LOOK_M => {
                         let warm_n_s = contacts[at].warm_n_s;
                         contacts[at] = Contact { warm_n_s, ..contact(&touch, &facing, skins, round.progress) };
+                        owners[at].meets_s = None;
                         *moved = true;
                         false
                     }
@@ -304,11 +318,18 @@ impl Search {
     }
 
     /// Keeps those contacts for which `keep` is true.
-    pub fn retain(&mut self, mut keep: impl FnMut(&Contact) -> bool) {
+    pub fn retain(&mut self, mut keep: impl FnMut(&mut Contact, &Owner) -> bool) {
         let Self { contacts, owners, .. } = self;
-        let mut kept = contacts.iter().map(&mut keep);
-        owners.retain(|_| kept.next().unwrap_or(true));
-        contacts.retain(|contact| keep(contact));
+        let mut kept = 0;
+        for at in 0..contacts.len() {
+            if keep(&mut contacts[at], &owners[at]) {
+                contacts.swap(kept, at);
+                owners.swap(kept, at);
+                kept += 1;
+            }
+        }
+        contacts.truncate(kept);
+        owners.truncate(kept);
     }
 
     /// Contacts in the order of their names: sums are then the same whatever found them first.

@@ -3,11 +3,12 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::blows::note_late;
 use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
-use super::{ClusterReport, ClusterStepper, On, Participant};
-use crate::cluster::{Contact, Member, Problem, ProblemError};
+use super::{ClusterReport, ClusterStepper, On, Participant, Role};
+use crate::cluster::{Member, Problem, ProblemError};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -35,6 +36,7 @@ impl ClusterStepper {
         let mut last_miss_m = f64::INFINITY;
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, on.threads, report)?;
+            self.note_motion(all);
             let Self { solver, search, ties, joints, progress, depth_m, rebounds, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
@@ -54,7 +56,7 @@ impl ClusterStepper {
             if round == ROUNDS_MAX || !passed && joined {
                 break;
             }
-            rebounds.choose(search, progress);
+            rebounds.choose(search, progress, Judge::Solved);
         }
         self.give(report);
         Ok(())
@@ -105,24 +107,34 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Gives every member the impulses found.
-    fn give(&mut self, report: &mut ClusterReport) {
+    /// Finds what the impulses found hold, and how places move by them.
+    fn note_motion(&mut self, all: &[Participant<'_>]) {
         let Self { solver, search, ties, progress, .. } = self;
         let solution = solver.solution();
-        progress.iter_mut().for_each(Progress::take);
-        // a blow is over when the step begins: the flight after it is free
-        let lasting = |(contact, impulse): (&Contact, &DVec3)| *impulse != DVec3::ZERO && contact.restitution == 0.0;
-        for (k, both) in search.contacts.iter().zip(&solution.contacts_n_s).enumerate() {
-            if lasting(both) {
-                let owner = &search.owners[k];
-                progress[owner.member].hold();
-                owner.other.into_iter().for_each(|other| progress[other].hold());
+        progress.iter_mut().for_each(|state| state.bears = false);
+        let mut hold = |both: &mut dyn Iterator<Item = usize>| both.for_each(|member| progress[member].bears = true);
+        for (k, impulse) in solution.contacts_n_s.iter().enumerate() {
+            // a blow is over when the step begins: the flight after it is free
+            if *impulse != DVec3::ZERO && search.contacts[k].restitution == 0.0 {
+                hold(&mut search.owners[k].both());
             }
         }
-        for (owner, _) in ties.owners.iter().zip(&solution.rows_n_s).filter(|(_, impulse)| **impulse != DVec3::ZERO) {
-            progress[owner.member].hold();
-            owner.other.into_iter().for_each(|other| progress[other].hold());
+        for (owner, impulse) in ties.owners.iter().zip(&solution.rows_n_s) {
+            if *impulse != DVec3::ZERO {
+                hold(&mut owner.both());
+            }
         }
+        for (one, state) in all.iter().zip(progress) {
+            state.go(one.member.role() == Role::Rigid);
+        }
+    }
+
+    /// Gives every member the impulses found.
+    fn give(&mut self, report: &mut ClusterReport) {
+        let Self { solver, search, progress, .. } = self;
+        progress.iter_mut().for_each(Progress::take);
+        note_late(search, &solver.solution().contacts_n_s, progress);
+        progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
     }

@@ -35,6 +35,13 @@ pub(super) struct RowOwner {
     pub hold: Option<Holders>,
 }
 
+impl RowOwner {
+    /// Its participants.
+    pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
+        std::iter::once(self.member).chain(self.other)
+    }
+}
+
 /// The two ends of a force, as each is told to the other: `None` is the user.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Holders {

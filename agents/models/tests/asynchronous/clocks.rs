@@ -121,21 +121,19 @@ impl Clocks {
         let id = AgentId(me as u32);
         let dt = SimSpan::from_secs_f64(1.0 / *rate_hz).unwrap();
         let context = StepContext { me: id, time: *time, neighbours: &neighbours, hands, links };
-        let mut made = SimSpan::ZERO;
         let mut list: Vec<Participant<'_>> = Vec::with_capacity(8);
         let member = agent.member().unwrap();
         list.push(Participant { id, member, context, laws: &laws, memory, parts: 1, grips });
         let sides = [Some(&mut *pairs)];
-        let made_here = &mut made;
         let round = move || {
             let (mut list, mut sides) = (list, sides);
             let sides = &mut sides[..];
             remotes.join(&mut list, sides, stepper, MacroStep { dt_s: dt.as_secs_f64(), parts: 1 });
-            *made_here = stepper.step(scene, &mut list, dt, &PlainLoop).unwrap().dt;
-            part(&list, sides, stepper, made_here.as_secs_f64());
+            stepper.step(scene, &mut list, dt, &PlainLoop).unwrap();
+            part(&list, sides, stepper, dt.as_secs_f64());
         };
         *allocations = allocation_counter::measure(round).count_total;
-        *time += made;
+        *time += dt;
         own.clear();
         agent.write_snapshot(own);
         own.pairs.clear();

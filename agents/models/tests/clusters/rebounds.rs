@@ -28,6 +28,8 @@ fn tops(table: &mut Table, body: usize, count: usize) -> Vec<f64> {
         let (_, before) = table.middle(body);
         let (_, dt_s) = table.step();
         let (place, after) = table.middle(body);
+            println!("{:.5} z {:.6} v {:.6}", table.time.as_secs_f64(), place.z - RADIUS_M, after.z);
+        }
         // what a blow at its start sends up may come down again within the step
         rising |= after.z > before.z + GRAVITY.z * dt_s + 1e-6;
         if rising && after.z <= 0.0 {

@@ -179,7 +179,7 @@ impl StepHarness {
         let outcome = stepper.step(scene, &mut all, dt, &PlainLoop);
         *participants = recycled(all);
         self.report = outcome?;
-        self.time += self.report.dt;
+        self.time += dt;
         self.impulse_n_s += self.stepper.totals().iter().map(|total| total.impulse_n_s.length()).sum::<f64>();
         for actor in &mut self.actors {
             actor.agent.write_snapshot(&mut actor.own);

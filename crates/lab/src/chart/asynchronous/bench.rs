@@ -176,13 +176,8 @@ impl StepHarness {
         let time = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
         let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
-        // a blow ends a macro step where it happens: the rest of the step follows
-        let end = time + dt;
-        let mut now = time;
-        while now < end {
-            let context = StepContext { me, time: now, neighbours: &neighbours, hands, links };
-            now += cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, end.since(now))?;
-        }
+        let context = StepContext { me, time, neighbours: &neighbours, hands, links };
+        cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, dt)?;
         actor.last_s = dt.as_secs_f64();
         own.clear();
         agent.write_snapshot(own);
@@ -237,11 +232,11 @@ impl Cluster {
         scene: &ClusterScene,
         around: Around<'_>,
         dt: SimSpan,
-    ) -> Result<SimSpan, StepError> {
+    ) -> Result<(), StepError> {
         let Self { memory, grips, pairs, remotes, stepper, overlaps } = self;
         let Around { context, law } = around;
         let laws: Vec<(AgentId, Law)> = context.neighbours.iter().map(|other| (other.id, other.law)).collect();
-        let Some(member) = agent.member() else { return agent.step(dt, &context).map(|_| dt) };
+        let Some(member) = agent.member() else { return agent.step(dt, &context).map(drop) };
         let id = context.me;
         let mut list = vec![Participant { id, member, context, laws: &laws, memory, parts: 1, grips }];
         let sides = &mut [Some(pairs)];
@@ -254,9 +249,9 @@ impl Cluster {
                 overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
             }
         }
-        let made = stepper.step(scene, &mut list, dt, &PlainLoop)?.dt;
-        part(&list, sides, stepper, made.as_secs_f64());
-        Ok(made)
+        stepper.step(scene, &mut list, dt, &PlainLoop)?;
+        part(&list, sides, stepper, dt_s);
+        Ok(())
     }
 }
 
