@@ -5,7 +5,7 @@
 //!
 //! A blow is solved with the speed at which its sides meet, and changes velocities from the start of the step. A body that nothing else
 //! holds is then carried to where the blow at its own time would have left it (eq. 27), so its flight is exact on both sides of it.
-//! A body rebounds once in a fine step: what it would meet later it does not know yet, and what it would then pass through stops it.
+//! A body rebounds once in a fine step: what it would pass through after its first blow stops it.
 
 use super::Progress;
 use super::memory::Partner;
@@ -47,7 +47,7 @@ impl Rebounds {
         self.first.resize(participants, None);
     }
 
-    /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that close too late to do so.
+    /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that meet later.
     pub fn choose(&mut self, search: &mut Search, progress: &[Progress], judge: Judge) {
         if search.contacts.iter().all(|contact| contact.restitution <= 0.0) {
             return;
@@ -71,14 +71,15 @@ impl Rebounds {
                 }
             }
         }
-        let foresees = matches!(judge, Judge::Foreseen);
-        search.retain(|contact, owner| self.settle(contact, owner) || !foresees);
+        search.contacts.iter_mut().zip(&search.owners).for_each(|(contact, owner)| self.settle(contact, owner));
+        if matches!(judge, Judge::Foreseen) {
+            search.retain(|owner| owner.meets_s.is_none_or(|meets_s| meets_s < self.step_s));
+        }
     }
 
-    /// Lets a contact rebound whose blow is the first of both its sides, and takes the restitution of one whose is not; returns whether the
-    /// contact is part of the problem before the solve.
-    fn settle(&self, contact: &mut Contact, owner: &Owner) -> bool {
-        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0) else { return true };
+    /// Lets a contact rebound whose blow is the first of both its sides, and takes the restitution of one whose is not.
+    fn settle(&self, contact: &mut Contact, owner: &Owner) {
+        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0) else { return };
         let pair = (owner.member, owner.partner);
         let is_first = |member: usize| self.first[member].is_some_and(|first| first.pair == pair);
         let rebounds = meets_s < self.step_s && owner.movers(contact).all(is_first);
@@ -88,7 +89,6 @@ impl Rebounds {
         } else {
             contact.restitution = 0.0;
         }
-        rebounds
     }
 
     /// When the sides of a contact meet that then rebound, seconds from now: before now where they are in each other.

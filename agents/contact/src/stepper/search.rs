@@ -317,12 +317,12 @@ impl Search {
         }
     }
 
-    /// Keeps those contacts for which `keep` is true.
-    pub fn retain(&mut self, mut keep: impl FnMut(&mut Contact, &Owner) -> bool) {
+    /// Keeps the contacts of those owners for which `keep` is true.
+    pub fn retain(&mut self, keep: impl Fn(&Owner) -> bool) {
         let Self { contacts, owners, .. } = self;
         let mut kept = 0;
         for at in 0..contacts.len() {
-            if keep(&mut contacts[at], &owners[at]) {
+            if keep(&owners[at]) {
                 contacts.swap(kept, at);
                 owners.swap(kept, at);
                 kept += 1;
