@@ -67,8 +67,7 @@ fn the_error_that_unequal_steps_make_is_reported_for_every_scene() {
     let rows = error["table"].as_array().unwrap();
     assert_eq!(rows.len(), 12, "four scenes, 1:1, 1:10 and 10:1");
     for row in rows.iter().filter(|r| r["scene"] == "oblique-blow") {
-        // at equal rates rebounds act where bodies meet; else at the start of a fine step, 1 ms at 1 m/s (clusters.md, section 9)
-        let most_mm = if number(row, "ratio") == 1.0 { 1e-2 } else { 1.0 };
-        assert!(number(row, "max_mm") < most_mm && number(row, "momentum_error") < 1e-9, "{row}");
+        // a blow acts where and when the sides meet; it gives way by a little that depends on the step (clusters.md, sections 2 and 9)
+        assert!(number(row, "max_mm") < 1e-2 && number(row, "momentum_error") < 1e-9, "{row}");
     }
 }

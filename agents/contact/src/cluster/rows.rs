@@ -16,7 +16,7 @@ const COMPLIANCE_MAX: f64 = 1e-3;
 /// A compliance gives way by up to this many times the wanted velocity before it is made harder.
 const HARDEN_PAST: f64 = 2.0;
 /// The share of the yield of what lies by which a blow gives way: rebounds are lower by it.
-const BLOW_SHARE: f64 = 5e-3;
+const BLOW_SHARE: f64 = 2e-3;
 /// The least scale, 1/kg: a row between parts that cannot move has none, and gets no impulse.
 const SCALE_MIN: f64 = 1e-12;
 

@@ -15,6 +15,7 @@
 mod arms;
 mod blows;
 mod doubling;
+mod heap;
 mod joints;
 mod links;
 mod local;
@@ -38,6 +39,7 @@ use crate::law::Law;
 use blows::Rebounds;
 pub use doubling::StepDoubling;
 use glam::DVec3;
+use heap::Heap;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
@@ -155,6 +157,7 @@ pub struct ClusterStepper {
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     rebounds: Rebounds,
+    heap: Heap,
     /// The participant of each member of the problem.
     places: Vec<usize>,
     outside: Outside,
@@ -186,6 +189,7 @@ impl ClusterStepper {
             totals: Vec::new(),
             kept: Vec::new(),
             rebounds: Rebounds::default(),
+            heap: Heap::default(),
             places: Vec::new(),
             outside: Outside::default(),
             local: Default::default(),
@@ -280,9 +284,7 @@ impl ClusterStepper {
         for fine in 0..parts {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
-            self.search.find(scene, all, &self.progress, h_s);
-            self.rebounds.begin(self.macro_s, h_s, all.len());
-            self.rebounds.choose(&mut self.search, &self.progress, Judge::Foreseen);
+            let is_heap = self.find(scene, all, h_s);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(on, all, h_s, report)?;
@@ -290,9 +292,37 @@ impl ClusterStepper {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
+            if is_heap {
+                self.step_heap(all, h_s, report)?;
+            }
             self.end(all, h_s, threads)?;
+            self.heap.place(all);
         }
         Ok(true)
+    }
+
+    /// Finds where members may touch; whether they are a heap, whose contacts are not the problem's.
+    fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) -> bool {
+        let Self { search, heap, progress, rebounds, .. } = self;
+        rebounds.begin(self.macro_s, h_s, all.len());
+        if !heap.is_on() || !heap.stays(scene, all) {
+            search.find(scene, all, progress, h_s);
+            heap.begin(scene, all, search.contacts.len());
+        }
+        if heap.is_on() {
+            search.find_near(all, progress, h_s);
+        } else {
+            rebounds.choose(search, progress, Judge::Foreseen);
+        }
+        heap.is_on()
+    }
+
+    /// Steps a heap from the velocities that its members have without contact.
+    fn step_heap(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        let found = self.heap.step(all, &mut self.progress, h_s, &mut self.totals)?;
+        report.contacts = found.contacts as u32;
+        report.depth_m = report.depth_m.max(found.depth_m);
+        Ok(())
     }
 
     /// Gives shorter steps to members that the solution strains too far; whether there are any.

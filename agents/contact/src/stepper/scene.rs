@@ -81,6 +81,11 @@ impl ClusterScene {
         self.apart.binary_search(&pair).is_ok()
     }
 
+    /// Whether no body passes through any other or through a static solid.
+    pub(super) fn stops_all(&self) -> bool {
+        self.apart.is_empty() && self.passages.is_empty()
+    }
+
     /// The static solids, by their numbers.
     pub fn statics(&self) -> &[StaticSolid] {
         &self.statics

@@ -15,10 +15,12 @@ use boxes::Boxes;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, ContactSide, Place, ShapeKind, Touch};
-use sweep::{FAR_M, Meeting, Sweep, Sweeping};
+use sweep::{FAR_M, Meeting, Sought, Sweep, Sweeping};
 
 /// A place is taken up if its gap may close below this within the step, metres.
 const LOOK_M: f64 = 4e-4;
+/// Sides that are closer than this have met, metres.
+const MET_M: f64 = 1e-6;
 /// How many steps ahead bodies look for each other.
 const NEAR_STEPS: f64 = 2.0;
 
@@ -78,6 +80,15 @@ enum Against<'a> {
 struct Pair<'a> {
     member: usize,
     against: Against<'a>,
+}
+
+/// How far a pair is searched.
+#[derive(Clone, Copy)]
+struct Reaching {
+    /// From where it is, metres.
+    reach_m: f64,
+    /// On its way, at the moment at which it is this near; `None` for a pair that is searched where it is.
+    swept_m: Option<f64>,
 }
 
 /// Places found of a pair.
@@ -160,6 +171,15 @@ pub(super) enum Judge {
 impl Search {
     /// Finds all places of a fine step of `h_s` seconds.
     pub fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
+        self.find_near(all, progress, h_s);
+        let near = std::mem::take(&mut self.near);
+        self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
+        self.near = near;
+        self.sort();
+    }
+
+    /// Finds pairs that are near each other, and no places.
+    pub fn find_near(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
         self.contacts.clear();
         self.owners.clear();
         self.near.clear();
@@ -170,10 +190,6 @@ impl Search {
         });
         self.boxes.pairs(NEAR_STEPS * h_s, &mut self.near);
         self.near.retain(|&[a, b]| !(all[a].member.is_remote() && all[b].member.is_remote()));
-        let near = std::mem::take(&mut self.near);
-        self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
-        self.near = near;
-        self.sort();
     }
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
@@ -234,20 +250,26 @@ impl Search {
         let reach_m = LOOK_M + way_m;
         self.touches.clear();
         let meets = reach.skin.grown(reach_m).meets(bounds);
-        let at = if meets { self.touch(round, pair, reach_m) } else { Meeting::default() };
+        // a blow acts where the sides meet, what goes far meets what is not near yet
+        let swept_m = match restitution([skin.form, form]) > 0.0 && way_m > 10.0 * MET_M {
+            true => Some(MET_M),
+            false => (reach_m > FAR_M).then_some(LOOK_M),
+        };
+        let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
         let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), meets_s: None };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
 
     /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
-    fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reach_m: f64) -> Meeting {
+    fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reaching: Reaching) -> Meeting {
+        let Reaching { reach_m, swept_m } = reaching;
         let Self { touches: into, scratch, sweep, .. } = self;
         let body = &*round.all[pair.member].member;
         let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
         let Some(skin) = body.skin() else { return now };
-        if reach_m > FAR_M {
-            match sweep.meet(round, pair, scratch, into) {
+        if let Some(reach_m) = swept_m {
+            match sweep.meet(round, Sought { pair, reach_m }, scratch, into) {
                 Sweeping::Meets(meeting) if meeting.after_s > 0.0 => return meeting,
                 Sweeping::Passes => return end,
                 Sweeping::Meets(_) | Sweeping::Unknown => {}
@@ -411,8 +433,13 @@ fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bo
     })
 }
 
-fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+/// The restitution of a pair: the larger of both; what bends gives back what it has stored.
+fn restitution(skins: [&CollisionShape; 2]) -> f64 {
     let bends = skins.iter().any(|skin| matches!(skin.kind, ShapeKind::Chain | ShapeKind::Surface(_)));
+    if bends { 0.0 } else { skins[0].restitution.max(skins[1].restitution) }
+}
+
+fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
     let Facing { sides, led_m_s } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
@@ -421,9 +448,9 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
-        // a pair takes the geometric mean of both frictions, and the larger restitution; what bends gives back what it has stored
+        // a pair takes the geometric mean of both frictions
         friction: (skins[0].friction * skins[1].friction).sqrt(),
-        restitution: if bends { 0.0 } else { skins[0].restitution.max(skins[1].restitution) },
+        restitution: restitution(skins),
         approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
         surface_m_s,
         owed_slip_m: DVec3::ZERO,

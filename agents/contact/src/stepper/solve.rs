@@ -37,7 +37,7 @@ impl ClusterStepper {
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
-            let Self { solver, search, ties, joints, progress, depth_m, rebounds, .. } = &mut *self;
+            let Self { solver, search, ties, joints, progress, depth_m, rebounds, heap, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -50,7 +50,7 @@ impl ClusterStepper {
             let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
-            let passed = round < ROUNDS_MAX && search.add_passed(&look);
+            let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
             if round == ROUNDS_MAX || !passed && joined {

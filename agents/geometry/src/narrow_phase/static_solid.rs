@@ -79,6 +79,18 @@ impl StaticSolid {
         Ok(Self { form, position: *position, rotation, mesh, bounds })
     }
 
+    /// Where the origin of its axes is, metres.
+    #[must_use]
+    pub const fn position(&self) -> DVec3 {
+        self.position
+    }
+
+    /// From its axes to the world's.
+    #[must_use]
+    pub const fn rotation(&self) -> DQuat {
+        self.rotation
+    }
+
     /// The box around it; that of a plane has no bounds.
     #[must_use]
     pub const fn bounds(&self) -> Aabb {

@@ -5,6 +5,7 @@ mod bodies;
 mod errors;
 mod grasp;
 mod hands;
+mod heaps;
 mod joints;
 mod links;
 mod own_model;

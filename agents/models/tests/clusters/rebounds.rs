@@ -180,8 +180,8 @@ fn a_heap_of_boxes_that_rebound_takes_one_step_a_macro_step_and_comes_to_rest() 
     let mut table = Table::among(boxes.collect(), &[floor(0.5)]);
     let found = table.play(3.0);
     assert_eq!(found.steps, 180);
-    // all of it falls by 0.1 m: 1.3 J
-    assert!(found.gain_j < 2e-3, "{found:?}");
+    // half a hundredth of what falls, 1.3 J: what came too deep for a moment is pushed out
+    assert!(found.gain_j < 6.5e-3, "{found:?}");
     assert!(found.rest_m < 5e-5 && found.lowest_m > 0.9 * half_m, "{found:?}");
     assert!((found.weight - 1.0).abs() < 1e-2, "{found:?}");
 }

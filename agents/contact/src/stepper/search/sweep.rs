@@ -3,7 +3,7 @@
 //! In: a pair with the velocities at which its places move. Out: when it meets, and its places at that moment. Never here: what is near from
 //! the start.
 
-use super::{Against, LOOK_M, Pair, Round};
+use super::{Against, Pair, Round};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};
 use metachron_geometry::{ShapePose, Touch};
@@ -26,6 +26,13 @@ pub(super) struct Meeting {
     pub ways: [DVec3; 2],
 }
 
+/// A pair, and the distance at which it meets, metres.
+#[derive(Clone, Copy)]
+pub(super) struct Sought<'a> {
+    pub pair: Pair<'a>,
+    pub reach_m: f64,
+}
+
 /// What a sweep found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Sweeping {
@@ -42,13 +49,14 @@ impl Sweep {
     pub fn meet(
         &mut self,
         round: &Round<'_, '_>,
-        pair: Pair<'_>,
+        sought: Sought<'_>,
         scratch: &mut NarrowPhaseScratch,
         into: &mut Vec<Touch>,
     ) -> Sweeping {
         into.clear();
+        let Sought { pair, reach_m } = sought;
         let [first, second] = &mut self.nodes;
-        let reach = SweptReach { reach_m: LOOK_M, around_m: FAR_M };
+        let reach = SweptReach { reach_m, around_m: FAR_M };
         let Some(here) = swept(round, pair.member, first) else { return Sweeping::Unknown };
         let (share, their_way) = match pair.against {
             Against::Own => return Sweeping::Unknown,

@@ -1,0 +1,326 @@
+//! A heap: rigid bodies that touch in more places than one problem is solved for in time, stepped by rapier3d.
+//!
+//! In: members with the velocities that they would have without contact. Out: those that they have with it, where they are then, what each
+//! pair gave. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
+//! Never here: bodies that bend, rows of springs and joints: these are solved before, as if nothing touched.
+//! Theory: docs/theory/clusters.md, section 9.
+
+use super::progress::Progress;
+use super::{ClusterScene, PairTotal, Participant, Partner, Role, add_up};
+use glam::{DMat3, DQuat, DVec3};
+use metachron_core::{AgentId, StepError};
+use metachron_geometry::narrow_phase::StaticSolid;
+use metachron_geometry::{ShapeKind, ShapePose, Solid, SolidShape};
+use rapier3d::dynamics::{
+    CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
+    SpringCoefficients,
+};
+use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ContactPair, SharedShape};
+use rapier3d::parry::math::{Pose, Rotation, Vec3};
+use rapier3d::pipeline::PhysicsWorld;
+
+/// Rigid bodies become a heap above so many contacts, and are one until they have fewer than the second.
+const CONTACTS_MIN: usize = 1000;
+const CONTACTS_LEFT: usize = 800;
+/// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
+const LONGEST_S: f64 = 1.0 / 240.0;
+/// By how many radii of its body a contact is foreseen.
+const FORESEEN_RADII: f64 = 2.0;
+/// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
+const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 300.0, damping_ratio: 10.0 };
+
+/// The heap of a cluster, if it is one.
+#[derive(Default)]
+pub(super) struct Heap {
+    world: Option<Box<World>>,
+}
+
+/// What a step of a heap was.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct HeapReport {
+    pub contacts: usize,
+    pub depth_m: f64,
+}
+
+/// The bodies of a heap in rapier3d.
+struct World {
+    physics: PhysicsWorld,
+    /// By rising numbers.
+    bodies: Vec<Known>,
+    contacts: usize,
+}
+
+/// A body, with its inertia in its own axes, kg·m².
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    id: AgentId,
+    handle: RigidBodyHandle,
+    mass_kg: f64,
+    inertia: DMat3,
+}
+
+/// A place of a rigid member: its centre of mass and its rotation.
+struct Placed<'a> {
+    shape: &'a SolidShape,
+    centre_m: DVec3,
+    rotation: DQuat,
+}
+
+impl Heap {
+    /// Whether the cluster is one.
+    pub fn is_on(&self) -> bool {
+        self.world.is_some()
+    }
+
+    /// Makes these members a heap if they touch in so many places.
+    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], contacts: usize) {
+        if contacts > CONTACTS_MIN && fits(scene, all) {
+            self.world = Some(Box::new(World::new(scene)));
+        }
+    }
+
+    /// Whether the heap goes on with these members; one that does not is none any more.
+    pub fn stays(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
+        self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT && fits(scene, all));
+        self.is_on()
+    }
+
+    /// Steps the members by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it. What
+    /// pairs gave is added to `totals`.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where rapier3d has no finite answer.
+    pub fn step(
+        &mut self,
+        all: &[Participant<'_>],
+        progress: &mut [Progress],
+        h_s: f64,
+        totals: &mut Vec<PairTotal>,
+    ) -> Result<HeapReport, StepError> {
+        let Some(world) = &mut self.world else { return Ok(HeapReport::default()) };
+        world.take(all, progress, h_s);
+        let steps = (h_s / LONGEST_S).ceil().max(1.0);
+        world.physics.integration_parameters.dt = (h_s / steps) as f32;
+        (0..steps as u32).for_each(|_| world.physics.step());
+        for (known, state) in world.bodies.iter().zip(progress) {
+            let body = &world.physics.bodies[known.handle];
+            let found = [body.linvel().as_dvec3(), body.angvel().as_dvec3()];
+            if !(found.iter().all(|v| v.is_finite()) && body.position().translation.is_finite()) {
+                let what = "the heap has no finite answer".to_owned();
+                return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
+            }
+            state.before.copy_from_slice(&found);
+            state.hold();
+        }
+        let report = world.read(all, totals);
+        world.contacts = report.contacts;
+        Ok(report)
+    }
+
+    /// Moves members, whose steps have ended, to where rapier3d has them.
+    pub fn place(&self, all: &mut [Participant<'_>]) {
+        let Some(world) = &self.world else { return };
+        for (known, one) in world.bodies.iter().zip(all) {
+            let Some(Placed { shape, centre_m, rotation }) = placed(one) else { continue };
+            let pose = world.physics.bodies[known.handle].position();
+            let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
+            let goal = DQuat::from_xyzw(x, y, z, w).normalize();
+            let way_m = pose.translation.as_dvec3() + goal * shape.com_local - centre_m;
+            let turn = (goal * rotation.inverse()).to_scaled_axis();
+            let axes = DMat3::from_quat(rotation);
+            one.member.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]);
+        }
+    }
+}
+
+/// Whether rapier3d can step these members: rigid bodies that touch all that they meet.
+fn fits(scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
+    let is_rigid = |one: &Participant<'_>| one.member.role() == Role::Rigid && !one.member.is_remote();
+    scene.stops_all() && all.iter().all(|one| is_rigid(one) && one.laws.is_empty() && placed(one).is_some())
+}
+
+impl World {
+    fn new(scene: &ClusterScene) -> Self {
+        let mut physics = PhysicsWorld { gravity: Vec3::ZERO, ..PhysicsWorld::default() };
+        physics.integration_parameters = IntegrationParameters {
+            num_solver_iterations: 4,
+            num_internal_stabilization_iterations: 2,
+            contact_softness: STIFF,
+            static_contact_softness: STIFF,
+            friction_model: FrictionModel::Simplified,
+            normalized_max_linear_velocity: f32::MAX,
+            ..IntegrationParameters::default()
+        };
+        for (number, solid) in (0..).zip(scene.statics()) {
+            if let Some(collider) = of_static(solid) {
+                physics.insert_collider(collider.user_data(Side::Static(number).name()), None);
+            }
+        }
+        Self { physics, bodies: Vec::new(), contacts: usize::MAX }
+    }
+
+    /// Takes up the members as they are, and what changes their velocities in the step.
+    fn take(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
+        let Self { physics, bodies, .. } = self;
+        bodies.retain(|known| {
+            let stays = all.binary_search_by_key(&known.id, |one| one.id).is_ok();
+            if !stays {
+                physics.remove_body(known.handle);
+            }
+            stays
+        });
+        let mut largest_m = 0.0_f64;
+        for (one, state) in all.iter().zip(progress) {
+            let Some(body) = placed(one) else { continue };
+            largest_m = largest_m.max(body.shape.radius_m);
+            let at = match bodies.binary_search_by_key(&one.id, |known| known.id) {
+                Ok(at) => at,
+                Err(at) => {
+                    bodies.insert(at, insert(physics, one, &body));
+                    at
+                }
+            };
+            let known = bodies[at];
+            let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
+            let now = [&state.start[0], &state.start[1]].map(|v| v.as_vec3());
+            // what is set anew loses what the last step knew
+            let pose = body.pose();
+            if *inside.position() != pose {
+                inside.set_position(pose, true);
+            }
+            if [inside.linvel(), inside.angvel()] != now {
+                inside.set_linvel(now[0], true);
+                inside.set_angvel(now[1], true);
+            }
+            inside.reset_forces(true);
+            inside.reset_torques(true);
+            inside.add_force(((state.before[0] - state.start[0]) * (known.mass_kg / h_s)).as_vec3(), true);
+            let axes = DMat3::from_quat(body.rotation);
+            let spun = axes * known.inertia * axes.transpose() * (state.before[1] - state.start[1]);
+            inside.add_torque((spun / h_s).as_vec3(), true);
+        }
+        physics.integration_parameters.length_unit = largest_m as f32;
+    }
+
+    /// What pairs gave in the last step.
+    fn read(&self, all: &[Participant<'_>], totals: &mut Vec<PairTotal>) -> HeapReport {
+        let mut report = HeapReport::default();
+        for pair in self.physics.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()) {
+            let Some(sides) = self.sides(pair) else { continue };
+            let member = |side: Side| match side {
+                Side::Body(id) => all.binary_search_by_key(&id, |one| one.id).ok(),
+                Side::Static(_) => None,
+            };
+            let [Some(first), second] = sides.map(member) else { continue };
+            let partner = match (sides[1], second) {
+                (Side::Static(number), _) => Partner::Static(number),
+                (Side::Body(id), Some(_)) => Partner::Agent(id),
+                (Side::Body(_), None) => continue,
+            };
+            for manifold in pair.manifolds() {
+                // from the first collider of the pair to the second
+                let away = manifold.data.normal.as_dvec3();
+                let is_turned = self.side(pair.collider1) != Some(sides[0]);
+                let towards_member = if is_turned { away } else { -away };
+                for point in &manifold.points {
+                    report.contacts += 1;
+                    let depth_m = f64::from(-point.dist).max(0.0);
+                    report.depth_m = report.depth_m.max(depth_m);
+                    if point.data.impulse > 0.0 {
+                        let impulse_n_s = towards_member * f64::from(point.data.impulse);
+                        add_up(totals, first, partner, impulse_n_s, depth_m);
+                    }
+                }
+            }
+        }
+        report
+    }
+
+    /// The sides of a pair: that of the lower number, then its partner.
+    fn sides(&self, pair: &ContactPair) -> Option<[Side; 2]> {
+        let mut sides = [self.side(pair.collider1)?, self.side(pair.collider2)?];
+        sides.sort_unstable();
+        Some(sides)
+    }
+
+    fn side(&self, collider: ColliderHandle) -> Option<Side> {
+        Some(Side::named(self.physics.colliders.get(collider)?.user_data))
+    }
+}
+
+/// A side of a contact in rapier3d; bodies come before static solids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Side {
+    Body(AgentId),
+    Static(u32),
+}
+
+impl Side {
+    fn name(self) -> u128 {
+        match self {
+            Self::Body(AgentId(id)) => u128::from(id),
+            Self::Static(number) => 1 << 32 | u128::from(number),
+        }
+    }
+
+    fn named(name: u128) -> Self {
+        let number = name as u32;
+        if name >> 32 == 0 { Self::Body(AgentId(number)) } else { Self::Static(number) }
+    }
+}
+
+impl Placed<'_> {
+    /// Where its axes are.
+    fn pose(&self) -> Pose {
+        pose(self.centre_m - self.rotation * self.shape.com_local, self.rotation)
+    }
+}
+
+/// The place of a rigid member; `None` of one whose skin is no solid.
+fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
+    let skin = one.member.skin()?;
+    let (ShapeKind::Solid(shape), ShapePose::Solid { position, rotation }) = (&skin.form.kind, skin.view) else {
+        return None;
+    };
+    Some(Placed { shape, centre_m: position, rotation })
+}
+
+fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>) -> Known {
+    let [mass, inertia] = [0, 1].map(|block| one.member.blocks()[block].value);
+    let (mass_kg, axes) = (mass.x_axis.x, DMat3::from_quat(body.rotation));
+    let inertia = axes.transpose() * inertia * axes;
+    let com = body.shape.com_local.as_vec3();
+    let matter = MassProperties::with_inertia_matrix(com, mass_kg as f32, inertia.as_mat3());
+    let builder = RigidBodyBuilder::dynamic()
+        .pose(body.pose())
+        .can_sleep(false)
+        .soft_ccd_prediction((FORESEEN_RADII * body.shape.radius_m) as f32)
+        .allow_fast_rotation(true)
+        .gyroscopic_forces_enabled(true);
+    let form = one.member.skin().map(|skin| (skin.form.friction, skin.form.restitution)).unwrap_or_default();
+    let collider = skin(body.shape.shape.clone(), form.0, form.1).mass_properties(matter);
+    let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
+    Known { id: one.id, handle, mass_kg, inertia }
+}
+
+/// A static solid; `None` of one that is no solid.
+fn of_static(solid: &StaticSolid) -> Option<ColliderBuilder> {
+    let ShapeKind::Solid(SolidShape { solid: kind, shape, .. }) = &solid.form.kind else { return None };
+    let shape = if matches!(kind, Solid::Plane) { SharedShape::halfspace(Vec3::Z) } else { shape.clone() };
+    let at = pose(solid.position(), solid.rotation());
+    Some(skin(shape, solid.form.friction, solid.form.restitution).position(at))
+}
+
+/// A shape with its skin: a pair takes the geometric mean of both frictions, and the larger restitution.
+fn skin(shape: SharedShape, friction: f64, restitution: f64) -> ColliderBuilder {
+    ColliderBuilder::new(shape)
+        .friction(friction.sqrt() as f32)
+        .friction_combine_rule(CoefficientCombineRule::Multiply)
+        .restitution(restitution as f32)
+        .restitution_combine_rule(CoefficientCombineRule::Max)
+}
+
+fn pose(position: DVec3, rotation: DQuat) -> Pose {
+    let turned = rotation.as_quat();
+    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(turned.x, turned.y, turned.z, turned.w))
+}
