@@ -287,7 +287,6 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
         impulse_n_s: coupling.impulse_n_s,
         in_flight_n_s: coupling.in_flight_n_s,
         inverse_mass_per_kg: coupling.inverse_mass_per_kg,
-        tank_j: coupling.tank_j,
         penetration_m: coupling.penetration_m,
         penetration_max_m: coupling.penetration_max_m,
         force_n: coupling.force_n,

@@ -50,7 +50,6 @@ pub mod law;
 pub mod laws;
 pub mod push_out;
 pub mod stepper;
-pub mod tank;
 
 pub use agent::{Agent, AnchorSpring, Neighbour, StepContext};
 pub use asynchronous::acknowledged;

@@ -53,8 +53,6 @@ pub struct PairState {
     /// How easily the owner and the other side give way along the normal at the contact that bears most, 1/kg, ≥ 0, when they last
     /// pressed on each other (a few steps ago at most); the sum is W of that contact. `None` where no contact was solved between the two.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// What is left in the energy tank, joules; `None` where the law keeps none.
-    pub tank_j: Option<f64>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
     pub parasitic_kg: f64,
     /// What this end of a line sends; with wave variables both sides publish the pair.
@@ -74,7 +72,6 @@ impl PairState {
             impulse_n_s: 0.0,
             in_flight_n_s: 0.0,
             inverse_mass_per_kg: None,
-            tank_j: None,
             parasitic_kg: 0.0,
             wave: None,
         }

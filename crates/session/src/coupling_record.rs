@@ -41,8 +41,6 @@ pub struct Coupling {
     /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
     /// other; `None` where none are published: in clusters, and for links, penalties and lines.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// Energy left in the energy tank, joules; `None` where the law has none.
-    pub tank_j: Option<f64>,
     /// Mass added by the law, kilograms.
     pub parasitic_kg: f64,
 }
@@ -75,7 +73,6 @@ impl Coupling {
             momentum_error: None,
             compared: false,
             inverse_mass_per_kg: None,
-            tank_j: None,
             parasitic_kg: 0.0,
         }
     }
@@ -89,7 +86,6 @@ impl Coupling {
         self.impulse_n_s = state.impulse_n_s;
         self.in_flight_n_s = state.in_flight_n_s;
         self.inverse_mass_per_kg = state.inverse_mass_per_kg;
-        self.tank_j = state.tank_j;
         self.parasitic_kg = state.parasitic_kg;
     }
 

@@ -149,7 +149,6 @@ fn fill_couplings(status: &mut Status, session: &Session) {
             force_n: pair.force_n,
             penetration_m: pair.penetration_m,
             inverse_mass_per_kg: pair.inverse_mass_per_kg,
-            tank_j: pair.tank_j,
         }));
     }
 }

@@ -219,6 +219,9 @@ impl Pairs {
             {
                 (state.contacts, state.penetration_m) = (total.contacts, total.depth_m);
                 state.force_n = total.impulse_n_s.length() / dt_s;
+                if total.most_n_s > 0.0 {
+                    state.inverse_mass_per_kg = Some(total.inverse_mass_per_kg);
+                }
             }
         }
         for state in states.iter_mut().filter(|state| state.kind == PairKind::Ledger) {

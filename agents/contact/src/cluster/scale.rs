@@ -6,7 +6,7 @@
 use super::gradients::Task;
 use super::members::Members;
 use super::problem::Member;
-use super::rows::Rows;
+use super::rows::{Rows, Term};
 use super::system::System;
 use glam::{DMat3, DVec3};
 
@@ -59,6 +59,18 @@ impl Scales {
                 terms.map(|t| self.samples[members.owners[t.block]].ratio() * estimate(members, &t.map, t.block)).sum();
             rows.set_scale(row, trace);
         }
+    }
+
+    /// How easily each side of a row gives way along the first axis of its frame, 1/kg: that of the member `first`, and all others.
+    pub fn along_normal(&self, members: &Members, terms: &[Term], first: Option<usize>) -> [f64; 2] {
+        let mut found = [0.0; 2];
+        for term in terms {
+            let owner = members.owners[term.block];
+            let given = term.map.mul_transpose_vec3(DVec3::X);
+            let gives = self.samples[owner].ratio() * given.dot(members.mobilities[term.block] * given);
+            found[usize::from(Some(owner) != first)] += gives;
+        }
+        found
     }
 
     /// Chooses rows of each member that lie evenly among all of its rows.

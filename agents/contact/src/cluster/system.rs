@@ -135,6 +135,11 @@ impl System {
         if self.form == StepForm::Iterative { self.gradients.products } else { 0 }
     }
 
+    /// How easily each side of a row gives way along the first axis of its frame, 1/kg: that of the member `first`, and all others.
+    pub fn along_normal(&self, rows: &Rows, row: usize, first: Option<usize>) -> [f64; 2] {
+        self.scales.along_normal(&self.members, rows.terms(row), first)
+    }
+
     /// The scale of each row (eq. 6).
     pub fn scale_rows(&mut self, members: &[Member<'_>], rows: &mut Rows) {
         let mut scales = std::mem::take(&mut self.scales);

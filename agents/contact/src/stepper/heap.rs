@@ -6,7 +6,7 @@
 //! Theory: docs/theory/clusters.md, section 9.
 
 use super::progress::Progress;
-use super::{ClusterScene, PairTotal, Participant, Partner, Role, add_up};
+use super::{ClusterScene, PairTotal, Participant, Partner, Role, total_of};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, StepError};
 use metachron_geometry::narrow_phase::StaticSolid;
@@ -228,7 +228,7 @@ impl World {
                     report.depth_m = report.depth_m.max(depth_m);
                     if point.data.impulse > 0.0 {
                         let impulse_n_s = towards_member * f64::from(point.data.impulse);
-                        add_up(totals, first, partner, impulse_n_s, depth_m);
+                        total_of(totals, first, partner).add(impulse_n_s, depth_m);
                     }
                 }
             }

@@ -142,6 +142,10 @@ pub struct PairTotal {
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
+    /// The most that one contact gave, N·s; zero for links and in heaps.
+    pub most_n_s: f64,
+    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
+    pub inverse_mass_per_kg: [f64; 2],
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
@@ -429,14 +433,19 @@ impl ClusterStepper {
             all[owner.member].memory.pair(owner.partner).next.push(place);
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
-                add_up(&mut self.totals, owner.member, owner.partner, impulse, -contact.gap_m);
+                let total = total_of(&mut self.totals, owner.member, owner.partner);
+                total.add(impulse, -contact.gap_m);
+                if impulse.length() > total.most_n_s {
+                    total.most_n_s = impulse.length();
+                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
+                }
             }
         }
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
             outside.note_line(owner, *impulse);
             if let Partner::Link(_) = owner.partner {
-                add_up(&mut self.totals, owner.member, owner.partner, *impulse, 0.0);
+                total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
             }
             let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
@@ -482,16 +491,23 @@ fn times(strain: f64) -> u32 {
     times
 }
 
-/// Adds the impulse of a contact or a link's row to the total of its pair.
-fn add_up(totals: &mut Vec<PairTotal>, member: usize, partner: Partner, impulse_n_s: DVec3, depth_m: f64) {
+impl PairTotal {
+    /// Adds the impulse of a contact or of a link's row.
+    fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
+        self.impulse_n_s += impulse_n_s;
+        self.depth_m = self.depth_m.max(depth_m);
+        self.contacts += 1;
+    }
+}
+
+/// The total of a pair, made where it is new.
+fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
     let order = |total: &PairTotal| (total.member, total.partner);
     let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
-        let none = PairTotal { member, partner, impulse_n_s: DVec3::ZERO, contacts: 0, depth_m: 0.0 };
-        totals.insert(at, none);
+        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
+        let (most_n_s, inverse_mass_per_kg) = (0.0, [0.0; 2]);
+        totals.insert(at, PairTotal { member, partner, impulse_n_s, contacts, depth_m, most_n_s, inverse_mass_per_kg });
         at
     });
-    let total = &mut totals[at];
-    total.impulse_n_s += impulse_n_s;
-    total.depth_m = total.depth_m.max(depth_m);
-    total.contacts += 1;
+    &mut totals[at]
 }

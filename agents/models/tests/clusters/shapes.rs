@@ -1,9 +1,10 @@
 //! Rigid bodies of every shape on planes, boxes and meshes: where they come to rest, how they roll, where they start inside.
 
-use crate::bodies::rigid;
+use crate::bodies::{block, rigid};
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
-use metachron_core::Body;
+use metachron_contact::stepper::Partner;
+use metachron_core::{AgentId, Body};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use std::sync::Arc;
@@ -148,4 +149,18 @@ fn cubes_come_to_rest_in_a_trough() {
     let findings = table.play(4.0);
     assert!(findings.landing_m < 1e-3 && findings.rest_m < 5e-5, "{findings:?}");
     assert!(findings.gain_j < 1e-3 && findings.lowest_m > 0.0, "{findings:?}");
+}
+
+#[test]
+fn a_pair_tells_how_easily_both_give_way() {
+    // a ball on the middle of a box that stands on the floor: both move along the line through their middles
+    let ball = rigid(Solid::Ball { radius_m: 0.05 }, DVec3::Z * 0.25, 0.5);
+    let ball = placed(RigidBody::new(ball).unwrap(), false);
+    let mut table = Table::new(vec![ball, block(DVec3::Z * 0.1, DVec3::splat(0.1), 2.0, 0.0)]);
+    table.play(0.5);
+    let [ball, below] = table.inverse_mass_per_kg(0, Partner::Agent(AgentId(1)));
+    assert!((ball - 2.0).abs() < 1e-6 && (below - 0.5).abs() < 1e-3, "{ball} {below}");
+    // the box presses with its corners, of a cube of side a: 1/m + (r × n)·I⁻¹(r × n) = 1/m + (a²/2)/(m a²/6)
+    let [below, floor] = table.inverse_mass_per_kg(1, Partner::Static(0));
+    assert!((below - 0.5 * 4.0).abs() < 1e-2 && floor == 0.0, "{below} {floor}");
 }

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
-    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan, StepDoubling,
+    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, StepDoubling,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
@@ -222,6 +222,12 @@ impl Table {
         of_pair.map(|total| total.impulse_n_s.dot(axis)).sum::<f64>() / self.last_s
     }
 
+    /// How easily a body, the lower number of two, and its partner give way where they press most, 1/kg.
+    pub fn inverse_mass_per_kg(&self, body: usize, partner: Partner) -> [f64; 2] {
+        let of_pair = |total: &&PairTotal| total.member == body && total.partner == partner;
+        self.stepper.totals().iter().find(of_pair).map_or([f64::NAN; 2], |total| total.inverse_mass_per_kg)
+    }
+
     /// Where a material point is.
     pub fn place(&mut self, body: usize, anchor: Anchor) -> DVec3 {
         self.bodies[body].agent.member().unwrap().anchor(anchor).unwrap().position
@@ -230,7 +236,7 @@ impl Table {
     /// The upward impulse of the last macro step by the floor, or by what is held.
     fn borne_n_s(&self) -> f64 {
         let holds = self.bodies.iter().any(|body| body.held);
-        let of = |total: &metachron_contact::stepper::PairTotal| {
+        let of = |total: &PairTotal| {
             let mine = total.impulse_n_s.z;
             match total.partner {
                 Partner::Static(_) if !holds => mine,

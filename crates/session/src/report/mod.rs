@@ -177,8 +177,6 @@ pub struct CouplingReport {
     /// each other: the sum is the contact's W, its inverse the effective mass there. `None` in clusters, and where no contact was solved
     /// between the two.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// Energy left in the energy tank, joules; `None` where the law has none.
-    pub tank_j: Option<f64>,
     /// Overlap at the end of the run, metres.
     pub penetration_m: f64,
     /// Greatest overlap found in a frame, metres.
@@ -384,7 +382,6 @@ mod tests {
         "/couplings/0/force_n",
         "/couplings/0/momentum_error",
         "/couplings/0/inverse_mass_per_kg",
-        "/couplings/0/tank_j",
         "/couplings/0/penetration_m",
         "/overlaps/0/depth_m",
         "/moved/0/by_m",

@@ -1,4 +1,4 @@
-//! The list of couplings: the pair of agents, its law, its force, and the energy left in its tank.
+//! The list of couplings: the pair of agents, its law, its force, and how deep the two are in each other.
 //!
 //! In: the rows of a [`crate::ui::Status`]. Out: a section of the side panel. Never here: the choice of couplings.
 
@@ -9,10 +9,10 @@ use egui::{Grid, RichText, Ui};
 
 /// The columns and their tooltips.
 const COLUMNS: [(&str, &str); 4] = [
-    ("Pair", "Owner of the contact, and its peer"),
+    ("Pair", "The two agents"),
     ("Law", "Contact law"),
     ("Force", "Present contact, grasp or joint force"),
-    ("Tank", "Energy left before the coupling's push-out is turned off"),
+    ("Depth", "The deepest overlap"),
 ];
 
 /// More rows than this are counted, not listed.
@@ -35,24 +35,14 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
             if let Some(inverse_masses) = row.inverse_mass_per_kg {
                 force.on_hover_text(effective_mass_text(row, inverse_masses));
             }
-            let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
-            let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
-            let color = if low { palette.warn } else { palette.weak };
-            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(accessible_text(row));
+            let depth = RichText::new(text::metres(row.penetration_m)).monospace().size(11.5).color(palette.weak);
+            ui.label(depth).on_hover_text(format!("{} contacts", row.contacts));
             ui.end_row();
         }
     });
     if couplings.len() > ROWS_MAX {
         ui.label(RichText::new(format!("and {} more", couplings.len() - ROWS_MAX)).size(11.5).color(palette.weak));
     }
-}
-
-fn accessible_text(row: &CouplingRow) -> String {
-    format!(
-        "{} contacts, {} deep; energy left in the tank before the push-out is turned off",
-        row.contacts,
-        text::metres(row.penetration_m)
-    )
 }
 
 /// Tooltip: the effective mass of both at the contact with the largest force.
@@ -82,12 +72,11 @@ mod tests {
             kind: "ledger",
             contacts: 1,
             force_n: 1.25,
-            penetration_m: 0.0,
+            penetration_m: 2e-3,
             inverse_mass_per_kg: None,
-            tank_j: Some(2.0),
         };
         let harness = Harness::new_ui(|ui| show(ui, std::slice::from_ref(&row)));
-        let cells = ["hose – floor", "ledger", "1.25 N", "2.00 J"];
+        let cells = ["hose – floor", "ledger", "1.25 N", &text::metres(2e-3)];
         for ((heading, _), cell) in COLUMNS.iter().zip(cells) {
             let (above, below) = (harness.get_by_label(heading).rect(), harness.get_by_label(cell).rect());
             assert!(above.bottom() <= below.top() && above.left() == below.left(), "{heading}: {above:?} {below:?}");
@@ -104,7 +93,6 @@ mod tests {
             force_n: 1.0,
             penetration_m: 0.0,
             inverse_mass_per_kg: None,
-            tank_j: None,
         };
         let tooltip = |pair| effective_mass_text(&row, pair);
         assert_eq!(

@@ -275,8 +275,6 @@ pub struct CouplingRow {
     pub penetration_m: f64,
     /// Inverse effective mass of each along the normal at the contact with the largest force, 1/kg, where a contact was solved.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// Energy left in its tank, joules, where it has one.
-    pub tank_j: Option<f64>,
 }
 
 /// Present activity of an agent.

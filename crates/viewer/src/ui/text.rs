@@ -30,20 +30,6 @@ pub fn metres(value: f64) -> String {
     }
 }
 
-/// An energy such as `3.20 mJ` or `1.50 J`.
-#[must_use]
-pub fn joules(value: f64) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    match value.abs() {
-        0.0 => "0 mJ".to_owned(),
-        size if size < 1e-3 => format!("{} µJ", figures(value * 1e6)),
-        size if size < 1.0 => format!("{} mJ", figures(value * 1e3)),
-        _ => format!("{} J", figures(value)),
-    }
-}
-
 /// A mass such as `3.20 g` or `1.50 kg`; an infinite one is that of a driven body.
 #[must_use]
 pub fn kilograms(value: f64) -> String {
