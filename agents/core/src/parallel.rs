@@ -22,12 +22,12 @@ impl ParallelFor for PlainLoop {
     }
 }
 
-/// A job of fewer blocks of three velocities is not divided: it takes less than some 50 µs, and to hand it over takes 10.
+/// What has fewer than two jobs of so many blocks of three velocities is not divided: one takes some 50 µs, and to hand it over takes 10.
 const JOB_MIN: usize = 64;
 
 /// Whether rounds of `size` blocks in all are worth more than one thread.
 #[must_use]
-pub const fn is_divided(size: usize) -> bool {
+pub const fn is_worth_dividing(size: usize) -> bool {
     size >= 2 * JOB_MIN
 }
 
@@ -43,7 +43,7 @@ pub fn for_each<A: Send, B: Send>(
 ) {
     let rounds = a.len().min(b.len());
     let total: usize = a[..rounds].iter().map(size).sum();
-    if rounds < 2 || !is_divided(total) {
+    if rounds < 2 || !is_worth_dividing(total) {
         a.iter_mut().zip(b).for_each(|(a, b)| visit(a, b));
         return;
     }
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_is_divided_into_like_jobs_and_a_small_one_is_not() {
+    fn a_list_is_worth_dividing_into_like_jobs_and_a_small_one_is_not() {
         let jobs = |sizes: &[usize]| {
             let scoped = Scoped { jobs: AtomicUsize::new(0) };
             squares(&scoped, sizes);

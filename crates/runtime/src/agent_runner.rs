@@ -198,7 +198,16 @@ impl AgentRunner {
 
     /// Accounts for a turn that took `wall` time of the caller, shared equally with the agents it leads.
     pub fn count(&mut self, wall: Duration) {
-        let Helped { waited, cpu } = self.cluster.as_mut().map_or_else(Helped::default, |seat| seat.take_helped());
+        let mut helped = Helped::default();
+        let mut take = |seat: Option<&mut Box<ClusterSeat>>| {
+            let Helped { waited, cpu } = seat.map_or_else(Helped::default, |seat| seat.take_helped());
+            helped.waited += waited;
+            helped.cpu += cpu;
+        };
+        take(self.cluster.as_mut());
+        // those that caught up with it have made turns of their own within its turn
+        self.led.each(|actor| take(actor.cluster.as_mut()));
+        let Helped { waited, cpu } = helped;
         let members = 1 + self.led.len() as u32;
         let own_ns = (wall.saturating_sub(waited) / members).as_nanos() as u64;
         let helpers_ns = (cpu / members).as_nanos() as u64;

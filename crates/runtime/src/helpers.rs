@@ -5,7 +5,7 @@
 
 use super::cpu::thread_time;
 use super::priority::Priority;
-use metachron_core::parallel::is_divided;
+use metachron_core::parallel::is_worth_dividing;
 use metachron_core::{ParallelFor, PlainLoop};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::cell::Cell;
@@ -78,7 +78,7 @@ impl Helpers {
         helped: &mut Helped,
         turn: impl FnOnce(&dyn ParallelFor) -> T + Send,
     ) -> T {
-        let is_shared = self.threads > 1 && is_divided(size);
+        let is_shared = self.threads > 1 && is_worth_dividing(size);
         let pool = is_shared.then(|| self.pool.get_or_init(|| self.start())).and_then(Option::as_ref);
         // the system may refuse threads
         let Some(pool) = pool else { return turn(&PlainLoop) };
@@ -103,13 +103,26 @@ impl Helpers {
 impl Turn {
     /// Runs `job`, which began on this thread, and accounts for the CPU time that it takes there.
     fn account<T>(&self, job: impl FnOnce() -> T) -> T {
-        let (from, before) = (thread_time(), ACCOUNTED_NS.get());
-        let made = job();
-        let took = thread_time().zip(from).map_or(Duration::ZERO, |(to, from)| to.saturating_sub(from));
+        let _account = Account { turn: self, from: thread_time(), before_ns: ACCOUNTED_NS.get() };
+        job()
+    }
+}
+
+/// A job that is accounted for when it ends, by a panic too.
+struct Account<'a> {
+    turn: &'a Turn,
+    /// On the thread's clock, and what jobs on the thread had accounted for, when it began.
+    from: Option<Duration>,
+    before_ns: u64,
+}
+
+impl Drop for Account<'_> {
+    fn drop(&mut self) {
+        let took = thread_time().zip(self.from).map_or(Duration::ZERO, |(to, from)| to.saturating_sub(from));
         let took_ns = took.as_nanos() as u64;
-        self.cpu_ns.fetch_add(took_ns.saturating_sub(ACCOUNTED_NS.get() - before), Relaxed);
-        ACCOUNTED_NS.set(before + took_ns);
-        made
+        let others_ns = ACCOUNTED_NS.get() - self.before_ns;
+        self.turn.cpu_ns.fetch_add(took_ns.saturating_sub(others_ns), Relaxed);
+        ACCOUNTED_NS.set(self.before_ns + took_ns);
     }
 }
 
@@ -152,7 +165,7 @@ mod tests {
                     let ms = helped.cpu.as_secs_f64() * 1e3;
                     // 16 parts of 2 ms; what a thread spends looking for work is not a multiple of it
                     assert!((32.0..64.0).contains(&ms), "{ms}");
-                    assert!(helped.waited > Duration::from_millis(4), "at best eight threads, but there are three");
+                    assert!(helped.waited > Duration::from_millis(4), "32 ms on three threads take more than 4 ms");
                 });
             }
         });

@@ -39,7 +39,7 @@ pub(super) struct Entries<'a> {
     chunk: usize,
 }
 
-/// Trees of fronts that cost less together are not divided: some 50 µs, in multiplications.
+/// Trees of fronts that cost less than two of these together are not divided: some 50 µs, in multiplications.
 const JOB_MIN: f64 = 2e5;
 /// An order made for an earlier structure is kept while its factor costs up to this many times as much as it did then.
 const KEEP_ORDER: f64 = 1.5;

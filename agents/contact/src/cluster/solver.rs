@@ -87,6 +87,8 @@ pub struct Solution {
     pub contacts_m_s: Vec<DVec3>,
     /// The velocity by which each contact gives way for an impulse, 1/kg: R of eq. 5.
     pub compliances_per_kg: Vec<f64>,
+    /// Whether each contact rebounds: those that would make energy do not, though the problem says so.
+    pub rebounds: Vec<bool>,
     /// What the solve took.
     pub report: Report,
     velocities: Vec<DVec3>,
@@ -269,6 +271,7 @@ impl Solver {
         solution.rows_n_s.clear();
         solution.contacts_m_s.clear();
         solution.compliances_per_kg.clear();
+        solution.rebounds.clear();
         for (k, row) in iterate.rows.rows.iter().enumerate() {
             let impulse = row.frame * iterate.state.lambda[k];
             if k >= problem.contacts.len() {
@@ -278,6 +281,7 @@ impl Solver {
             solution.contacts_n_s.push(impulse);
             solution.contacts_m_s.push(row.frame * (iterate.state.velocity[k] - row.bias));
             solution.compliances_per_kg.push(row.compliance);
+            solution.rebounds.push(row.calm.is_some());
         }
         solution.velocities.iter_mut().zip(&iterate.state.change).for_each(|(v, change)| *v += *change);
     }

@@ -66,7 +66,10 @@ impl Rebounds {
             let pair = (owner.member, owner.partner);
             for member in owner.movers(contact) {
                 let first = &mut self.first[member];
-                if self.known[member].is_none() && first.is_none_or(|first| after_s < first.meets_s) {
+                if after_s < self.step_s
+                    && self.known[member].is_none()
+                    && first.is_none_or(|first| after_s < first.meets_s)
+                {
                     *first = Some(First { meets_s: after_s, pair });
                 }
             }
@@ -84,8 +87,8 @@ impl Rebounds {
         let is_first = |member: usize| self.first[member].is_some_and(|first| first.pair == pair);
         let rebounds = meets_s < self.step_s && owner.movers(contact).all(is_first);
         if rebounds {
-            // it acts where the sides meet
-            contact.gap_m = 0.0;
+            // one that slows down on its way meets within the step all the same
+            contact.gap_m = contact.gap_m.min(contact.approach_m_s * self.step_s);
         } else {
             contact.restitution = 0.0;
         }
@@ -106,7 +109,7 @@ impl Rebounds {
     }
 }
 
-/// Adds to what each participant is carried by, N·s²: what blows gave, times the seconds since they acted (eq. 27).
+/// Adds to what each participant is carried by, N·s²: −τ Jᵀλ of each blow, that acts τ seconds into the step (eq. 27).
 pub(super) fn note_late(search: &Search, impulses_n_s: &[DVec3], progress: &mut [Progress]) {
     for ((contact, owner), impulse) in search.contacts.iter().zip(&search.owners).zip(impulses_n_s) {
         let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0 && *impulse != DVec3::ZERO) else {

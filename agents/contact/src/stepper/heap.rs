@@ -21,9 +21,11 @@ use rapier3d::pipeline::PhysicsWorld;
 
 /// Rigid bodies become a heap above so many contacts, and are one until they have fewer than the second.
 const CONTACTS_MIN: usize = 1000;
-const CONTACTS_LEFT: usize = 800;
+const CONTACTS_LEFT: usize = 500;
 /// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
 const LONGEST_S: f64 = 1.0 / 240.0;
+/// Nothing is farther from the origin or faster than this, metres, m/s and rad/s.
+const REACH_MAX: f32 = 1e6;
 /// By how many radii of its body a contact is foreseen.
 const FORESEEN_RADII: f64 = 2.0;
 /// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
@@ -48,6 +50,8 @@ struct World {
     /// By rising numbers.
     bodies: Vec<Known>,
     contacts: usize,
+    /// Storage: members that something touches.
+    touched: Vec<usize>,
 }
 
 /// A body, with its inertia in its own axes, kg·m².
@@ -57,6 +61,8 @@ struct Known {
     handle: RigidBodyHandle,
     mass_kg: f64,
     inertia: DMat3,
+    /// Whether anything has touched it in the step: what flies does so exactly, as its member says.
+    touched: bool,
 }
 
 /// A place of a rigid member: its centre of mass and its rotation.
@@ -79,8 +85,8 @@ impl Heap {
         }
     }
 
-    /// Whether the heap goes on with these members; one that does not is none any more.
-    pub fn stays(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
+    /// Goes on with these members as a heap where they still are one, and ends it where not; whether it goes on.
+    pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
         self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT && fits(scene, all));
         self.is_on()
     }
@@ -99,20 +105,24 @@ impl Heap {
     ) -> Result<HeapReport, StepError> {
         let Some(world) = &mut self.world else { return Ok(HeapReport::default()) };
         world.take(all, progress, h_s);
-        let steps = (h_s / LONGEST_S).ceil().max(1.0);
+        // spans are whole nanoseconds
+        let steps = (h_s / LONGEST_S - 1e-3).ceil().max(1.0);
         world.physics.integration_parameters.dt = (h_s / steps) as f32;
-        (0..steps as u32).for_each(|_| world.physics.step());
-        for (known, state) in world.bodies.iter().zip(progress) {
+        let mut report = HeapReport::default();
+        for _ in 0..steps as u32 {
+            world.physics.step();
+            report = world.read(all, totals, report.depth_m);
+        }
+        if !world.is_sound() {
+            self.world = None;
+            let what = "the heap has no finite answer".to_owned();
+            return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
+        }
+        for (known, state) in world.bodies.iter().zip(progress).filter(|(known, _)| known.touched) {
             let body = &world.physics.bodies[known.handle];
-            let found = [body.linvel().as_dvec3(), body.angvel().as_dvec3()];
-            if !(found.iter().all(|v| v.is_finite()) && body.position().translation.is_finite()) {
-                let what = "the heap has no finite answer".to_owned();
-                return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
-            }
-            state.before.copy_from_slice(&found);
+            state.before.copy_from_slice(&[body.linvel().as_dvec3(), body.angvel().as_dvec3()]);
             state.hold();
         }
-        let report = world.read(all, totals);
         world.contacts = report.contacts;
         Ok(report)
     }
@@ -120,7 +130,7 @@ impl Heap {
     /// Moves members, whose steps have ended, to where rapier3d has them.
     pub fn place(&self, all: &mut [Participant<'_>]) {
         let Some(world) = &self.world else { return };
-        for (known, one) in world.bodies.iter().zip(all) {
+        for (known, one) in world.bodies.iter().zip(all).filter(|(known, _)| known.touched) {
             let Some(Placed { shape, centre_m, rotation }) = placed(one) else { continue };
             let pose = world.physics.bodies[known.handle].position();
             let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
@@ -133,10 +143,12 @@ impl Heap {
     }
 }
 
-/// Whether rapier3d can step these members: rigid bodies that touch all that they meet.
+/// Whether rapier3d can step these members: rigid bodies of which none passes through another or through a static solid.
 fn fits(scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
+    let has = |id: AgentId| all.binary_search_by_key(&id, |one| one.id).is_ok();
     let is_rigid = |one: &Participant<'_>| one.member.role() == Role::Rigid && !one.member.is_remote();
-    scene.stops_all() && all.iter().all(|one| is_rigid(one) && one.laws.is_empty() && placed(one).is_some())
+    let is_free = |one: &Participant<'_>| !one.laws.iter().any(|(other, _)| has(*other));
+    all.iter().all(|one| is_rigid(one) && is_free(one) && placed(one).is_some()) && scene.stops_all_of(has)
 }
 
 impl World {
@@ -156,7 +168,7 @@ impl World {
                 physics.insert_collider(collider.user_data(Side::Static(number).name()), None);
             }
         }
-        Self { physics, bodies: Vec::new(), contacts: usize::MAX }
+        Self { physics, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new() }
     }
 
     /// Takes up the members as they are, and what changes their velocities in the step.
@@ -169,10 +181,10 @@ impl World {
             }
             stays
         });
-        let mut largest_m = 0.0_f64;
+        let mut smallest_m = f64::INFINITY;
         for (one, state) in all.iter().zip(progress) {
             let Some(body) = placed(one) else { continue };
-            largest_m = largest_m.max(body.shape.radius_m);
+            smallest_m = smallest_m.min(body.shape.radius_m);
             let at = match bodies.binary_search_by_key(&one.id, |known| known.id) {
                 Ok(at) => at,
                 Err(at) => {
@@ -180,10 +192,11 @@ impl World {
                     at
                 }
             };
+            bodies[at].touched = false;
             let known = bodies[at];
             let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
             let now = [&state.start[0], &state.start[1]].map(|v| v.as_vec3());
-            // what is set anew loses what the last step knew
+            // what is set anew is searched anew
             let pose = body.pose();
             if *inside.position() != pose {
                 inside.set_position(pose, true);
@@ -199,29 +212,42 @@ impl World {
             let spun = axes * known.inertia * axes.transpose() * (state.before[1] - state.start[1]);
             inside.add_torque((spun / h_s).as_vec3(), true);
         }
-        physics.integration_parameters.length_unit = largest_m as f32;
+        // the error that rapier3d allows is a share of it
+        physics.integration_parameters.length_unit = smallest_m as f32;
     }
 
-    /// What pairs gave in the last step.
-    fn read(&self, all: &[Participant<'_>], totals: &mut Vec<PairTotal>) -> HeapReport {
-        let mut report = HeapReport::default();
+    /// Whether all bodies are somewhere.
+    fn is_sound(&self) -> bool {
+        self.bodies.iter().all(|known| {
+            let body = &self.physics.bodies[known.handle];
+            let pose = body.position();
+            let place = [pose.translation, body.linvel(), body.angvel()];
+            pose.rotation.is_finite() && place.iter().all(|v| v.abs().max_element() <= REACH_MAX)
+        })
+    }
+
+    /// Adds what pairs gave in the last step, along the normals of their contacts.
+    fn read(&mut self, all: &[Participant<'_>], totals: &mut Vec<PairTotal>, depth_m: f64) -> HeapReport {
+        let mut report = HeapReport { contacts: 0, depth_m };
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.clear();
         for pair in self.physics.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()) {
-            let Some(sides) = self.sides(pair) else { continue };
+            let Some(sides @ [first_side, _]) = self.sides(pair) else { continue };
+            // normals point from the first collider of a pair to the second
+            let sign = if self.side(pair.collider1) == Some(first_side) { -1.0 } else { 1.0 };
             let member = |side: Side| match side {
                 Side::Body(id) => all.binary_search_by_key(&id, |one| one.id).ok(),
                 Side::Static(_) => None,
             };
             let [Some(first), second] = sides.map(member) else { continue };
+            touched.extend(std::iter::once(first).chain(second));
             let partner = match (sides[1], second) {
                 (Side::Static(number), _) => Partner::Static(number),
                 (Side::Body(id), Some(_)) => Partner::Agent(id),
                 (Side::Body(_), None) => continue,
             };
-            for manifold in pair.manifolds() {
-                // from the first collider of the pair to the second
-                let away = manifold.data.normal.as_dvec3();
-                let is_turned = self.side(pair.collider1) != Some(sides[0]);
-                let towards_member = if is_turned { away } else { -away };
+            for manifold in pair.solver_manifolds() {
+                let towards_member = manifold.data.normal.as_dvec3() * sign;
                 for point in &manifold.points {
                     report.contacts += 1;
                     let depth_m = f64::from(-point.dist).max(0.0);
@@ -233,6 +259,9 @@ impl World {
                 }
             }
         }
+        // bodies are in the order of the members
+        touched.iter().for_each(|&member| self.bodies[member].touched = true);
+        self.touched = touched;
         report
     }
 
@@ -296,14 +325,15 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>) 
         .can_sleep(false)
         .soft_ccd_prediction((FORESEEN_RADII * body.shape.radius_m) as f32)
         .allow_fast_rotation(true)
-        .gyroscopic_forces_enabled(true);
+        // the members' own flight, which is part of what changes their velocities, has the gyroscopic part
+        .gyroscopic_forces_enabled(false);
     let form = one.member.skin().map(|skin| (skin.form.friction, skin.form.restitution)).unwrap_or_default();
     let collider = skin(body.shape.shape.clone(), form.0, form.1).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
-    Known { id: one.id, handle, mass_kg, inertia }
+    Known { id: one.id, handle, mass_kg, inertia, touched: false }
 }
 
-/// A static solid; `None` of one that is no solid.
+/// A static solid; its form is always one.
 fn of_static(solid: &StaticSolid) -> Option<ColliderBuilder> {
     let ShapeKind::Solid(SolidShape { solid: kind, shape, .. }) = &solid.form.kind else { return None };
     let shape = if matches!(kind, Solid::Plane) { SharedShape::halfspace(Vec3::Z) } else { shape.clone() };

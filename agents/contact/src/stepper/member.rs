@@ -128,8 +128,8 @@ pub trait ClusterMember: Send {
         0.0
     }
 
-    /// Moves it to where late impulses on its blocks would have carried it, which are given times the seconds since they acted; its
-    /// velocities stay. A body whose flight is not its centre's alone stays where it is.
+    /// Moves it by A⁻¹ of these, N·s² and N·m·s²: impulses times the seconds for which they should have moved it longer; its velocities
+    /// stay. A body whose flight is not its centre's alone stays where it is.
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
         let _ = impulses_n_s2;
     }

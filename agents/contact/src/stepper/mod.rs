@@ -6,7 +6,7 @@
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close
+//! search    places that may close, which of them rebound, and when; or that the members are a heap, which rapier3d steps
 //! tie       springs, links, joints
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
@@ -220,8 +220,8 @@ impl ClusterStepper {
     /// them; the bits are the same on however many.
     ///
     /// # Errors
-    /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: those
-    /// that had not ended their step are as they were.
+    /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: all are
+    /// as they were.
     pub fn step(
         &mut self,
         scene: &ClusterScene,
@@ -237,8 +237,15 @@ impl ClusterStepper {
         self.foresee(all, self.macro_s, threads)?;
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
-        while !self.advance(On { scene, threads }, all, dt, &mut report)? {
-            self.go_back(all);
+        loop {
+            match self.advance(On { scene, threads }, all, dt, &mut report) {
+                Ok(true) => break,
+                Ok(false) => self.go_back(all),
+                Err(error) => {
+                    self.go_back(all);
+                    return Err(error);
+                }
+            }
         }
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
@@ -309,7 +316,7 @@ impl ClusterStepper {
     fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) -> bool {
         let Self { search, heap, progress, rebounds, .. } = self;
         rebounds.begin(self.macro_s, h_s, all.len());
-        if !heap.is_on() || !heap.stays(scene, all) {
+        if !heap.is_on() || !heap.go_on(scene, all) {
             search.find(scene, all, progress, h_s);
             heap.begin(scene, all, search.contacts.len());
         }

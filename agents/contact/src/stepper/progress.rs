@@ -42,7 +42,7 @@ pub(super) struct Progress {
     pub touched: bool,
     pub held: bool,
     pub bears: bool,
-    /// What blows gave each of its blocks since its step began, times the seconds since they acted, N·s²; empty for none.
+    /// What its blocks are to be carried by for blows that act later than its step begins, N·s² (eq. 27); empty for none.
     pub late: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
@@ -93,7 +93,7 @@ impl Progress {
         seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
     }
 
-    /// Finds how its place moves by the last solve, of a body whose flight is free of it where `flies`.
+    /// Finds at which velocity its place moves by the last solve: where it `flies` if nothing holds it, in the mean of the fine step.
     pub fn go(&mut self, flies: bool) {
         self.going.clone_from(&self.solved);
         if flies && !self.touched && !self.bears {
@@ -106,7 +106,7 @@ impl Progress {
         self.before.clone_from(&self.known);
     }
 
-    /// Takes the velocities `moved` at which its place moves with the impulses found (eq. 25).
+    /// Takes the velocities at which its place moves with the impulses found (eq. 25).
     pub fn take(&mut self) {
         let p = f64::from(self.part);
         for (at, moved) in self.solved.iter().enumerate() {

@@ -81,9 +81,10 @@ impl ClusterScene {
         self.apart.binary_search(&pair).is_ok()
     }
 
-    /// Whether no body passes through any other or through a static solid.
-    pub(super) fn stops_all(&self) -> bool {
-        self.apart.is_empty() && self.passages.is_empty()
+    /// Whether none of the bodies that `has` knows passes through another of them or through a static solid.
+    pub(super) fn stops_all_of(&self, has: impl Fn(AgentId) -> bool) -> bool {
+        let apart = self.apart.iter().any(|pair| pair.iter().all(|id| has(*id)));
+        !(apart || self.passages.iter().any(|passage| has(passage.body)))
     }
 
     /// The static solids, by their numbers.

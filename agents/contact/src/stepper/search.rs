@@ -251,10 +251,9 @@ impl Search {
         self.touches.clear();
         let meets = reach.skin.grown(reach_m).meets(bounds);
         // a blow acts where the sides meet, what goes far meets what is not near yet
-        let swept_m = match restitution([skin.form, form]) > 0.0 && way_m > 10.0 * MET_M {
-            true => Some(MET_M),
-            false => (reach_m > FAR_M).then_some(LOOK_M),
-        };
+        let rebounds = restitution([skin.form, form]) > 0.0 && way_m > 10.0 * MET_M;
+        let far_m = (reach_m > FAR_M).then_some(LOOK_M);
+        let swept_m = if rebounds { Some(MET_M) } else { far_m };
         let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
         let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), meets_s: None };
@@ -315,8 +314,9 @@ impl Search {
                     Err(_) => ends_m < 0.0,
                     // on its way it meets another place than the one it was kept from
                     Ok(at) if swept && ends_m < -LOOK_M => {
-                        let warm_n_s = contacts[at].warm_n_s;
-                        contacts[at] = Contact { warm_n_s, ..contact(&touch, &facing, skins, round.progress) };
+                        let Contact { warm_n_s, owed_slip_m, .. } = contacts[at];
+                        let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
+                        contacts[at] = Contact { warm_n_s, owed_slip_m, ..found };
                         owners[at].meets_s = None;
                         *moved = true;
                         false
@@ -326,10 +326,7 @@ impl Search {
             };
             if taken {
                 owners.push(owner);
-                let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
-                let surface_m_s = remote::slower_push_out(&touch, round.h_s, late_s);
-                let found = contact(&touch, &facing, skins, round.progress);
-                contacts.push(Contact { surface_m_s: found.surface_m_s + surface_m_s, ..found });
+                contacts.push(taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins }));
             } else {
                 clear_m = clear_m.min(gap_m);
             }
@@ -339,12 +336,17 @@ impl Search {
         }
     }
 
-    /// Keeps the contacts of those owners for which `keep` is true.
+    /// Keeps the contacts of those owners for which `keep` is true; the pairs of others are looked at again after the solve.
     pub fn retain(&mut self, keep: impl Fn(&Owner) -> bool) {
-        let Self { contacts, owners, .. } = self;
+        let Self { contacts, owners, looks, .. } = self;
         let mut kept = 0;
         for at in 0..contacts.len() {
-            if keep(&owners[at]) {
+            if !keep(&owners[at]) {
+                let pair = (owners[at].member, owners[at].partner);
+                if let Ok(look) = looks.binary_search_by_key(&pair, |look| (look.member, look.partner)) {
+                    looks[look].clear_m = 0.0;
+                }
+            } else {
                 contacts.swap(kept, at);
                 owners.swap(kept, at);
                 kept += 1;
@@ -431,6 +433,19 @@ fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bo
         let (a, b) = (a + led[0], b + led[1]);
         [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
     })
+}
+
+/// The two sides of a touch, with their skins.
+struct Skinned<'a> {
+    facing: &'a Facing,
+    skins: [&'a CollisionShape; 2],
+}
+
+/// A contact of the problem; from what is stepped elsewhere it comes out in that one's steps.
+fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned<'_>) -> Contact {
+    let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
+    let found = contact(touch, sides.facing, sides.skins, round.progress);
+    Contact { surface_m_s: found.surface_m_s + remote::slower_push_out(touch, round.h_s, late_s), ..found }
 }
 
 /// The restitution of a pair: the larger of both; what bends gives back what it has stored.

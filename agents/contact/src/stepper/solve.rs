@@ -47,13 +47,13 @@ impl ClusterStepper {
                 row.warm_n_s = *impulse;
             }
             let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
-            let joined = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
+            let joints_done = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
             let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
-            if round == ROUNDS_MAX || !passed && joined {
+            if round == ROUNDS_MAX || !passed && joints_done {
                 break;
             }
             rebounds.choose(search, progress, Judge::Solved);
@@ -94,6 +94,12 @@ impl ClusterStepper {
         places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
         move_sides(search, ties, |place| places.get(place).copied());
         let took = outcome.map_err(|error| refused(&error, h_s))?;
+        // a blow that would make energy is none
+        for (contact, rebounds) in search.contacts.iter_mut().zip(&solver.solution().rebounds) {
+            if !rebounds {
+                contact.restitution = 0.0;
+            }
+        }
         for state in &mut *progress {
             let Progress { solved, seen, place, .. } = state;
             solved.clear();

@@ -1,10 +1,13 @@
 //! Heaps of more contacts than one problem is solved for: rapier3d steps them.
 
-use crate::bodies::block;
-use crate::table::{GRAVITY, Table, plane};
+use crate::bodies::{block, rigid};
+use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
+use metachron_contact::stepper::Partner;
 use metachron_core::Anchor;
+use metachron_geometry::Solid;
+use metachron_models::rigid::{RigidBody, RigidSpec};
 
 const HALF_M: f64 = 0.03;
 
@@ -31,6 +34,9 @@ fn a_heap_of_a_thousand_contacts_rests_where_a_small_one_does() {
     }
     assert!(last.0.contacts > 1000 && last.0.factors == 0, "rapier3d has it: {last:?}");
     assert!(most_j < before_j + 1e-3, "{before_j} J, then {most_j} J");
+    let on_floor_n: f64 = (0..wide * wide).map(|k| heap.given_n(k, Partner::Static(0))).sum();
+    let weight_n = 0.2 * -GRAVITY.z * (wide * wide * high) as f64;
+    assert!((on_floor_n / weight_n - 1.0).abs() < 1e-2, "{on_floor_n} of {weight_n} N");
     for k in 0..wide * wide * high {
         let (place, velocity) = heap.middle(k);
         let layer = (k / wide / wide) as f64;
@@ -66,4 +72,24 @@ fn a_user_lifts_a_box_off_a_heap_and_feels_its_weight() {
     // its neighbours stay
     let (beside, _) = heap.middle(lifted - 1);
     assert!((beside.z - 5.0 * HALF_M).abs() < 2e-4, "{beside}");
+}
+
+#[test]
+fn what_tumbles_over_a_heap_keeps_its_momentum() {
+    let (wide, high) = (10, 3);
+    let mut heap = columns(wide, high);
+    let spec = rigid(Solid::Box { half_extents_m: DVec3::new(0.1, 0.04, 0.01) }, DVec3::new(0.3, 0.3, 0.35), 0.3);
+    let thrown = RigidSpec { gravity: DVec3::ZERO, spin: DVec3::new(2.0, 3.0, 1.0), velocity: DVec3::Z * 0.02, ..spec };
+    heap.bodies.push(placed(RigidBody::new(thrown).unwrap(), false));
+    let last = heap.bodies.len() - 1;
+    let (linear, angular) = heap.bodies[last].agent.momentum();
+    while heap.time.as_secs_f64() < 1.0 {
+        heap.step();
+    }
+    let (after, spun) = heap.bodies[last].agent.momentum();
+    // single precision, added up over 240 steps
+    assert!((after - linear).length() < 1e-5 * linear.length(), "{linear}, then {after}");
+    let about_middle = |momentum: DVec3, heap: &mut Table| momentum - heap.middle(last).0.cross(after);
+    let (now, before) = (about_middle(spun, &mut heap), angular - DVec3::new(0.3, 0.3, 0.35).cross(linear));
+    assert!((now - before).length() < 1e-3 * before.length(), "{before}, then {now}");
 }
