@@ -436,7 +436,7 @@ impl AgentRunner {
                 (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
                 pair.kind == PairKind::Attachment || seat.memory.near(now).any(|id| id == pair.with)
             });
-            for total in stepper.totals().iter().filter(|total| total.member == me) {
+            for total in stepper.totals_of(me) {
                 let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
                 let pair = match total.partner {
                     Partner::Agent(with) => Some((with, PairKind::Cluster)),

@@ -213,7 +213,7 @@ impl Pairs {
             state.force_n += impulse.linear.length() / dt_s;
             state.impulse_n_s += impulse.linear.length();
         }
-        for total in stepper.totals().iter().filter(|total| total.member == place) {
+        for total in stepper.totals_of(place) {
             if let Partner::Agent(with) = total.partner
                 && let Some(state) = states.iter_mut().find(|state| state.with == with)
             {

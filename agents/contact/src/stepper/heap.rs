@@ -50,8 +50,17 @@ struct World {
     /// By rising numbers.
     bodies: Vec<Known>,
     contacts: usize,
-    /// Storage: members that something touches.
+    /// Storage: members that something touches, and what contacts give.
     touched: Vec<usize>,
+    given: Vec<Given>,
+}
+
+/// What a contact gave a member in a step of rapier3d.
+struct Given {
+    member: usize,
+    partner: Partner,
+    impulse_n_s: DVec3,
+    depth_m: f64,
 }
 
 /// A body, with its inertia in its own axes, kg·m².
@@ -111,7 +120,7 @@ impl Heap {
         let mut report = HeapReport::default();
         for _ in 0..steps as u32 {
             world.physics.step();
-            report = world.read(all, totals, report.depth_m);
+            report = world.read(all, report.depth_m);
         }
         if !world.is_sound() {
             self.world = None;
@@ -124,6 +133,10 @@ impl Heap {
             state.hold();
         }
         world.contacts = report.contacts;
+        world.given.sort_by_key(|given| (given.member, given.partner));
+        for Given { member, partner, impulse_n_s, depth_m } in world.given.drain(..) {
+            total_of(totals, member, partner).add(impulse_n_s, depth_m);
+        }
         Ok(report)
     }
 
@@ -168,7 +181,7 @@ impl World {
                 physics.insert_collider(collider.user_data(Side::Static(number).name()), None);
             }
         }
-        Self { physics, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new() }
+        Self { physics, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
     }
 
     /// Takes up the members as they are, and what changes their velocities in the step.
@@ -226,10 +239,10 @@ impl World {
         })
     }
 
-    /// Adds what pairs gave in the last step, along the normals of their contacts.
-    fn read(&mut self, all: &[Participant<'_>], totals: &mut Vec<PairTotal>, depth_m: f64) -> HeapReport {
+    /// Notes what pairs gave in the last step, along the normals of their contacts.
+    fn read(&mut self, all: &[Participant<'_>], depth_m: f64) -> HeapReport {
         let mut report = HeapReport { contacts: 0, depth_m };
-        let mut touched = std::mem::take(&mut self.touched);
+        let (mut touched, mut given) = (std::mem::take(&mut self.touched), std::mem::take(&mut self.given));
         touched.clear();
         for pair in self.physics.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()) {
             let Some(sides @ [first_side, _]) = self.sides(pair) else { continue };
@@ -254,14 +267,14 @@ impl World {
                     report.depth_m = report.depth_m.max(depth_m);
                     if point.data.impulse > 0.0 {
                         let impulse_n_s = towards_member * f64::from(point.data.impulse);
-                        total_of(totals, first, partner).add(impulse_n_s, depth_m);
+                        given.push(Given { member: first, partner, impulse_n_s, depth_m });
                     }
                 }
             }
         }
         // bodies are in the order of the members
         touched.iter().for_each(|&member| self.bodies[member].touched = true);
-        self.touched = touched;
+        (self.touched, self.given) = (touched, given);
         report
     }
 

@@ -376,6 +376,13 @@ impl ClusterStepper {
         &self.totals
     }
 
+    /// The same of one participant.
+    #[must_use]
+    pub fn totals_of(&self, member: usize) -> &[PairTotal] {
+        let start = self.totals.partition_point(|total| total.member < member);
+        &self.totals[start..self.totals.partition_point(|total| total.member <= member)]
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
