@@ -343,7 +343,8 @@ impl AgentRunner {
         let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
         let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, links };
         let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
-        let participant = Participant { id, member: agent.member()?, context, laws, memory, parts, grips };
+        let (member, alone_s) = (agent.member()?, self.pace.wanted().as_secs_f64());
+        let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };
         Some((participant, asynchronous.as_deref_mut()))
     }
 

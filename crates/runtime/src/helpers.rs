@@ -203,7 +203,16 @@ mod tests {
             let mut all: Vec<_> = seats
                 .map(|((tube, (memory, grips)), id)| {
                     let context = StepContext::alone(id, time);
-                    Participant { id, member: tube.member().unwrap(), context, laws: &[], memory, parts: 1, grips }
+                    Participant {
+                        id,
+                        member: tube.member().unwrap(),
+                        context,
+                        laws: &[],
+                        memory,
+                        parts: 1,
+                        alone_s: 0.004,
+                        grips,
+                    }
                 })
                 .collect();
             let size = all.iter().map(Participant::size).sum();

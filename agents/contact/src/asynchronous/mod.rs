@@ -125,7 +125,16 @@ impl Remotes {
         for Remote { seen, member, memory, grips, .. } in self.all.iter_mut().filter(|remote| remote.met) {
             member.foretell(seen, time);
             let (id, context) = (seen.id, StepContext::alone(seen.id, time));
-            locals.push(Participant { id, member, context, laws: &[], memory, parts: step.parts, grips });
+            locals.push(Participant {
+                id,
+                member,
+                context,
+                laws: &[],
+                memory,
+                parts: step.parts,
+                alone_s: step.dt_s,
+                grips,
+            });
         }
     }
 

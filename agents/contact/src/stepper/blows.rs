@@ -1,11 +1,13 @@
 //! Blows: contacts that rebound, each at its own time within a fine step.
 //!
 //! In: the places of a fine step, what a solve gave. Out: which of them rebound and when, by how much later than the step's start each
-//! impulse acts. Never here: how a rebound is solved ([`crate::cluster`]). Theory: docs/theory/clusters.md, section 9.
+//! impulse acts, how many fine steps the macro step needs. Never here: how a rebound is solved ([`crate::cluster`]).
+//! Theory: docs/theory/clusters.md, section 9.
 //!
 //! A blow is solved with the speed at which its sides meet, and changes velocities from the start of the step. A body that nothing else
 //! holds is then carried to where the blow at its own time would have left it (eq. 27), so its flight is exact on both sides of it.
-//! A body rebounds once in a fine step: what it would pass through after its first blow stops it.
+//! Blows of one body that are further apart in time are in fine steps of their own, up to [`PARTS_MAX`] in a macro step. There what a body
+//! meets at once it rebounds off at once, and one that its blow would send through something else does not rebound.
 
 use super::Progress;
 use super::memory::Partner;
@@ -13,23 +15,30 @@ use super::search::{Judge, Owner, Search, velocity};
 use crate::cluster::{Contact, Side};
 use glam::DVec3;
 
+/// The most fine steps of a macro step that blows ask for.
+const PARTS_MAX: u32 = 16;
+
+/// By how much steps are divided in which a body that rebounds strikes another.
+const DIVIDED: u32 = 4;
+
 /// What decides whether a contact rebounds.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rebounds {
     /// The macro step and the fine step that are made, seconds.
     macro_s: f64,
     step_s: f64,
-    /// The first blow of each participant in the fine step.
-    first: Vec<Option<First>>,
-    /// Those of them that were known when it was last decided.
-    known: Vec<Option<First>>,
+    /// The blows of each participant in the fine step.
+    blows: Vec<Option<Blows>>,
+    /// How many fine steps blows ask the macro step for.
+    parts: u32,
 }
 
-/// The first blow of a participant.
+/// When a participant meets what it rebounds off.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct First {
-    meets_s: f64,
-    /// The pair that it belongs to: all its places rebound together.
+struct Blows {
+    first_s: f64,
+    last_s: f64,
+    /// The pair that it meets first.
     pair: (usize, Partner),
 }
 
@@ -42,9 +51,14 @@ struct Meeting {
 impl Rebounds {
     /// Begins a fine step of so many participants.
     pub fn begin(&mut self, macro_s: f64, step_s: f64, participants: usize) {
-        (self.macro_s, self.step_s) = (macro_s, step_s);
-        self.first.clear();
-        self.first.resize(participants, None);
+        (self.macro_s, self.step_s, self.parts) = (macro_s, step_s, 1);
+        self.blows.clear();
+        self.blows.resize(participants, None);
+    }
+
+    /// How many fine steps the macro step needs; 1 where blows do not matter.
+    pub const fn parts(&self) -> u32 {
+        self.parts
     }
 
     /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that meet later.
@@ -52,9 +66,16 @@ impl Rebounds {
         if search.contacts.iter().all(|contact| contact.restitution <= 0.0) {
             return;
         }
-        self.known.clone_from(&self.first);
+        match judge {
+            Judge::Foreseen => self.foresee(search, progress),
+            Judge::Solved => self.stop(search),
+        }
+    }
+
+    /// Takes the blows of the step as far as flights tell.
+    fn foresee(&mut self, search: &mut Search, progress: &[Progress]) {
         for (contact, owner) in search.contacts.iter_mut().zip(&mut search.owners) {
-            if contact.restitution <= 0.0 || owner.meets_s.is_some() {
+            if contact.restitution <= 0.0 {
                 continue;
             }
             let Some(Meeting { after_s, approach_m_s }) = self.meeting(contact, progress) else {
@@ -63,34 +84,64 @@ impl Rebounds {
             };
             owner.meets_s = Some(after_s);
             contact.approach_m_s = approach_m_s;
-            let pair = (owner.member, owner.partner);
-            for member in owner.movers(contact) {
-                let first = &mut self.first[member];
-                if after_s < self.step_s
-                    && self.known[member].is_none()
-                    && first.is_none_or(|first| after_s < first.meets_s)
-                {
-                    *first = Some(First { meets_s: after_s, pair });
-                }
+            // one that slows down on its way meets within the step all the same
+            contact.gap_m = contact.gap_m.min(approach_m_s * self.step_s);
+            if after_s < self.step_s {
+                owner.movers(contact).for_each(|member| self.note(member, after_s, (owner.member, owner.partner)));
             }
         }
-        search.contacts.iter_mut().zip(&search.owners).for_each(|(contact, owner)| self.settle(contact, owner));
-        if matches!(judge, Judge::Foreseen) {
-            search.retain(|owner| owner.meets_s.is_none_or(|meets_s| meets_s < self.step_s));
+        search.retain(|owner| owner.meets_s.is_none_or(|meets_s| meets_s < self.step_s));
+    }
+
+    /// Notes a blow of a participant, and asks for steps that are no longer than what is between it and the others.
+    fn note(&mut self, member: usize, after_s: f64, pair: (usize, Partner)) {
+        let blows = self.blows[member].get_or_insert(Blows { first_s: after_s, last_s: after_s, pair });
+        if after_s < blows.first_s {
+            (blows.first_s, blows.pair) = (after_s, pair);
+        } else if pair == blows.pair {
+            return;
+        }
+        blows.last_s = blows.last_s.max(after_s);
+        let apart_s = blows.last_s - blows.first_s;
+        if apart_s > self.finest_s() {
+            let parts = (self.macro_s / apart_s).ceil() as u32;
+            self.parts = self.parts.max(parts.next_power_of_two().min(PARTS_MAX));
         }
     }
 
-    /// Lets a contact rebound whose blow is the first of both its sides, and takes the restitution of one whose is not.
-    fn settle(&self, contact: &mut Contact, owner: &Owner) {
-        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0) else { return };
-        let pair = (owner.member, owner.partner);
-        let is_first = |member: usize| self.first[member].is_some_and(|first| first.pair == pair);
-        let rebounds = meets_s < self.step_s && owner.movers(contact).all(is_first);
-        if rebounds {
-            // one that slows down on its way meets within the step all the same
-            contact.gap_m = contact.gap_m.min(contact.approach_m_s * self.step_s);
-        } else {
-            contact.restitution = 0.0;
+    fn finest_s(&self) -> f64 {
+        // steps are whole nanoseconds
+        self.macro_s / f64::from(PARTS_MAX) * (1.0 + 1e-6)
+    }
+
+    /// After a solve: what is struck by what rebounds, or is sent through something by it, was not foreseen.
+    fn stop(&mut self, search: &mut Search) {
+        let is_new = |contact: &Contact, owner: &Owner| contact.restitution > 0.0 && owner.meets_s.is_none();
+        for at in 0..search.contacts.len() {
+            let (contact, owner) = (&search.contacts[at], search.owners[at]);
+            if !is_new(contact, &owner) {
+                continue;
+            }
+            let struck = owner.movers(contact).any(|member| self.blows[member].is_some());
+            search.contacts[at].restitution = 0.0;
+            if !struck {
+                continue;
+            }
+            if self.step_s > self.finest_s() {
+                let parts = (self.macro_s / self.step_s).round() as u32;
+                self.parts = self.parts.max((DIVIDED * parts).min(PARTS_MAX));
+            } else {
+                owner.both().for_each(|member| self.calm(search, member));
+            }
+        }
+    }
+
+    /// Takes the rebounds of a participant.
+    fn calm(&self, search: &mut Search, member: usize) {
+        for (contact, owner) in search.contacts.iter_mut().zip(&search.owners) {
+            if owner.both().any(|other| other == member) {
+                contact.restitution = 0.0;
+            }
         }
     }
 

@@ -24,6 +24,8 @@ const CONTACTS_MIN: usize = 1000;
 const CONTACTS_LEFT: usize = 500;
 /// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
 const LONGEST_S: f64 = 1.0 / 240.0;
+/// The most steps of rapier3d in a fine step: no body goes farther in one than half its radius, as far as that takes no more.
+const STEPS_MAX: f64 = 64.0;
 /// Nothing is farther from the origin or faster than this, metres, m/s and rad/s.
 const REACH_MAX: f32 = 1e6;
 /// By how many radii of its body a contact is foreseen.
@@ -47,6 +49,8 @@ pub(super) struct HeapReport {
 /// The bodies of a heap in rapier3d.
 struct World {
     physics: PhysicsWorld,
+    /// Where the origin of rapier3d is: near the bodies, as its numbers are single.
+    origin_m: DVec3,
     /// By rising numbers.
     bodies: Vec<Known>,
     contacts: usize,
@@ -61,6 +65,7 @@ struct Given {
     partner: Partner,
     impulse_n_s: DVec3,
     depth_m: f64,
+    counts: bool,
 }
 
 /// A body, with its inertia in its own axes, kg·m².
@@ -70,6 +75,7 @@ struct Known {
     handle: RigidBodyHandle,
     mass_kg: f64,
     inertia: DMat3,
+    radius_m: f64,
     /// Whether anything has touched it in the step: what flies does so exactly, as its member says.
     touched: bool,
 }
@@ -90,7 +96,8 @@ impl Heap {
     /// Makes these members a heap if they touch in so many places.
     pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], contacts: usize) {
         if contacts > CONTACTS_MIN && fits(scene, all) {
-            self.world = Some(Box::new(World::new(scene)));
+            let middle = all.iter().filter_map(placed).map(|body| body.centre_m).sum::<DVec3>() / all.len() as f64;
+            self.world = Some(Box::new(World::new(scene, middle)));
         }
     }
 
@@ -115,12 +122,14 @@ impl Heap {
         let Some(world) = &mut self.world else { return Ok(HeapReport::default()) };
         world.take(all, progress, h_s);
         // spans are whole nanoseconds
-        let steps = (h_s / LONGEST_S - 1e-3).ceil().max(1.0);
+        let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);
         world.physics.integration_parameters.dt = (h_s / steps) as f32;
         let mut report = HeapReport::default();
-        for _ in 0..steps as u32 {
+        for left in (0..steps as u32).rev() {
             world.physics.step();
-            report = world.read(all, report.depth_m);
+            let deepest_m = report.depth_m;
+            report = world.read(all, left == 0);
+            report.depth_m = report.depth_m.max(deepest_m);
         }
         if !world.is_sound() {
             self.world = None;
@@ -134,8 +143,11 @@ impl Heap {
         }
         world.contacts = report.contacts;
         world.given.sort_by_key(|given| (given.member, given.partner));
-        for Given { member, partner, impulse_n_s, depth_m } in world.given.drain(..) {
-            total_of(totals, member, partner).add(impulse_n_s, depth_m);
+        for Given { member, partner, impulse_n_s, depth_m, counts } in world.given.drain(..) {
+            let total = total_of(totals, member, partner);
+            total.add(impulse_n_s, depth_m);
+            // a place is counted once, not in every step of rapier3d
+            total.contacts -= u32::from(!counts);
         }
         Ok(report)
     }
@@ -148,7 +160,7 @@ impl Heap {
             let pose = world.physics.bodies[known.handle].position();
             let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
             let goal = DQuat::from_xyzw(x, y, z, w).normalize();
-            let way_m = pose.translation.as_dvec3() + goal * shape.com_local - centre_m;
+            let way_m = world.origin_m + pose.translation.as_dvec3() + goal * shape.com_local - centre_m;
             let turn = (goal * rotation.inverse()).to_scaled_axis();
             let axes = DMat3::from_quat(rotation);
             one.member.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]);
@@ -165,7 +177,7 @@ fn fits(scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
 }
 
 impl World {
-    fn new(scene: &ClusterScene) -> Self {
+    fn new(scene: &ClusterScene, origin_m: DVec3) -> Self {
         let mut physics = PhysicsWorld { gravity: Vec3::ZERO, ..PhysicsWorld::default() };
         physics.integration_parameters = IntegrationParameters {
             num_solver_iterations: 4,
@@ -177,16 +189,16 @@ impl World {
             ..IntegrationParameters::default()
         };
         for (number, solid) in (0..).zip(scene.statics()) {
-            if let Some(collider) = of_static(solid) {
+            if let Some(collider) = of_static(solid, origin_m) {
                 physics.insert_collider(collider.user_data(Side::Static(number).name()), None);
             }
         }
-        Self { physics, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
+        Self { physics, origin_m, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
     }
 
     /// Takes up the members as they are, and what changes their velocities in the step.
     fn take(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
-        let Self { physics, bodies, .. } = self;
+        let Self { physics, bodies, origin_m, .. } = self;
         bodies.retain(|known| {
             let stays = all.binary_search_by_key(&known.id, |one| one.id).is_ok();
             if !stays {
@@ -201,7 +213,7 @@ impl World {
             let at = match bodies.binary_search_by_key(&one.id, |known| known.id) {
                 Ok(at) => at,
                 Err(at) => {
-                    bodies.insert(at, insert(physics, one, &body));
+                    bodies.insert(at, insert(physics, one, &body, *origin_m));
                     at
                 }
             };
@@ -210,7 +222,7 @@ impl World {
             let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
             let now = [&state.start[0], &state.start[1]].map(|v| v.as_vec3());
             // what is set anew is searched anew
-            let pose = body.pose();
+            let pose = body.pose(*origin_m);
             if *inside.position() != pose {
                 inside.set_position(pose, true);
             }
@@ -229,6 +241,15 @@ impl World {
         physics.integration_parameters.length_unit = smallest_m as f32;
     }
 
+    /// How far bodies go in `h_s` seconds, in halves of their radii.
+    fn way(&self, progress: &[Progress], h_s: f64) -> f64 {
+        let ways =
+            self.bodies.iter().zip(progress).map(|(known, state)| {
+                state.start[0].length().max(state.before[0].length()) * h_s / (0.5 * known.radius_m)
+            });
+        ways.fold(0.0, f64::max)
+    }
+
     /// Whether all bodies are somewhere.
     fn is_sound(&self) -> bool {
         self.bodies.iter().all(|known| {
@@ -239,9 +260,9 @@ impl World {
         })
     }
 
-    /// Notes what pairs gave in the last step, along the normals of their contacts.
-    fn read(&mut self, all: &[Participant<'_>], depth_m: f64) -> HeapReport {
-        let mut report = HeapReport { contacts: 0, depth_m };
+    /// Notes what pairs gave in the last step, along the normals of their contacts; whether its places `count`.
+    fn read(&mut self, all: &[Participant<'_>], counts: bool) -> HeapReport {
+        let mut report = HeapReport::default();
         let (mut touched, mut given) = (std::mem::take(&mut self.touched), std::mem::take(&mut self.given));
         touched.clear();
         for pair in self.physics.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()) {
@@ -267,7 +288,7 @@ impl World {
                     report.depth_m = report.depth_m.max(depth_m);
                     if point.data.impulse > 0.0 {
                         let impulse_n_s = towards_member * f64::from(point.data.impulse);
-                        given.push(Given { member: first, partner, impulse_n_s, depth_m });
+                        given.push(Given { member: first, partner, impulse_n_s, depth_m, counts });
                     }
                 }
             }
@@ -312,9 +333,9 @@ impl Side {
 }
 
 impl Placed<'_> {
-    /// Where its axes are.
-    fn pose(&self) -> Pose {
-        pose(self.centre_m - self.rotation * self.shape.com_local, self.rotation)
+    /// Where its axes are, from an origin.
+    fn pose(&self, origin_m: DVec3) -> Pose {
+        pose(self.centre_m - self.rotation * self.shape.com_local - origin_m, self.rotation)
     }
 }
 
@@ -327,14 +348,14 @@ fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
     Some(Placed { shape, centre_m: position, rotation })
 }
 
-fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>) -> Known {
+fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, origin_m: DVec3) -> Known {
     let [mass, inertia] = [0, 1].map(|block| one.member.blocks()[block].value);
     let (mass_kg, axes) = (mass.x_axis.x, DMat3::from_quat(body.rotation));
     let inertia = axes.transpose() * inertia * axes;
     let com = body.shape.com_local.as_vec3();
     let matter = MassProperties::with_inertia_matrix(com, mass_kg as f32, inertia.as_mat3());
     let builder = RigidBodyBuilder::dynamic()
-        .pose(body.pose())
+        .pose(body.pose(origin_m))
         .can_sleep(false)
         .soft_ccd_prediction((FORESEEN_RADII * body.shape.radius_m) as f32)
         .allow_fast_rotation(true)
@@ -343,14 +364,14 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>) 
     let form = one.member.skin().map(|skin| (skin.form.friction, skin.form.restitution)).unwrap_or_default();
     let collider = skin(body.shape.shape.clone(), form.0, form.1).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
-    Known { id: one.id, handle, mass_kg, inertia, touched: false }
+    Known { id: one.id, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
 }
 
 /// A static solid; its form is always one.
-fn of_static(solid: &StaticSolid) -> Option<ColliderBuilder> {
+fn of_static(solid: &StaticSolid, origin_m: DVec3) -> Option<ColliderBuilder> {
     let ShapeKind::Solid(SolidShape { solid: kind, shape, .. }) = &solid.form.kind else { return None };
     let shape = if matches!(kind, Solid::Plane) { SharedShape::halfspace(Vec3::Z) } else { shape.clone() };
-    let at = pose(solid.position(), solid.rotation());
+    let at = pose(solid.position() - origin_m, solid.rotation());
     Some(skin(shape, solid.form.friction, solid.form.restitution).position(at))
 }
 

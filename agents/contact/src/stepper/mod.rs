@@ -75,6 +75,8 @@ pub struct Participant<'a> {
     pub memory: &'a mut ContactMemory,
     /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
     pub parts: u32,
+    /// How long a step it makes alone, seconds: so far ahead it looks for others.
+    pub alone_s: f64,
     /// The forces of springs and grasps on it in the last fine step.
     pub grips: &'a mut Vec<Grip>,
 }
@@ -296,10 +298,13 @@ impl ClusterStepper {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
             let is_heap = self.find(scene, all, h_s);
+            if self.divide_blows(all, parts) {
+                return Ok(false);
+            }
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(on, all, h_s, report)?;
-            if self.divide(all, h_s) {
+            if self.divide_blows(all, parts) || self.divide(all, h_s) {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -334,6 +339,20 @@ impl ClusterStepper {
         report.contacts = found.contacts as u32;
         report.depth_m = report.depth_m.max(found.depth_m);
         Ok(())
+    }
+
+    /// Gives shorter steps to rigid members where blows follow each other in a fine step, of which there are `parts`; whether there are any.
+    fn divide_blows(&mut self, all: &[Participant<'_>], parts: u32) -> bool {
+        let wanted = self.rebounds.parts();
+        if wanted <= parts {
+            return false;
+        }
+        for (one, state) in all.iter().zip(&mut self.progress) {
+            if one.member.role() == Role::Rigid {
+                state.parts = state.parts.max(wanted);
+            }
+        }
+        true
     }
 
     /// Gives shorter steps to members that the solution strains too far; whether there are any.

@@ -188,7 +188,7 @@ impl Search {
             let (body, state) = (&all[member].member, &progress[member]);
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
         });
-        self.boxes.pairs(NEAR_STEPS * h_s, &mut self.near);
+        self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
         self.near.retain(|&[a, b]| !(all[a].member.is_remote() && all[b].member.is_remote()));
     }
 
@@ -199,7 +199,7 @@ impl Search {
         self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
-        self.boxes.pairs(h_s, &mut pairs);
+        self.boxes.meeting(h_s, &mut pairs);
         (self.known, self.moved) = (self.contacts.len(), false);
         self.find_all(round, &pairs);
         self.again = pairs;

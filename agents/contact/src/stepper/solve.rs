@@ -57,6 +57,10 @@ impl ClusterStepper {
                 break;
             }
             rebounds.choose(search, progress, Judge::Solved);
+            if f64::from(rebounds.parts()) * h_s > 1.5 * self.macro_s {
+                // the step is made again in shorter ones
+                return Ok(());
+            }
         }
         self.give(report);
         Ok(())

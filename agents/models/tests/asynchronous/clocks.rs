@@ -123,7 +123,7 @@ impl Clocks {
         let context = StepContext { me: id, time: *time, neighbours: &neighbours, hands, links };
         let mut list: Vec<Participant<'_>> = Vec::with_capacity(8);
         let member = agent.member().unwrap();
-        list.push(Participant { id, member, context, laws: &laws, memory, parts: 1, grips });
+        list.push(Participant { id, member, context, laws: &laws, memory, parts: 1, alone_s: dt.as_secs_f64(), grips });
         let sides = [Some(&mut *pairs)];
         let round = move || {
             let (mut list, mut sides) = (list, sides);

@@ -173,6 +173,7 @@ impl StepHarness {
                 laws: &[],
                 memory,
                 parts,
+                alone_s: step_s,
                 grips,
             }));
         }

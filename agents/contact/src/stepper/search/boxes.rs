@@ -15,6 +15,8 @@ pub(super) struct Reach {
     pub skin: Aabb,
     /// The fastest speed of any point of it, m/s.
     pub speed_m_s: f64,
+    /// How long a step it makes alone, seconds.
+    alone_s: f64,
 }
 
 /// The boxes of all members that have a skin.
@@ -31,7 +33,7 @@ impl Boxes {
         self.reaches.clear();
         let reach = |(member, one): (usize, &Participant<'_>)| {
             let skin = one.member.skin()?.bounds();
-            Some(Reach { skin, speed_m_s: speed_m_s(member) })
+            Some(Reach { skin, speed_m_s: speed_m_s(member), alone_s: one.alone_s })
         };
         self.reaches.extend(all.iter().enumerate().map(reach));
         self.along_x.clear();
@@ -45,19 +47,30 @@ impl Boxes {
         self.reaches[member]
     }
 
-    /// Adds the pairs whose boxes may meet within `after_s` seconds, the lower member first, sorted.
-    pub fn pairs(&self, after_s: f64, into: &mut Vec<[usize; 2]>) {
+    /// Adds the pairs whose boxes may meet within a step of `step_s` seconds, the lower member first, sorted.
+    pub fn meeting(&self, step_s: f64, into: &mut Vec<[usize; 2]>) {
+        self.pairs(|_| step_s, into);
+    }
+
+    /// Adds the pairs whose boxes may meet within `steps` steps of one of `step_s` seconds, or of those that either makes alone.
+    pub fn near(&self, steps: f64, step_s: f64, into: &mut Vec<[usize; 2]>) {
+        self.pairs(|reach| steps * step_s.max(reach.alone_s), into);
+    }
+
+    fn pairs(&self, after_s: impl Fn(&Reach) -> f64, into: &mut Vec<[usize; 2]>) {
         let reach = |&member: &usize| self.reaches[member].map(|reach| (member, reach));
-        let grown = |reach: &Reach| reach.skin.grown(reach.speed_m_s * after_s + 0.5 * NEAR_M);
-        let fastest = self.along_x.iter().filter_map(reach).map(|(_, reach)| reach.speed_m_s).fold(0.0, f64::max);
-        let widest = fastest * after_s + NEAR_M;
+        let most = |of: &dyn Fn(&Reach) -> f64| self.reaches.iter().flatten().map(of).fold(0.0, f64::max);
+        let (fastest, longest_s) = (most(&|reach| reach.speed_m_s), most(&|reach| after_s(reach)));
+        let grown = |reach: &Reach, after_s: f64| reach.skin.grown(reach.speed_m_s * after_s + 0.5 * NEAR_M);
+        let widest = fastest * longest_s + NEAR_M;
         for (at, (member, here)) in self.along_x.iter().filter_map(reach).enumerate() {
-            let mine = grown(&here);
+            let farthest = grown(&here, longest_s).high.x;
             for (other, there) in self.along_x[at + 1..].iter().filter_map(reach) {
-                if there.skin.low.x - widest > mine.high.x {
+                if there.skin.low.x - widest > farthest {
                     break;
                 }
-                if mine.meets(grown(&there)) {
+                let after_s = after_s(&here).max(after_s(&there));
+                if grown(&here, after_s).meets(grown(&there, after_s)) {
                     into.push([member.min(other), member.max(other)]);
                 }
             }
