@@ -36,7 +36,7 @@ pub(super) struct BroadPhase {
     calls: Vec<Calls>,
 }
 
-/// Agents that have given impulses to one agent since its last query: a bit each, on pages allocated on first use, since most agents never
+/// Agents that have given impulses to one agent, or belong with it, since its last query: a bit each, on pages allocated on first use, since most agents never
 /// interact with most others.
 #[derive(Debug, Default)]
 struct Calls {
@@ -96,8 +96,8 @@ impl BroadPhase {
         }
     }
 
-    /// Notifies `to` that `from` has given an impulse to it: `to` lists `from` at its next turn.
-    pub fn report_impulse(&self, to: AgentId, from: AgentId) {
+    /// Notifies `to` that `from` has given an impulse to it, or belongs into one cluster with it: `to` lists `from` at its next turn.
+    pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
         let pages = self.calls.len().div_ceil(64 * PAGE_WORDS);
@@ -109,7 +109,7 @@ impl BroadPhase {
     }
 
     /// Visits the agents that have called `id` since the last query, by rising numbers.
-    pub fn take_givers(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
+    pub fn take_callers(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
         let Some(calls) = self.calls.get(id.0 as usize) else { return };
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;

@@ -377,10 +377,18 @@ impl AgentRunner {
     /// The same, and notes with whom it belongs into one cluster.
     fn look_among(&mut self, step: PlannedStep, members: &Membership) {
         self.observe(step, members);
+        let now = self.pace.time();
         let Self { observer, peers, writer, links, cluster, .. } = self;
         let Some(seat) = cluster else { return };
         let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
         seat.bond(observer, grasped, links, peers.get(observer.me()));
+        // who joins stays for a while: two that follow each other from cluster to cluster would never meet
+        let ClusterSeat { memory, bonds, .. } = &mut **seat;
+        bonds.iter().for_each(|id| memory.meet(*id, now));
+        // one of shorter steps does not look as far ahead, and has to hear of it before it steps past
+        if let Some(broad_phase) = &peers.broad_phase {
+            observer.near().iter().for_each(|id| broad_phase.call(*id, observer.me()));
+        }
     }
 
     /// Notes how the step was made and solved.

@@ -193,7 +193,7 @@ impl Observer {
                 wanted.push(neighbour.id);
             }
         }
-        broad_phase.take_givers(me, |caller| {
+        broad_phase.take_callers(me, |caller| {
             if !is_linked(caller) {
                 wanted.push(caller);
             }

@@ -95,7 +95,7 @@ impl AgentRunner {
                 Some((_, revision)) => *revision = ledger.revision,
                 None => self.announced.push((ledger.with, ledger.revision)),
             }
-            broad_phase.report_impulse(ledger.with, self.shared.id);
+            broad_phase.call(ledger.with, self.shared.id);
             if sleep.is_resting(ledger.with) {
                 sleep.wake(ledger.with);
             }

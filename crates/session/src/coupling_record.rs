@@ -39,7 +39,7 @@ pub struct Coupling {
     /// Whether both ledgers were ever seen at the same revision.
     pub(super) compared: bool,
     /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
-    /// other; `None` where none are published: in clusters, and for links, penalties and lines.
+    /// other; `None` where none are published: in heaps, and for links, penalties and lines.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// Mass added by the law, kilograms.
     pub parasitic_kg: f64,

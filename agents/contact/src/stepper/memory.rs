@@ -4,8 +4,11 @@
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
 use glam::DVec3;
-use metachron_core::{AgentId, SimTime};
+use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::TouchKey;
+
+/// Two bodies belong together until they have not been near each other for this long, seconds.
+const PART_S: f64 = 0.2;
 
 /// The other side of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -115,7 +118,14 @@ impl ContactMemory {
         self.pairs.retain(|pair| !pair.places.is_empty() || pair.near_until > now);
     }
 
-    /// The agents of higher number that were near lately, at `now`.
+    /// Notes that an agent is near at `now`: the two belong together from then on until they have not been near for a while.
+    pub fn meet(&mut self, id: AgentId, now: SimTime) {
+        let until = now + SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
+        let pair = self.pair(Partner::Agent(id));
+        pair.near_until = pair.near_until.max(until);
+    }
+
+    /// The agents that were near lately, at `now`: those that were so in a step in the memory of the lower number.
     pub fn near(&self, now: SimTime) -> impl Iterator<Item = AgentId> + '_ {
         self.pairs.iter().filter_map(move |pair| match pair.partner {
             Partner::Agent(id) if pair.near_until > now => Some(id),

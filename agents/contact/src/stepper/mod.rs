@@ -58,8 +58,6 @@ use ties::{FineStep, Ties, place_key};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
-/// Two bodies belong together until they have not been near each other for this long, seconds.
-const PART_S: f64 = 0.2;
 
 /// A body in its cluster's step.
 pub struct Participant<'a> {
@@ -483,11 +481,9 @@ impl ClusterStepper {
             let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
-        let part = SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
         for &[a, b] in &search.near {
-            let until = all[a].context.time + dt + part;
-            let partner = Partner::Agent(all[b].id);
-            all[a].memory.pair(partner).near_until = until;
+            let (now, other) = (all[a].context.time + dt, all[b].id);
+            all[a].memory.meet(other, now);
         }
         for (member, one) in all.iter_mut().enumerate() {
             one.memory.turn(one.context.time + dt);

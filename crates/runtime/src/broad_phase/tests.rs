@@ -242,10 +242,10 @@ fn an_overrun_log_makes_all_agents_be_checked() {
 #[test]
 fn a_reported_impulse_is_delivered_once() {
     let broad_phase = BroadPhase::new(200);
-    [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.report_impulse(AgentId(7), AgentId(from)));
+    [130, 3, 64, 3].into_iter().for_each(|from| broad_phase.call(AgentId(7), AgentId(from)));
     let visited = |id| {
         let mut visited = Vec::new();
-        broad_phase.take_givers(AgentId(id), |caller| visited.push(caller.0));
+        broad_phase.take_callers(AgentId(id), |caller| visited.push(caller.0));
         visited
     };
     assert!(visited(8).is_empty());

@@ -23,7 +23,7 @@ fn close(log: &Log) -> Vec<AgentSpawn> {
 
 /// Members that swing through each other at unequal rates, so that they meet and part all the time.
 fn crossing(work: f64, log: &Log) -> Vec<AgentSpawn> {
-    let swing = |k: usize| Swing { reach_m: 0.6, rate_hz: 0.5 + 0.07 * k as f64, phase: 0.13 * k as f64 };
+    let swing = |k: usize| Swing { reach_m: 6.0, rate_hz: 0.5 + 0.07 * k as f64, phase: 0.13 * k as f64 };
     let member = |k: usize| Dummy { swing: Some(swing(k)), ..Dummy::member(work, log) };
     RATES.iter().enumerate().map(|(k, hz)| named(member(k).at(*hz), *hz)).collect()
 }
@@ -73,7 +73,7 @@ fn play_counting(run: &mut dyn Run, until_ms: u64) -> usize {
 fn a_thousand_moves_lose_no_step_and_make_none_twice() {
     let log = Log::default();
     let mut run = lockstep(crossing(20.0, &log), Machine::two_cores_software());
-    let changes = play_counting(&mut *run, 45_000);
+    let changes = play_counting(&mut *run, 60_000);
     assert!(changes > 1000, "{changes} changes of leaders");
     let handles = run.agents().to_vec();
     let stats = run.shutdown();

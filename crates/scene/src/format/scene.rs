@@ -67,7 +67,7 @@ pub struct WorldFile {
 
 /// Whether objects collide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected true or false")]
 pub enum ContactsFile {
     /// Whether moving objects collide with each other.
     Whether(bool),

@@ -174,7 +174,7 @@ pub struct CouplingReport {
     /// Impulse that one side had given and the other not yet taken in the last states, newton seconds.
     pub in_flight_n_s: f64,
     /// Inverse effective masses of `a` and `b` along the normal at the contact with the greatest load, 1/kg, when they last pressed on
-    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` in clusters, and where no contact was solved
+    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` in heaps, and where no contact was solved
     /// between the two.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// Overlap at the end of the run, metres.
