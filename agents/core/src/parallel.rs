@@ -1,6 +1,6 @@
 //! Loops whose rounds may run on several threads at the same time.
 //!
-//! In: two lists, what is done with each pair of their elements. Out: the same bits whoever makes which round: rounds write to their own
+//! In: two lists, what is done with each pair of their elements. Out: the same bits on any threads: rounds write to their own
 //! elements only. Never here: threads; those who have some implement [`ParallelFor`].
 
 use std::fmt;

@@ -159,7 +159,7 @@ impl ClusterSeat {
         self.helped
     }
 
-    /// The same, which is accounted for now.
+    /// Takes that time, to account for it.
     pub fn take_helped(&mut self) -> Helped {
         std::mem::take(&mut self.helped)
     }

@@ -57,7 +57,7 @@ impl std::fmt::Debug for Helpers {
 }
 
 impl Helpers {
-    /// Nobody: every turn is made by its caller.
+    /// No helpers: every turn is made by its caller.
     pub const fn none() -> Self {
         Self::with_threads(1, Priority::Normal)
     }

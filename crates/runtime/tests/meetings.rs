@@ -1,4 +1,4 @@
-//! Bodies with clocks of their own that fly towards each other: whoever looks how far ahead, they meet. Reference: momentum and restitution.
+//! Bodies with clocks of their own that fly towards each other: however far ahead each looks, they meet. Reference: momentum and restitution.
 
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;

@@ -29,7 +29,8 @@ pub(super) struct Rebounds {
     step_s: f64,
     /// The blows of each participant in the fine step.
     blows: Vec<Option<Blows>>,
-    /// How many fine steps blows ask the macro step for.
+    /// How many fine steps the macro step is made in, and how many blows ask for.
+    made: u32,
     parts: u32,
 }
 
@@ -51,14 +52,15 @@ struct Meeting {
 impl Rebounds {
     /// Begins a fine step of so many participants.
     pub fn begin(&mut self, macro_s: f64, step_s: f64, participants: usize) {
-        (self.macro_s, self.step_s, self.parts) = (macro_s, step_s, 1);
+        (self.macro_s, self.step_s) = (macro_s, step_s);
+        (self.made, self.parts) = ((macro_s / step_s).round() as u32, 1);
         self.blows.clear();
         self.blows.resize(participants, None);
     }
 
-    /// How many fine steps the macro step needs; 1 where blows do not matter.
-    pub const fn parts(&self) -> u32 {
-        self.parts
+    /// How many fine steps the macro step has to be made in; `None` where those that it is made in are enough.
+    pub fn wanted_parts(&self) -> Option<u32> {
+        (self.parts > self.made).then_some(self.parts)
     }
 
     /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that meet later.
@@ -103,15 +105,12 @@ impl Rebounds {
         }
         blows.last_s = blows.last_s.max(after_s);
         let apart_s = blows.last_s - blows.first_s;
-        if apart_s > self.finest_s() {
+        // steps are whole nanoseconds
+        let finest_s = self.macro_s / f64::from(PARTS_MAX) * (1.0 + 1e-6);
+        if apart_s > finest_s {
             let parts = (self.macro_s / apart_s).ceil() as u32;
             self.parts = self.parts.max(parts.next_power_of_two().min(PARTS_MAX));
         }
-    }
-
-    fn finest_s(&self) -> f64 {
-        // steps are whole nanoseconds
-        self.macro_s / f64::from(PARTS_MAX) * (1.0 + 1e-6)
     }
 
     /// After a solve: what is struck by what rebounds, or is sent through something by it, was not foreseen.
@@ -127,9 +126,8 @@ impl Rebounds {
             if !struck {
                 continue;
             }
-            if self.step_s > self.finest_s() {
-                let parts = (self.macro_s / self.step_s).round() as u32;
-                self.parts = self.parts.max((DIVIDED * parts).min(PARTS_MAX));
+            if self.made < PARTS_MAX {
+                self.parts = self.parts.max((DIVIDED * self.made).min(PARTS_MAX));
             } else {
                 owner.both().for_each(|member| self.calm(search, member));
             }

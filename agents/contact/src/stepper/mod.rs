@@ -79,7 +79,7 @@ pub struct Participant<'a> {
     pub grips: &'a mut Vec<Grip>,
 }
 
-/// Where and by whom a macro step is made.
+/// The surroundings of a macro step, and the threads that make it.
 #[derive(Clone, Copy)]
 struct On<'a> {
     scene: &'a ClusterScene,
@@ -296,13 +296,13 @@ impl ClusterStepper {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
             let is_heap = self.find(scene, all, h_s);
-            if self.divide_blows(all, parts) {
+            if self.divide_blows(all) {
                 return Ok(false);
             }
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
             self.solve(on, all, h_s, report)?;
-            if self.divide_blows(all, parts) || self.divide(all, h_s) {
+            if self.divide_blows(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -339,12 +339,9 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Gives shorter steps to rigid members where blows follow each other in a fine step, of which there are `parts`; whether there are any.
-    fn divide_blows(&mut self, all: &[Participant<'_>], parts: u32) -> bool {
-        let wanted = self.rebounds.parts();
-        if wanted <= parts {
-            return false;
-        }
+    /// Gives shorter steps to rigid members where blows follow each other in a fine step; whether they do.
+    fn divide_blows(&mut self, all: &[Participant<'_>]) -> bool {
+        let Some(wanted) = self.rebounds.wanted_parts() else { return false };
         for (one, state) in all.iter().zip(&mut self.progress) {
             if one.member.role() == Role::Rigid {
                 state.parts = state.parts.max(wanted);

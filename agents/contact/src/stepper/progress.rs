@@ -46,7 +46,7 @@ pub(super) struct Progress {
     pub late: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
-    /// Why its last begin or end failed, where nobody has asked since.
+    /// Why its last begin or end failed, until that is taken.
     pub failure: Option<StepError>,
 }
 

@@ -57,7 +57,7 @@ impl ClusterStepper {
                 break;
             }
             rebounds.choose(search, progress, Judge::Solved);
-            if f64::from(rebounds.parts()) * h_s > 1.5 * self.macro_s {
+            if rebounds.wanted_parts().is_some() {
                 // the step is made again in shorter ones
                 return Ok(());
             }
