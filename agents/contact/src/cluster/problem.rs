@@ -64,6 +64,9 @@ pub struct Contact {
     /// The speed at which the sides closed along the normal when the step began, that of the surface included, m/s; below zero where
     /// they parted. Without meaning where nothing rebounds.
     pub approach_m_s: f64,
+    /// By how much the speed at which they part changes after the blow within the step: what falls on something that lies has all of its
+    /// fall, and two that fall together nothing. Without meaning where nothing rebounds.
+    pub gained_m_s: f64,
     /// The velocity of side 1's surface beyond that of its blocks, as of a conveyor or of a solid that is led along a path, world axes,
     /// m/s.
     pub surface_m_s: DVec3,

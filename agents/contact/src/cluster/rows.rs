@@ -95,12 +95,9 @@ impl Row {
         Self { surface, ..Self::new(law, frame, contact.bias_m_s(problem.h_s)) }
     }
 
-    /// Lets a contact that closed at `approach_m_s` rebound where its sides would move at `free_m_s` along the normal without it
-    /// (eq. 3b).
-    fn rebound(&mut self, parting_m_s: f64, approach_m_s: f64, free_m_s: f64) {
+    /// Lets a contact part at this speed, and at what its sides gain after the blow (eq. 3b).
+    fn rebound(&mut self, parting_m_s: f64, gained_m_s: f64) {
         self.calm = Some(self.bias.x);
-        // the blow is at the start of the step: what else changes the velocity within it does so after the blow
-        let gained_m_s = free_m_s + approach_m_s;
         self.bias.x = -parting_m_s - gained_m_s;
     }
 
@@ -196,10 +193,10 @@ impl Rows {
         }
         for k in 0..self.rows.len() {
             let moving = self.velocity(k, free) - self.rows[k].surface;
-            let contact = problem.contacts.get(k);
-            let rebound = contact.and_then(|contact| Some((contact.approach_m_s, contact.rebound_m_s(problem.h_s)?)));
-            if let Some((approach_m_s, parting_m_s)) = rebound {
-                self.rows[k].rebound(parting_m_s, approach_m_s, moving.x);
+            if let Some(contact) = problem.contacts.get(k)
+                && let Some(parting_m_s) = contact.rebound_m_s(problem.h_s)
+            {
+                self.rows[k].rebound(parting_m_s, contact.gained_m_s);
             }
             self.rows[k].free = self.rows[k].bias + moving;
         }

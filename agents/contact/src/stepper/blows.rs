@@ -6,14 +6,18 @@
 //!
 //! A blow is solved with the speed at which its sides meet, and changes velocities from the start of the step. A body that nothing else
 //! holds is then carried to where the blow at its own time would have left it (eq. 27), so its flight is exact on both sides of it.
-//! Blows of one body that are further apart in time are in fine steps of their own, up to [`PARTS_MAX`] in a macro step. There what a body
-//! meets at once it rebounds off at once, and one that its blow would send through something else does not rebound.
+//! Blows of one body that are further apart in time are in fine steps of their own, up to [`PARTS_MAX`] in a macro step. There blows that
+//! share a body are one event, at the time of the first, and one that its blow would send through something else does not rebound.
 
-use super::Progress;
+use super::Participant;
+use super::foresight::Foresight;
 use super::memory::Partner;
-use super::search::{Judge, Owner, Search, velocity};
-use crate::cluster::{Contact, Side};
+use super::progress::Progress;
+use super::search::{Owner, Search};
+use super::ties::Ties;
+use crate::cluster::Contact;
 use glam::DVec3;
+use metachron_core::DisjointSets;
 
 /// The most fine steps of a macro step that blows ask for.
 const PARTS_MAX: u32 = 16;
@@ -32,6 +36,10 @@ pub(super) struct Rebounds {
     /// How many fine steps the macro step is made in, and how many blows ask for.
     made: u32,
     parts: u32,
+    /// Participants whose blows were solved as one, and when those act.
+    events: DisjointSets,
+    times_s: Vec<f64>,
+    foresight: Foresight,
 }
 
 /// When a participant meets what it rebounds off.
@@ -46,7 +54,9 @@ struct Blows {
 /// Two sides that close.
 struct Meeting {
     after_s: f64,
+    /// The speed at which they close then, and by how much they part faster at the step's end, without the blow.
     approach_m_s: f64,
+    gained_m_s: f64,
 }
 
 impl Rebounds {
@@ -63,36 +73,43 @@ impl Rebounds {
         (self.parts > self.made).then_some(self.parts)
     }
 
-    /// Decides for places that are new whether they rebound, and when. Before the solve those are left out that meet later.
-    pub fn choose(&mut self, search: &mut Search, progress: &[Progress], judge: Judge) {
-        if search.contacts.iter().all(|contact| contact.restitution <= 0.0) {
+    /// Before the solve: takes the blows of the step as far as flights tell, leaves out those that meet later.
+    pub fn foresee(&mut self, all: &[Participant<'_>], search: &mut Search, ties: &Ties, progress: &[Progress]) {
+        if !any_rebounds(search) {
             return;
         }
-        match judge {
-            Judge::Foreseen => self.foresee(search, progress),
-            Judge::Solved => self.stop(search),
+        let mut foresight = std::mem::take(&mut self.foresight);
+        foresight.begin(search, ties, progress);
+        let mut start = 0;
+        while start < search.owners.len() {
+            let pair = search.owners[start].pair();
+            let end = start + search.owners[start..].iter().take_while(|owner| owner.pair() == pair).count();
+            if search.contacts[start..end].iter().any(|contact| contact.restitution > 0.0) {
+                foresight.look(all, search, start..end, progress);
+                (start..end).for_each(|at| self.meet(&foresight, &mut search.contacts[at], &mut search.owners[at]));
+            }
+            start = end;
         }
+        self.foresight = foresight;
+        search.retain(|owner| owner.meets_s.is_none_or(|meets_s| meets_s < self.step_s));
     }
 
-    /// Takes the blows of the step as far as flights tell.
-    fn foresee(&mut self, search: &mut Search, progress: &[Progress]) {
-        for (contact, owner) in search.contacts.iter_mut().zip(&mut search.owners) {
-            if contact.restitution <= 0.0 {
-                continue;
-            }
-            let Some(Meeting { after_s, approach_m_s }) = self.meeting(contact, progress) else {
-                contact.restitution = 0.0;
-                continue;
-            };
-            owner.meets_s = Some(after_s);
-            contact.approach_m_s = approach_m_s;
-            // one that slows down on its way meets within the step all the same
-            contact.gap_m = contact.gap_m.min(approach_m_s * self.step_s);
-            if after_s < self.step_s {
-                owner.movers(contact).for_each(|member| self.note(member, after_s, (owner.member, owner.partner)));
-            }
+    /// Takes one contact for a blow, or its rebound.
+    fn meet(&mut self, foresight: &Foresight, contact: &mut Contact, owner: &mut Owner) {
+        if contact.restitution <= 0.0 {
+            return;
         }
-        search.retain(|owner| owner.meets_s.is_none_or(|meets_s| meets_s < self.step_s));
+        let Some(Meeting { after_s, approach_m_s, gained_m_s }) = self.meeting(foresight, contact) else {
+            contact.restitution = 0.0;
+            return;
+        };
+        owner.meets_s = Some(after_s);
+        (contact.approach_m_s, contact.gained_m_s) = (approach_m_s, gained_m_s);
+        // one that slows down on its way meets within the step all the same
+        contact.gap_m = contact.gap_m.min(approach_m_s * self.step_s);
+        if after_s < self.step_s {
+            owner.movers(contact).for_each(|member| self.note(member, after_s, owner.pair()));
+        }
     }
 
     /// Notes a blow of a participant, and asks for steps that are no longer than what is between it and the others.
@@ -114,7 +131,10 @@ impl Rebounds {
     }
 
     /// After a solve: what is struck by what rebounds, or is sent through something by it, was not foreseen.
-    fn stop(&mut self, search: &mut Search) {
+    pub fn stop(&mut self, search: &mut Search) {
+        if !any_rebounds(search) {
+            return;
+        }
         let is_new = |contact: &Contact, owner: &Owner| contact.restitution > 0.0 && owner.meets_s.is_none();
         for at in 0..search.contacts.len() {
             let (contact, owner) = (&search.contacts[at], search.owners[at]);
@@ -144,40 +164,55 @@ impl Rebounds {
     }
 
     /// When the sides of a contact meet that then rebound, seconds from now: before now where they are in each other.
-    fn meeting(&self, contact: &Contact, progress: &[Progress]) -> Option<Meeting> {
-        let [a, b] = contact.sides.each_ref().map(|side| gain_m_s(side, progress, contact));
-        let gain_m_s2 = (b - a) / self.step_s;
+    fn meeting(&self, foresight: &Foresight, contact: &Contact) -> Option<Meeting> {
+        let gain_m_s = |at: usize| foresight.gain_m_s(at, &contact.sides[at], contact.normal);
+        let gain_m_s2 = (gain_m_s(1) - gain_m_s(0)) / self.step_s;
         let after_s = first_root(contact.gap_m, contact.approach_m_s, gain_m_s2)?.max(-self.step_s);
         let approach_m_s = contact.approach_m_s + gain_m_s2 * after_s;
-        // what both gain, as they fall, is not what drives them together where one of them lies on something
-        let driven_m_s2 = (b - a).max(b).max(-a) / self.step_s;
+        let gained_m_s = -gain_m_s2 * (self.step_s - after_s);
         // what parts for less than a macro step would hop at every step
-        let flies = 2.0 * contact.restitution * approach_m_s > driven_m_s2 * self.macro_s;
+        let flies = 2.0 * contact.restitution * approach_m_s > gain_m_s2 * self.macro_s;
         // what meets in a later step is decided then
-        (flies || after_s >= self.step_s).then_some(Meeting { after_s, approach_m_s })
+        (flies || after_s >= self.step_s).then_some(Meeting { after_s, approach_m_s, gained_m_s })
     }
-}
 
-/// Adds to what each participant is carried by, N·s²: −τ Jᵀλ of each blow, that acts τ seconds into the step (eq. 27).
-pub(super) fn note_late(search: &Search, impulses_n_s: &[DVec3], progress: &mut [Progress]) {
-    for ((contact, owner), impulse) in search.contacts.iter().zip(&search.owners).zip(impulses_n_s) {
-        let Some(meets_s) = owner.meets_s.filter(|_| contact.restitution > 0.0 && *impulse != DVec3::ZERO) else {
-            continue;
+    /// Adds to what each participant is carried by, N·s²: −τ Jᵀλ of each blow, that acts τ seconds into the step (eq. 27).
+    ///
+    /// Blows that share a body in one fine step were solved as one and come at one time, that of the first: the impulses of a light body
+    /// between two heavy ones cancel but for its own momentum, and at times of their own would carry it through both.
+    pub fn note_late(&mut self, search: &Search, impulses_n_s: &[DVec3], progress: &mut [Progress]) {
+        let Self { events, times_s, .. } = self;
+        let all = || search.contacts.iter().zip(&search.owners).zip(impulses_n_s);
+        let blows = || {
+            all().filter_map(|((contact, owner), impulse)| {
+                let meets_s = owner.meets_s.filter(|_| contact.restitution > 0.0 && *impulse != DVec3::ZERO)?;
+                Some((contact, owner, impulse, meets_s, owner.movers(contact).next()?))
+            })
         };
-        for (side, sign) in contact.sides.iter().zip([1.0, -1.0]).filter(|(side, _)| !side.terms().is_empty()) {
-            let state = &mut progress[side.member];
-            state.late.resize(state.start.len(), DVec3::ZERO);
-            for term in side.terms() {
-                state.late[term.block] -= term.map.mul_transpose_vec3(*impulse) * (sign * meets_s);
+        events.reset(progress.len());
+        blows()
+            .for_each(|(contact, owner, _, _, first)| owner.movers(contact).for_each(|body| events.join(first, body)));
+        times_s.clear();
+        times_s.resize(progress.len(), f64::INFINITY);
+        for (_, _, _, meets_s, first) in blows() {
+            let time_s = &mut times_s[events.lowest(first)];
+            *time_s = time_s.min(meets_s);
+        }
+        for (contact, _, impulse, _, first) in blows() {
+            let acts_s = times_s[events.lowest(first)];
+            for (side, sign) in contact.sides.iter().zip([1.0, -1.0]).filter(|(side, _)| !side.terms().is_empty()) {
+                let state = &mut progress[side.member];
+                state.late.resize(state.start.len(), DVec3::ZERO);
+                for term in side.terms() {
+                    state.late[term.block] -= term.map.mul_transpose_vec3(*impulse) * (sign * acts_s);
+                }
             }
         }
     }
 }
 
-/// What a side gains along a contact's normal within the step without contact, m/s.
-fn gain_m_s(side: &Side, progress: &[Progress], contact: &Contact) -> f64 {
-    let now = velocity(side, |member| &progress[member].before);
-    (velocity(side, |member| &progress[member].seen) - now).dot(contact.normal)
+fn any_rebounds(search: &Search) -> bool {
+    search.contacts.iter().any(|contact| contact.restitution > 0.0)
 }
 
 /// When a gap g closes that does so at a speed v, which grows by a: the root t of g = v t + ½ a t² at which it closes, t < 0 for g < 0.

@@ -15,6 +15,7 @@
 mod arms;
 mod blows;
 mod doubling;
+mod foresight;
 mod heap;
 mod joints;
 mod links;
@@ -53,7 +54,7 @@ pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
-use search::{Judge, Search};
+use search::Search;
 use ties::{FineStep, Ties, place_key};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
@@ -296,11 +297,14 @@ impl ClusterStepper {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
             let is_heap = self.find(scene, all, h_s);
+            self.tie(scene, all, h_s, f64::from(fine) * h_s);
+            self.recall(all, h_s);
+            if !is_heap {
+                self.rebounds.foresee(all, &mut self.search, &self.ties, &self.progress);
+            }
             if self.divide_blows(all) {
                 return Ok(false);
             }
-            self.tie(scene, all, h_s, f64::from(fine) * h_s);
-            self.recall(all, h_s);
             self.solve(on, all, h_s, report)?;
             if self.divide_blows(all) || self.divide(all, h_s) {
                 return Ok(false);
@@ -325,8 +329,6 @@ impl ClusterStepper {
         }
         if heap.is_on() {
             search.find_near(all, progress, h_s);
-        } else {
-            rebounds.choose(search, progress, Judge::Foreseen);
         }
         heap.is_on()
     }
@@ -457,7 +459,9 @@ impl ClusterStepper {
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            let place = Remembered { key: owner.key.anywhere(), force_n: impulse / h_s, owed_slip_m };
+            // a blow is over
+            let lasting = if contact.restitution > 0.0 { DVec3::ZERO } else { impulse };
+            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {

@@ -43,6 +43,11 @@ impl Owner {
         (self.member, self.partner, self.key)
     }
 
+    /// The pair that it belongs to.
+    pub const fn pair(&self) -> (usize, Partner) {
+        (self.member, self.partner)
+    }
+
     /// Its participants.
     pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
         std::iter::once(self.member).chain(self.other)
@@ -467,6 +472,7 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         friction: (skins[0].friction * skins[1].friction).sqrt(),
         restitution: restitution(skins),
         approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
+        gained_m_s: 0.0,
         surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,

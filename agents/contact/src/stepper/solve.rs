@@ -3,7 +3,6 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use super::blows::note_late;
 use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
@@ -56,7 +55,7 @@ impl ClusterStepper {
             if round == ROUNDS_MAX || !passed && joints_done {
                 break;
             }
-            rebounds.choose(search, progress, Judge::Solved);
+            rebounds.stop(search);
             if rebounds.wanted_parts().is_some() {
                 // the step is made again in shorter ones
                 return Ok(());
@@ -141,9 +140,9 @@ impl ClusterStepper {
 
     /// Gives every member the impulses found.
     fn give(&mut self, report: &mut ClusterReport) {
-        let Self { solver, search, progress, .. } = self;
+        let Self { solver, search, progress, rebounds, .. } = self;
         progress.iter_mut().for_each(Progress::take);
-        note_late(search, &solver.solution().contacts_n_s, progress);
+        rebounds.note_late(search, &solver.solution().contacts_n_s, progress);
         progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);

@@ -12,6 +12,7 @@ mod own_model;
 mod passing;
 mod rebounds;
 mod scenes;
+mod sets;
 mod shapes;
 mod slope;
 mod stacks;

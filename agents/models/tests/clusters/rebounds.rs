@@ -86,6 +86,29 @@ fn balls_of_one_cluster_bounce_each_as_if_alone() {
 }
 
 #[test]
+fn a_ball_rebounds_off_a_box_that_lies_as_off_the_ground() {
+    for restitution in [0.5, 0.8] {
+        for rate_hz in [60.0, 137.0, 240.0, 1000.0] {
+            let half_m = 0.1;
+            let slab = rigid(Solid::Box { half_extents_m: DVec3::splat(half_m) }, DVec3::Z * half_m, 2.0);
+            let above =
+                RigidSpec { position: ball(0.0, 0.0).position + DVec3::Z * 2.0 * half_m, ..ball(0.0, restitution) };
+            let bodies = [slab, above].map(|spec| placed(RigidBody::new(spec).unwrap(), false));
+            let mut table = Table::new(bodies.into()).at_rates(rate_hz, rate_hz);
+            for (bounce, top_m) in (1..).zip(tops(&mut table, 1, 5)) {
+                let (top_m, exact_m) = (top_m - 2.0 * half_m, restitution.powi(2 * bounce) * HEIGHT_M);
+                if exact_m < 2e-3 {
+                    break; // what flies for little more than a step
+                }
+                let (off, here) = (top_m / exact_m - 1.0, format!("e {restitution}, {rate_hz} Hz, bounce {bounce}"));
+                // never above: box and ball give way by a five-hundredth of the blow
+                assert!((-1e-2..1e-9).contains(&off), "{here}: {top_m} of {exact_m}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_ball_without_restitution_stays_where_it_lands() {
     for rate_hz in [60.0, 240.0] {
         let ball = placed(RigidBody::new(ball(0.0, 0.0)).unwrap(), false);
@@ -184,4 +207,24 @@ fn a_pile_of_boxes_that_rebound_comes_to_rest() {
     assert!(found.gain_j < 6.5e-3, "{found:?}");
     assert!(found.rest_m < 5e-5 && found.lowest_m > 0.9 * half_m, "{found:?}");
     assert!((found.weight - 1.0).abs() < 1e-2, "{found:?}");
+}
+
+#[test]
+fn a_light_box_that_bounces_between_a_heavy_one_and_the_floor_stays_between_them() {
+    let boxed = |half_m: f64, bottom_m: f64, mass_kg: f64, restitution: f64| {
+        let solid = Solid::Box { half_extents_m: DVec3::splat(half_m) };
+        let spec = rigid(solid, DVec3::Z * (bottom_m + half_m), mass_kg);
+        placed(RigidBody::new(RigidSpec { restitution, ..spec }).unwrap(), false)
+    };
+    for gap_m in [0.01, 0.02, 0.03, 0.05] {
+        for (lower_hz, upper_hz) in [(60.0, 60.0), (240.0, 240.0), (240.0, 30.0), (30.0, 1000.0)] {
+            let bodies = vec![boxed(0.08, 0.06, 0.4, 0.5), boxed(0.1, 0.22 + gap_m, 90.0, 0.0)];
+            let found = Table::new(bodies).at_rates(lower_hz, upper_hz).play(1.0);
+            let here = format!("gap {gap_m} m, {lower_hz} : {upper_hz} Hz");
+            let deepest_m = found.landing_m.max(found.rest_m);
+            assert!(deepest_m < 1e-3, "{here}: {deepest_m} m deep");
+            assert!(found.gain_j < 0.01, "{here}: {} J made", found.gain_j);
+            assert!((found.highest_m - 0.26).abs() < 1e-4, "{here}: it lies at {} m", found.highest_m);
+        }
+    }
 }

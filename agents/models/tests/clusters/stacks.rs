@@ -24,12 +24,12 @@ impl Draw {
         low + (high - low) * ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn below(&mut self, count: usize) -> usize {
+    pub fn below(&mut self, count: usize) -> usize {
         (self.between(0.0, count as f64) as usize).min(count - 1)
     }
 
     /// A number whose logarithm is even between these.
-    fn power(&mut self, low: f64, high: f64) -> f64 {
+    pub fn power(&mut self, low: f64, high: f64) -> f64 {
         libm::pow(10.0, self.between(low, high))
     }
 }

@@ -139,6 +139,7 @@ pub fn contact(sides: [Side; 2], normal: DVec3) -> Contact {
         friction: 0.5,
         restitution: 0.0,
         approach_m_s: 0.0,
+        gained_m_s: 0.0,
         surface_m_s: DVec3::ZERO,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,

@@ -138,7 +138,8 @@ fn a_ball_that_falls_again_and_again_rises_by_the_square_of_its_restitution() {
         let mut body = rigid(0.3, DVec3::splat(0.02));
         body.free[0].z = speed - 9.81 * h_s;
         let side = [Side::rigid(0, DVec3::ZERO), Side::FIXED];
-        let touch = Contact { restitution, approach_m_s: -speed, gap_m: height, ..contact(side, DVec3::Z) };
+        let fall = Contact { approach_m_s: -speed, gained_m_s: -9.81 * h_s, ..contact(side, DVec3::Z) };
+        let touch = Contact { restitution, gap_m: height, ..fall };
         let case = Case { h_s, bodies: vec![body], contacts: vec![touch], rows: Vec::new() };
         let before = speed;
         speed = case.with(|problem| solver.solve(problem).unwrap().velocities(0)[0].z);
