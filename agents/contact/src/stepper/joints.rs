@@ -35,8 +35,18 @@ pub(super) struct Joints {
 struct Held {
     joint: Joint,
     members: (usize, Option<usize>),
-    /// How far it is off when the step begins.
+    /// How far it is off when the step begins, and the rotations of both.
     now: Off,
+    rotations: [DQuat; 2],
+}
+
+/// What joints do with some velocities by the end of a fine step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Aimed {
+    /// By how much one misses what it is to hold, metres or radians.
+    pub miss_m: f64,
+    /// By how much a body in a joint turns.
+    pub turn_rad: f64,
 }
 
 /// What a row of a joint is about.
@@ -122,7 +132,7 @@ impl Joints {
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
-        self.held.push(Held { joint: *joint, members: (first, second), now });
+        self.held.push(Held { joint: *joint, members: (first, second), now, rotations: [a.rotation, b.rotation] });
         let held = self.held.len() - 1;
         let axis = joint.axis(&a, anchors[1] - anchors[0]);
         let mut key = 0;
@@ -162,21 +172,25 @@ impl Joints {
     }
 
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
-    /// Returns by how much they would miss that with these velocities themselves, metres or radians.
+    /// Returns what they would do with these velocities themselves.
     pub fn aim<'v>(
         &self,
         all: &[Participant<'_>],
         ties: &mut Ties,
         velocities: impl Fn(usize) -> &'v [DVec3],
         h_s: f64,
-    ) -> f64 {
-        let mut worst = 0.0_f64;
+    ) -> Aimed {
+        let mut aimed = Aimed::default();
         let mut then = None;
         for part in &self.parts {
             let held = &self.held[part.held];
             let off = match then {
                 Some((at, off)) if at == part.held => off,
-                _ => held.off_after(all, &velocities, h_s),
+                _ => {
+                    let (off, turn_rad) = held.after(all, &velocities, h_s);
+                    aimed.turn_rad = aimed.turn_rad.max(turn_rad);
+                    off
+                }
             };
             then = Some((part.held, off));
             let row = &mut ties.rows[part.row];
@@ -184,24 +198,26 @@ impl Joints {
             let miss = part.way.off(&off, row) - wanted;
             let [a, b] = row.sides.map(|side| velocity(&side, &velocities));
             row.target_m_s = a - b - miss / h_s;
-            worst = worst.max(part.way.missed(miss, row));
+            aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
         }
-        worst
+        aimed
     }
 }
 
 impl Held {
-    /// How far it is off once its bodies have moved on for `h_s` seconds.
-    fn off_after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> Off {
+    /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much one of them has turned then.
+    fn after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> (Off, f64) {
         let at = |member: usize| all[member].member.pose(velocities(member), h_s);
         let (a, b) = self.members;
-        let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return self.now };
+        let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return (self.now, 0.0) };
+        let turned = [&a, &b].into_iter().zip(self.rotations).map(|(then, now)| then.rotation.angle_between(now));
+        let turn_rad = turned.fold(0.0, f64::max);
         let mut off = self.joint.off(&a, &b);
         if matches!(self.joint.kind, JointKind::Revolute { .. }) {
             // angles are known but for whole turns
             off.travel += ((self.now.travel - off.travel) / TAU).round() * TAU;
         }
-        off
+        (off, turn_rad)
     }
 }
 

@@ -171,6 +171,8 @@ pub struct ClusterStepper {
     /// The macro step that is made and its fine steps, seconds.
     macro_s: f64,
     fine_s: f64,
+    /// How many times as many fine steps joints ask for that do not hold, or in which bodies turn too far.
+    joints_ask: u32,
 }
 
 impl Default for ClusterStepper {
@@ -200,6 +202,7 @@ impl ClusterStepper {
             local: Default::default(),
             macro_s: 0.0,
             fine_s: 0.0,
+            joints_ask: 1,
         }
     }
 
@@ -306,7 +309,7 @@ impl ClusterStepper {
                 return Ok(false);
             }
             self.solve(on, all, h_s, report)?;
-            if self.divide_blows(all) || self.divide(all, h_s) {
+            if self.divide_blows(all) || self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
@@ -350,6 +353,20 @@ impl ClusterStepper {
             }
         }
         true
+    }
+
+    /// Gives shorter steps to rigid members where joints ask for them; whether it does.
+    fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
+        if self.joints_ask <= 1 {
+            return false;
+        }
+        let mut any = false;
+        for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
+            let most = one.parts * DIVIDED_MAX;
+            any |= state.parts < most;
+            state.parts = (state.parts * self.joints_ask).min(most);
+        }
+        any
     }
 
     /// Gives shorter steps to members that the solution strains too far; whether there are any.

@@ -3,10 +3,11 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::joints::Aimed;
 use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
-use super::{ClusterReport, ClusterStepper, On, Participant, Role};
+use super::{ClusterReport, ClusterStepper, On, Participant, Role, times};
 use crate::cluster::{Member, Problem, ProblemError};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
@@ -15,6 +16,8 @@ use metachron_core::{ParallelFor, StepError, recycled};
 const ROUNDS_MAX: u32 = 6;
 /// Joints hold to this share of the depth of contacts, in metres and radians.
 const JOINT_SHARE: f64 = 0.25;
+/// By how much a body in a joint may turn in a fine step: the force of the joint is where it is at the start.
+const TURN_MAX_RAD: f64 = 0.15;
 
 impl ClusterStepper {
     /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
@@ -27,6 +30,7 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         report.contacts = 0;
+        self.joints_ask = 1;
         if self.search.contacts.is_empty() && self.ties.rows.is_empty() {
             // what touches nothing moves as it would
             self.progress.iter_mut().for_each(Progress::go_on);
@@ -36,7 +40,7 @@ impl ClusterStepper {
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
-            let Self { solver, search, ties, joints, progress, depth_m, rebounds, heap, .. } = &mut *self;
+            let Self { solver, search, ties, joints, joints_ask, progress, depth_m, rebounds, heap, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -45,13 +49,15 @@ impl ClusterStepper {
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            let miss_m = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
+            let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joints_done = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
             let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
+            let opens = if miss_m < JOINT_SHARE * *depth_m { 1 } else { 2 };
+            *joints_ask = times(turn_rad / TURN_MAX_RAD).max(opens);
             if round == ROUNDS_MAX || !passed && joints_done {
                 break;
             }

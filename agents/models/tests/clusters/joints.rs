@@ -144,6 +144,21 @@ fn a_chain_that_swings_a_weight_of_a_hundred_links_keeps_its_length() {
 }
 
 #[test]
+fn a_chain_let_go_from_level_whips_and_keeps_its_length_and_its_energy() {
+    let (ratio, rate_hz, seconds) = (50.0, 240.0, 4.0);
+    let mut table = chain(ratio, DVec3::X, rate_hz);
+    let (start_j, fall_j) = (table.energy_j(), ratio * G * 4.0);
+    let (mut worst_m, mut off_j) = (0.0_f64, 0.0_f64);
+    while table.time.as_secs_f64() < seconds {
+        table.step();
+        worst_m = worst_m.max(stretch(&table, 20));
+        off_j = off_j.max((table.energy_j() - start_j).abs());
+    }
+    assert!(worst_m < 1e-5, "a joint opened by {worst_m:e} m");
+    assert!(off_j < 0.02 * fall_j, "{off_j} J of {fall_j}");
+}
+
+#[test]
 fn links_of_a_thousandth_of_what_they_carry_do_not_begin_to_tremble() {
     // three links of 10 g above 10 kg that swings: their own swings of 600 1/s are far beyond steps of 1/60 s
     let rotation = DQuat::from_rotation_y(0.3);
