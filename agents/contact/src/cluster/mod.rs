@@ -64,6 +64,7 @@ mod shifts;
 mod side;
 mod skew;
 mod solver;
+mod sparse_factor;
 mod system;
 mod tiles;
 mod validate;
@@ -73,6 +74,7 @@ pub use joint::{Hold, JointRow, Spring};
 pub use problem::{Block, Contact, Member, Problem, Response};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};
+pub use sparse_factor::SparseFactor;
 pub use system::StepForm;
 
 #[cfg(test)]

@@ -46,9 +46,4 @@ impl BendingElement {
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         0.5 * self.stiffness * self.bent(positions).length_squared()
     }
-
-    /// The vertices that it joins.
-    pub fn vertices(&self) -> [u32; 5] {
-        self.vertices
-    }
 }

@@ -53,8 +53,8 @@ impl SoftBody {
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
         let surface = mesh.surface();
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
-        Ok(Self {
-            system: mesh.system(),
+        let mut body = Self {
+            system: System::new(&mesh.held),
             free: positions.clone(),
             before: velocities.clone(),
             positions,
@@ -70,7 +70,11 @@ impl SoftBody {
             steps: 0,
             unknowns: Unknowns::default(),
             spec,
-        })
+        };
+        // what a step costs is known before the first
+        body.assemble(1e-3);
+        body.system.shape();
+        Ok(body)
     }
 
     /// Its vertices in the form of a snapshot.
@@ -194,6 +198,6 @@ impl Agent for SoftBody {
 impl SoftBody {
     /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
     pub(super) fn work(&self) -> f64 {
-        1e-3 * self.system.work() as f64 + 0.5 * self.mesh.elements() as f64
+        1e-3 * self.system.work() + 0.5 * self.mesh.elements() as f64
     }
 }

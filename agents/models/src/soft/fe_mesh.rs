@@ -193,21 +193,6 @@ impl FeMesh {
         self.radius_m = radius_m;
     }
 
-    /// The system of this body: its sparsity pattern over the moving vertices.
-    pub fn system(&self) -> System {
-        let mut first: Vec<u32> = (0..self.rest.len() as u32).collect();
-        let mut join = |vertices: &[u32]| {
-            let moving = || vertices.iter().copied().filter(|v| !self.held[*v as usize]);
-            let lowest = moving().min().unwrap_or(0);
-            moving().for_each(|v| first[v as usize] = first[v as usize].min(lowest));
-        };
-        self.bars.iter().for_each(|bar| join(&bar.ends));
-        self.triangles.iter().for_each(|corners| join(corners));
-        self.bending.iter().for_each(|element| join(&element.vertices()));
-        self.hexahedra.iter().for_each(|hexahedron| join(&hexahedron.vertices));
-        System::new(&first, &self.held)
-    }
-
     /// Adds the forces and stiffness of all elements at these positions; updates the cells' rotations.
     pub fn add(&mut self, positions: &[DVec3], system: &mut System) {
         self.bars.iter().for_each(|bar| bar.add(positions, system));

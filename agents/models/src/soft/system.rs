@@ -3,15 +3,17 @@
 //! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Response};
-use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
+use metachron_contact::cluster::{Block, Response, SparseFactor};
+use metachron_core::PlainLoop;
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct System {
-    matrix: Factor,
-    /// Lowest row that each row is joined to.
-    first: Vec<u32>,
+    factor: SparseFactor,
+    /// The row of each vertex; none for held ones. Rows rise with the vertices.
+    rows: Vec<Option<u32>>,
+    /// How many vertices move.
+    moving: usize,
     /// Force on each vertex at the start of the substep, N.
     pub forces: Vec<DVec3>,
     /// The lower half of the matrix as blocks of moving vertices, as they were added.
@@ -20,36 +22,17 @@ pub(super) struct System {
     square: f64,
 }
 
-/// The matrix of the moving vertices, and then its factor.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Factor {
-    matrix: SkylineCholesky<3>,
-    /// The row of each vertex; none for held ones. Rows rise with the vertices.
-    rows: Vec<Option<u32>>,
-}
-
 impl System {
-    /// A system in which each moving vertex i is joined to no moving vertex lower than `first[i]`.
-    pub fn new(first: &[u32], held: &[bool]) -> Self {
+    /// A system of vertices of which some are held.
+    pub fn new(held: &[bool]) -> Self {
         let mut next = 0..;
-        let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
-        let first: Vec<u32> =
-            rows.iter().zip(first).filter_map(|(row, first)| row.and(rows[*first as usize])).collect();
-        let mut matrix = SkylineCholesky::default();
-        matrix.shape(&first);
-        Self {
-            matrix: Factor { matrix, rows },
-            first,
-            forces: vec![DVec3::ZERO; held.len()],
-            blocks: vec![],
-            square: 0.0,
-        }
+        let rows = held.iter().map(|&held| if held { None } else { next.next() }).collect();
+        let moving = held.iter().filter(|held| !**held).count();
+        Self { rows, moving, forces: vec![DVec3::ZERO; held.len()], ..Self::default() }
     }
 
     /// Begins a substep of `h` seconds: no force, no stiffness.
     pub fn begin(&mut self, h: f64) {
-        // the factor overwrote the matrix in place, of the same shape
-        self.matrix.matrix.clear();
         self.blocks.clear();
         self.forces.fill(DVec3::ZERO);
         self.square = h * h;
@@ -72,30 +55,36 @@ impl System {
         self.add(vertex, vertex, inertia);
     }
 
-    fn add(&mut self, i: usize, j: usize, block: DMat3) {
-        let Factor { matrix, rows } = &mut self.matrix;
-        if let (Some(row), Some(column)) = (rows[i], rows[j]) {
-            self.blocks.push(Block { row: row as usize, column: column as usize, value: block });
-            matrix.add_block(
-                BlockIndex { row: row as usize, column: column as usize },
-                block.transpose().to_cols_array_2d(),
-            );
+    fn add(&mut self, i: usize, j: usize, value: DMat3) {
+        if let (Some(row), Some(column)) = (self.rows[i], self.rows[j]) {
+            self.blocks.push(Block { row: row as usize, column: column as usize, value });
         }
+    }
+
+    /// Takes up where the matrix that was added has blocks.
+    pub fn shape(&mut self) {
+        self.factor.shape(self.moving, &self.blocks);
     }
 
     /// Factors the matrix; `false` where it is not positive.
     pub fn factor(&mut self) -> bool {
-        self.matrix.matrix.factor()
+        // members of a cluster begin side by side: a factor is one thread's
+        self.factor.factor(self.moving, &self.blocks, &PlainLoop).is_ok()
     }
 
     /// The factor.
-    pub const fn answer(&self) -> &Factor {
-        &self.matrix
+    pub const fn answer(&self) -> &SparseFactor {
+        &self.factor
     }
 
-    /// Replaces impulses, one for each vertex (N·s), by the velocities they cause (m/s) by the factor (eq. 2).
+    /// Replaces impulses, one for each vertex (N·s), by the velocities they cause (m/s) by the factor (eq. 2); held vertices stay still.
     pub fn respond(&self, impulses: &mut [DVec3]) {
-        self.matrix.respond_at(impulses);
+        let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
+        rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);
+        self.factor.respond(&mut impulses[..self.moving]);
+        for (vertex, row) in self.rows.iter().enumerate().rev() {
+            impulses[vertex] = row.map_or(DVec3::ZERO, |row| impulses[row as usize]);
+        }
     }
 
     /// The lower half of the matrix, in blocks of moving vertices; entries with one place add up.
@@ -105,30 +94,11 @@ impl System {
 
     /// The row of each vertex among those that move; none for held ones.
     pub fn rows(&self) -> &[Option<u32>] {
-        &self.matrix.rows
+        &self.rows
     }
 
     /// Cost of a factorisation, multiplications.
-    pub fn work(&self) -> usize {
-        SkylineCholesky::<3>::work(&self.first)
-    }
-}
-
-impl Response for Factor {
-    /// One impulse for each moving vertex.
-    fn respond(&self, impulses: &mut [DVec3]) {
-        self.matrix.solve_vectors(impulses);
-    }
-}
-
-impl Factor {
-    /// A⁻¹ on impulses, one for each vertex; held vertices stay still.
-    pub fn respond_at(&self, impulses: &mut [DVec3]) {
-        let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
-        rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);
-        self.matrix.solve_vectors(&mut impulses[..self.matrix.rows() / 3]);
-        for (vertex, row) in self.rows.iter().enumerate().rev() {
-            impulses[vertex] = row.map_or(DVec3::ZERO, |row| impulses[row as usize]);
-        }
+    pub fn work(&self) -> f64 {
+        self.factor.cost()
     }
 }

@@ -1,0 +1,51 @@
+//! What does a step of a solid or a sheet by itself take? Prints milliseconds a step by the number of nodes.
+
+use glam::{DQuat, DVec3};
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use std::time::Instant;
+
+const WARM_UP: u32 = 20;
+const STEPS: u32 = 40;
+
+fn main() {
+    for cells in [4, 6, 8, 10, 12] {
+        let shape = SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] };
+        let matter = SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2 };
+        step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, matter, Side::Bottom);
+    }
+    for cells in [10, 20, 30, 44] {
+        let shape = SoftShape::Sheet { size_m: [0.3; 2], thickness_m: 0.004, segments: [cells; 2] };
+        let matter = SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 0.2 };
+        step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, matter, Side::Left);
+    }
+}
+
+fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
+    let spec = SoftSpec {
+        shape,
+        matter,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        held: vec![held],
+        friction: 0.5,
+        gravity: DVec3::Z * -9.81,
+        sleep: false,
+    };
+    let Ok(mut body) = SoftBody::new(spec) else { return println!("{name}: refused") };
+    let dt = SimSpan::from_millis(10);
+    let mut time = SimTime::ZERO;
+    let mut started = Instant::now();
+    for at in 0..WARM_UP + STEPS {
+        if at == WARM_UP {
+            started = Instant::now();
+        }
+        if let Err(error) = body.step(dt, &StepContext::alone(AgentId(0), time)) {
+            return println!("{name}: {error}");
+        }
+        time += dt;
+    }
+    println!("{name}: {:7.3} ms a step", 1e3 * started.elapsed().as_secs_f64() / f64::from(STEPS));
+}
