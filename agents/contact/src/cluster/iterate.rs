@@ -117,6 +117,16 @@ impl Iterate {
         self.steps = 0;
     }
 
+    /// Starts from where members go on as they were.
+    pub fn guess(&mut self, members: &[Member<'_>]) {
+        let mut start = 0;
+        for member in members {
+            let change = &mut self.state.change[start..start + member.free.len()];
+            change.iter_mut().zip(member.now).zip(member.free).for_each(|((x, now), free)| *x = *now - *free);
+            start += member.free.len();
+        }
+    }
+
     /// Velocities as the impulses make them: momentum to rounding by a factor, else to the share of it that is wanted (eq. 17).
     pub fn respond(&mut self, members: &[Member<'_>]) {
         let Self { rows, system, state, scratch, .. } = self;

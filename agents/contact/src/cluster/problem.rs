@@ -40,6 +40,8 @@ pub struct Member<'a> {
     pub blocks: &'a [Block],
     /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that moves as it is told.
     pub free: &'a [DVec3],
+    /// Its velocities when the step began, near which gradients look for the answer first; empty where nothing is known.
+    pub now: &'a [DVec3],
     /// How much of its own step an impulse moves it by, in fine steps: f ≥ 1 where its step is longer than h, else 1.
     pub share: f64,
     /// The factor of A that it lends; `None` to have A factored here. What is lent is taken for positive definite.

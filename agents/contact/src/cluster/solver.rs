@@ -120,6 +120,11 @@ pub struct Solver {
 }
 
 impl Solver {
+    /// Solves the equations of steps by this form from now on.
+    pub fn set_form(&mut self, form: StepForm) {
+        self.settings.form = form;
+    }
+
     /// A solver with its settings.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
@@ -182,6 +187,7 @@ impl Solver {
     fn start(&mut self, members: &[Member<'_>]) {
         self.iterate.state.lambda.clone_from(&self.warm);
         self.iterate.rows.rows.iter_mut().zip(&self.compliances).for_each(|(row, r)| row.compliance = *r);
+        self.iterate.guess(members);
         self.iterate.respond(members);
     }
 

@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
 use super::{ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Member, Problem, ProblemError};
+use crate::cluster::{Member, Problem, ProblemError, RIGID_BLOCKS, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -92,9 +92,13 @@ impl ClusterStepper {
             blocks: one.member.blocks(),
             response: one.member.response(),
             free: &state.seen,
+            now: &state.before,
             share: f64::from(state.part),
         }));
         move_sides(search, ties, |member| progress[member].place);
+        // one that bends and lends no factor is too large for one
+        let lends = |member: &Member<'_>| member.response.is_some() || member.free.len() <= RIGID_BLOCKS;
+        solver.set_form(if list.iter().all(lends) { StepForm::Direct } else { StepForm::Iterative });
         let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = recycled(list);

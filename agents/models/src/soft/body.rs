@@ -26,6 +26,8 @@ pub struct SoftBody {
     pub(super) velocities: Vec<DVec3>,
     /// The velocities at the end of a substep without contact.
     pub(super) free: Vec<DVec3>,
+    /// What they would have at its end if nothing held them together, kg·m/s.
+    pub(super) impulses: Vec<DVec3>,
     pub(super) ties: Vec<VertexSpring>,
     pub(super) form: Arc<CollisionShape>,
     pub(super) grips: Vec<Grip>,
@@ -47,14 +49,16 @@ impl SoftBody {
     /// [`SoftError`] for a number outside its range, a side it does not have.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let mesh = FeMesh::new(&spec);
+        let mut mesh = FeMesh::new(&spec);
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
         let surface = mesh.surface();
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
-        let mut body = Self {
-            system: System::new(&mesh.held),
+        let system = mesh.system(&positions);
+        Ok(Self {
+            system,
+            impulses: vec![],
             free: positions.clone(),
             before: velocities.clone(),
             positions,
@@ -70,11 +74,7 @@ impl SoftBody {
             steps: 0,
             unknowns: Unknowns::default(),
             spec,
-        };
-        // what a step costs is known before the first
-        body.assemble(1e-3);
-        body.system.shape();
-        Ok(body)
+        })
     }
 
     /// Its vertices in the form of a snapshot.

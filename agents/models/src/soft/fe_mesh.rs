@@ -193,6 +193,12 @@ impl FeMesh {
         self.radius_m = radius_m;
     }
 
+    /// The system of this body.
+    pub fn system(&mut self, positions: &[DVec3]) -> System {
+        let (held, bulky) = (self.held.clone(), !self.hexahedra.is_empty());
+        System::new(&held, bulky, |system| self.add(positions, system))
+    }
+
     /// Adds the forces and stiffness of all elements at these positions; updates the cells' rotations.
     pub fn add(&mut self, positions: &[DVec3], system: &mut System) {
         self.bars.iter().for_each(|bar| bar.add(positions, system));

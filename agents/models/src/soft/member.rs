@@ -4,6 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 1–3; docs/theory/clusters.md, section 9.
 
 use super::body::SoftBody;
+use super::system::Purpose;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
@@ -70,7 +71,7 @@ impl ClusterMember for SoftBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         self.ties.clear();
-        self.predict(h_s).map_err(|what| self.diverged(what, h_s))?;
+        self.predict(h_s, Purpose::Shared).map_err(|what| self.diverged(what, h_s))?;
         let Self { system, free, velocities, positions, unknowns, .. } = self;
         let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
             into.clear();
@@ -87,7 +88,7 @@ impl ClusterMember for SoftBody {
     }
 
     fn response(&self) -> Option<&dyn Response> {
-        Some(self.system.answer())
+        self.system.response().map(|factor| factor as &dyn Response)
     }
 
     fn free(&self) -> &[DVec3] {

@@ -10,6 +10,7 @@ mod bar;
 mod bending;
 mod body;
 mod fe_mesh;
+mod gradients;
 mod grid;
 mod hexahedron;
 mod member;

@@ -116,7 +116,7 @@ pub enum SoftError {
 }
 
 /// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.
-pub const VERTICES_MAX: u64 = 2048;
+pub const VERTICES_MAX: u64 = 10_000;
 
 impl SoftShape {
     /// The model's name as scenes write it.

@@ -3,6 +3,7 @@
 //! In: a state and the springs on it. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
+use super::system::Purpose;
 use glam::{DMat3, DVec3};
 use metachron_contact::StepContext;
 use metachron_core::StepError;
@@ -25,7 +26,7 @@ impl SoftBody {
         let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
         while left > 0 {
             let h = dt / f64::from(parts);
-            self.predict(h).map_err(|what| self.diverged(what, dt))?;
+            self.predict(h, Purpose::Own).map_err(|what| self.diverged(what, dt))?;
             if self.mesh.edge_change(|vertex| self.free[vertex as usize], h) > EDGE_CHANGE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
                 continue;
@@ -41,17 +42,15 @@ impl SoftBody {
     }
 
     /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–3).
-    pub(super) fn predict(&mut self, h: f64) -> Result<(), &'static str> {
+    pub(super) fn predict(&mut self, h: f64, purpose: Purpose) -> Result<(), &'static str> {
         self.assemble(h);
-        if !self.system.factor() {
-            return Err("the stiffness matrix is not positive definite");
-        }
-        let Self { system, mesh, velocities, free, .. } = self;
-        free.clear();
+        let Self { system, mesh, velocities, free, impulses, .. } = self;
+        impulses.clear();
         let momenta = velocities.iter().zip(&mesh.mass_kg).map(|(v, mass)| *v * *mass);
-        free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
-        system.respond(free);
-        Ok(())
+        impulses.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
+        free.clone_from(velocities);
+        let solved = system.solve(impulses, free, purpose);
+        if solved { Ok(()) } else { Err("the stiffness matrix is not positive definite") }
     }
 
     /// Assembles the system of a substep of `h` seconds at the present positions.
@@ -68,7 +67,7 @@ impl SoftBody {
     }
 
     /// Moves with the predicted velocities.
-    fn finish_substep(&mut self, h: f64) {
+    pub(super) fn finish_substep(&mut self, h: f64) {
         let Self { positions, velocities, free, ties, .. } = self;
         std::mem::swap(velocities, free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);

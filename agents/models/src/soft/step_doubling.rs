@@ -5,6 +5,7 @@
 
 use super::anchor_springs::VertexSpring;
 use super::body::SoftBody;
+use super::system::Purpose;
 use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_core::step_doubling::{DoublingSchedule, farthest};
@@ -56,7 +57,7 @@ impl SoftBody {
 
     /// One substep of the repetition, which is not published; returns whether it could be solved.
     fn half(&mut self, h: f64) -> bool {
-        if self.predict(h).is_err() {
+        if self.predict(h, Purpose::Own).is_err() {
             return false;
         }
         let Self { positions, velocities, free, ties, .. } = self;

@@ -1,6 +1,7 @@
 //! What a soft body must do, against closed forms.
 
 mod error;
+mod large;
 mod promises;
 mod skins;
 mod statics;
@@ -156,7 +157,7 @@ fn an_invalid_spec_is_refused_with_its_limit() {
     assert!(fails(SoftSpec { matter: rubber, ..spec(solid()) }).contains("0.49"));
     assert!(fails(SoftSpec { held: vec![Side::Top], ..spec(SHEET) }).contains("a sheet has no side `top`"));
     let fine = SoftShape::Ball { radius_m: 0.1, segments: 40 };
-    assert!(fails(spec(fine)).contains("68921 vertices; at most 2048"));
+    assert!(fails(spec(fine)).contains("68921 vertices; at most 10000"));
     let point = SoftShape::Rope { path_m: vec![DVec3::X; 3], radius_m: 0.01, segments: 4 };
     assert!(fails(spec(point)).contains("two different points"));
     let bad = SoftShape::Box { size_m: DVec3::new(1.0, f64::NAN, 1.0), segments: [1; 3] };

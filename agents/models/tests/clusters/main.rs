@@ -7,6 +7,7 @@ mod grasp;
 mod hands;
 mod heaps;
 mod joints;
+mod large;
 mod links;
 mod own_model;
 mod passing;

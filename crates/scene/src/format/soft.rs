@@ -10,7 +10,7 @@ use serde::Deserialize;
 pub struct SheetFile {
     /// Length along its x and y axes, metres, each 1e-6 … 1e4.
     pub size_m: [f64; 2],
-    /// Cells along x and y; at most 2048 vertices in all.
+    /// Cells along x and y; at most 10,000 vertices in all.
     pub segments: [u32; 2],
     /// Thickness, metres, 1e-6 … 1e4.
     pub thickness_m: f64,
@@ -46,7 +46,7 @@ pub struct SolidFile {
     pub size_m: Option<Point>,
     /// Radius of a ball, metres, 1e-6 … 1e4.
     pub radius_m: Option<f64>,
-    /// Cells along x, y and z, for a ball three equal numbers of at least 2; at most 2048 vertices in all.
+    /// Cells along x, y and z, for a ball three equal numbers of at least 2; at most 10,000 vertices in all.
     pub segments: [u32; 3],
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,

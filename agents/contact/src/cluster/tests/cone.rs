@@ -75,7 +75,7 @@ fn slopes_are_those_of_differences() {
 /// A point of 1 kg that meets the floor at 1 m/s, the floor asking for `push_m_s` more.
 fn falling(push_m_s: f64) -> Iterate {
     let blocks = [diagonal(0, DVec3::ONE)];
-    let members = [Member { blocks: &blocks, free: &FALL, share: 1.0, response: None }];
+    let members = [Member { blocks: &blocks, free: &FALL, now: &[], share: 1.0, response: None }];
     let h_s = 0.01;
     let gap_m = -push_m_s * h_s / 0.2;
     let contacts = [Contact { gap_m, ..contact([Side::node(0, 0), Side::FIXED], DVec3::Z) }];

@@ -36,7 +36,7 @@ fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
     let response = |k: usize| (lends && k.is_multiple_of(2)).then(|| &lent[k] as &dyn Response);
     let bodies = case.bodies.iter().enumerate();
     let members: Vec<_> = bodies
-        .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, share: 1.5, response: response(k) })
+        .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, now: &[], share: 1.5, response: response(k) })
         .collect();
     let (contacts, rows) = (&case.contacts, &case.rows);
     let problem = Problem { h_s: case.h_s, members: &members, contacts, rows, threads: &PlainLoop };

@@ -68,7 +68,7 @@ impl Case {
         let members: Vec<_> = self
             .bodies
             .iter()
-            .map(|b| Member { blocks: &b.blocks, free: &b.free, share: 1.0, response: None })
+            .map(|b| Member { blocks: &b.blocks, free: &b.free, now: &[], share: 1.0, response: None })
             .collect();
         work(&Problem {
             h_s: self.h_s,

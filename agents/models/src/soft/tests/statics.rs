@@ -53,7 +53,7 @@ fn a_strip_of_sheet_bends_like_a_plate() {
         for (held, rest) in body.mesh.held.iter_mut().zip(&body.mesh.rest) {
             *held |= rest.x < 1.5 * first;
         }
-        body.system = body.mesh.system();
+        body.system = body.mesh.system(&body.positions);
         let tip = settled(&mut body, 0.02, 400).positions.last().unwrap().z;
         // two rows make a wall half-way between them
         let free = length - 0.5 * first;

@@ -1,0 +1,141 @@
+//! Conjugate gradients for large solids: what a factor would take N² for, some tens of products do.
+//!
+//! In: the lower half of a symmetric positive definite matrix in 3 × 3 blocks, a right side, a start. Out: a solution. Never here: elements.
+//! Theory: docs/theory/soft.md, eq. 4.
+
+use glam::{DMat3, DVec3};
+use metachron_contact::cluster::Block;
+
+/// What is left may change no vertex by itself by more than this, m/s: a hundredth of what contacts are solved to.
+const LEFT_M_S: f64 = 5e-8;
+/// The most products of one solution: far beyond what a solid takes.
+const PRODUCTS_MAX: u32 = 2000;
+
+/// The storage of conjugate gradients.
+#[derive(Debug, Default)]
+pub(super) struct Gradients {
+    /// The inverse of each diagonal block.
+    mobilities: Vec<DMat3>,
+    left: Vec<DVec3>,
+    direction: Vec<DVec3>,
+    image: Vec<DVec3>,
+    /// Products of the last solution.
+    pub products: u32,
+}
+
+impl Gradients {
+    /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places; `false` where A is found
+    /// not to be positive definite, or the solution not to end.
+    pub fn solve(&mut self, blocks: &[Block], diagonal: &[u32], right: &[DVec3], x: &mut [DVec3]) -> bool {
+        let Self { mobilities, left, direction, image, products } = self;
+        mobilities.clear();
+        mobilities.extend(diagonal.iter().map(|at| blocks[*at as usize].value.inverse()));
+        image.resize(x.len(), DVec3::ZERO);
+        let together = together(blocks).inverse();
+        // what falls freely is solved by the second of these alone
+        for products_so_far in 1..=2 {
+            multiply(blocks, x, image);
+            *products = products_so_far;
+            left.clear();
+            left.extend(right.iter().zip(&*image).map(|(right, image)| *right - *image));
+            if products_so_far == 1 {
+                shift(x, together, left);
+            }
+        }
+        direction.clear();
+        direction.resize(x.len(), DVec3::ZERO);
+        let mut power = f64::INFINITY;
+        while *products < PRODUCTS_MAX {
+            let (mut size, mut worst) = (0.0, 0.0_f64);
+            for (left, mobility) in left.iter().zip(&*mobilities) {
+                let answer = *mobility * *left;
+                size += left.dot(answer);
+                worst = worst.max(answer.abs().max_element());
+            }
+            if worst <= LEFT_M_S {
+                shift(x, together, left);
+                return x.iter().all(|x| x.is_finite());
+            }
+            let kept = size / std::mem::replace(&mut power, size);
+            if !(size > 0.0 && size.is_finite()) {
+                return false;
+            }
+            for ((direction, left), mobility) in direction.iter_mut().zip(&*left).zip(&*mobilities) {
+                *direction = *mobility * *left + *direction * kept;
+            }
+            multiply(blocks, direction, image);
+            *products += 1;
+            let along = power / dot(direction, image);
+            if !(along > 0.0 && along.is_finite()) {
+                return false;
+            }
+            for ((x, left), (direction, image)) in x.iter_mut().zip(&mut *left).zip(direction.iter().zip(&*image)) {
+                *x += *direction * along;
+                *left -= *image * along;
+            }
+        }
+        false
+    }
+}
+
+/// out ← A x.
+fn multiply(blocks: &[Block], x: &[DVec3], out: &mut [DVec3]) {
+    out.fill(DVec3::ZERO);
+    for Block { row, column, value } in blocks {
+        out[*row] += *value * x[*column];
+        if row != column {
+            out[*column] += value.mul_transpose_vec3(x[*row]);
+        }
+    }
+}
+
+/// Moves all vertices alike, so that what is `left` sums to nothing: momentum is kept to rounding.
+fn shift(x: &mut [DVec3], together: DMat3, left: &[DVec3]) {
+    let by = together * left.iter().sum::<DVec3>();
+    x.iter_mut().for_each(|x| *x += by);
+}
+
+/// The matrix of all vertices moving alike.
+fn together(blocks: &[Block]) -> DMat3 {
+    let of = |Block { row, column, value }: &Block| if row == column { *value } else { *value + value.transpose() };
+    blocks.iter().map(of).fold(DMat3::ZERO, |sum, value| sum + value)
+}
+
+fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of springs, held at one end.
+    fn chain(count: usize) -> (Vec<Block>, Vec<u32>) {
+        let block =
+            |row, column, k: f64| Block { row, column, value: DMat3::from_diagonal(DVec3::new(k, 2.0 * k, 3.0 * k)) };
+        let mut blocks = vec![block(0, 0, 2.0)];
+        (1..count).for_each(|row| blocks.extend([block(row, row - 1, -1.0), block(row, row, 2.0)]));
+        let diagonal = (0..count as u32).map(|row| 2 * row).collect();
+        (blocks, diagonal)
+    }
+
+    #[test]
+    fn the_solution_is_that_of_a_chain_of_springs() {
+        let count = 50;
+        let (blocks, diagonal) = chain(count);
+        let mut x = vec![DVec3::ONE; count];
+        assert!(Gradients::default().solve(&blocks, &diagonal, &vec![DVec3::Z * 3e-3; count], &mut x));
+        for (at, x) in x.iter().enumerate() {
+            // k u'' = −f between two walls
+            let exact = 1e-3 * 0.5 * (at as f64 + 1.0) * (count - at) as f64;
+            assert!(x.distance(DVec3::Z * exact) < 1e-4, "{at}: {x} is not {exact}");
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_is_told() {
+        let (mut blocks, diagonal) = chain(5);
+        blocks[4].value = DMat3::from_diagonal(DVec3::splat(-1.0));
+        assert!(!Gradients::default().solve(&blocks, &diagonal, &[DVec3::ONE; 5], &mut [DVec3::ZERO; 5]));
+    }
+}

@@ -1,0 +1,58 @@
+//! Solids that are solved by conjugate gradients, against a factor and against what every step keeps.
+
+use super::super::system::Purpose;
+use super::*;
+
+fn cube(cells: u32) -> SoftShape {
+    SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] }
+}
+
+const ORGAN: SoftMatter = SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 2.0 };
+
+#[test]
+fn gradients_and_a_factor_lead_to_the_same_shape() {
+    let settled = |purpose: Purpose| {
+        let held = SoftSpec { matter: ORGAN, gravity: G, held: vec![Side::Bottom], ..spec(cube(8)) };
+        let mut body = SoftBody::new(held).unwrap();
+        for _ in 0..100 {
+            body.predict(0.01, purpose).unwrap();
+            body.finish_substep(0.01);
+            assert_eq!(body.system.response().is_some(), purpose == Purpose::Shared);
+        }
+        body.positions.clone()
+    };
+    let [by_gradients, by_factor] = [Purpose::Own, Purpose::Shared].map(settled);
+    let sag_m = 0.1 - by_factor.iter().map(|at| at.z).fold(0.0, f64::max);
+    assert!(sag_m > 3e-3, "it sags by {sag_m} m");
+    let off_m = by_gradients.iter().zip(&by_factor).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+    assert!(off_m < 1e-4 * sag_m, "{off_m} m apart where it sags by {sag_m} m");
+}
+
+#[test]
+fn a_large_solid_that_wobbles_keeps_its_momentum_and_makes_no_energy() {
+    let matter = SoftMatter { damping_per_s: 0.0, ..ORGAN };
+    let mut body = SoftBody::new(SoftSpec { matter, velocity: DVec3::X, ..spec(cube(9)) }).unwrap();
+    for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
+        *v += DVec3::new(2.0 * x.z, -x.x, 3.0 * x.y);
+    }
+    let (before, mut energy_j) = (body.linear_momentum(), body.energy_j());
+    for _ in 0..50 {
+        run(&mut body, 2e-3, 1);
+        let off = body.linear_momentum().distance(before);
+        assert!(off < 1e-13 * before.length(), "momentum is off by {off:e} kg m/s");
+        let now_j = body.energy_j();
+        assert!(now_j <= energy_j * (1.0 + 1e-9), "{now_j} J after {energy_j}");
+        energy_j = now_j;
+    }
+    assert!(body.system.response().is_none(), "no factor was made");
+}
+
+#[test]
+fn a_large_solid_falls_as_anything_falls() {
+    let mut body = SoftBody::new(SoftSpec { gravity: G, ..spec(cube(9)) }).unwrap();
+    let start = body.positions.clone();
+    run(&mut body, 1e-3, 100);
+    let fallen = G * (0.5 * 0.1 * 0.101);
+    let off = body.positions.iter().zip(&start).map(|(now, start)| now.distance(*start + fallen)).fold(0.0, f64::max);
+    assert!(off < 1e-12, "{off:e} m off");
+}

@@ -1,0 +1,29 @@
+//! Solids too large for a factor, solved by conjugate gradients with all that they touch: exact weights, energy, momentum.
+
+use crate::bodies::{block, solid, tube};
+use crate::table::{Placed, Table, placed};
+use glam::DVec3;
+use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
+
+/// A cube of 0.1 m of so many cells along each edge, of the stuff of an organ, above the floor.
+fn organ(cells: u32, bottom_m: f64) -> Placed {
+    let spec = solid(DVec3::Z * (bottom_m + 0.05), DVec3::splat(0.1), [cells; 3], 12e3);
+    let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
+    placed(SoftBody::new(SoftSpec { matter, ..spec }).unwrap(), false)
+}
+
+#[test]
+fn a_solid_of_a_thousand_nodes_lies_on_the_floor_with_what_lies_on_it() {
+    let alone = || Table::new(vec![organ(9, 0.0002)]);
+    let plate = || block(DVec3::Z * 0.1055, DVec3::new(0.05, 0.05, 0.005), 0.2, 0.0);
+    let with_plate = || Table::new(vec![organ(9, 0.0002), plate()]);
+    let with_tube = || Table::new(vec![organ(9, 0.0002), tube(DVec3::Z * 0.1105, DVec3::X * 0.08, 0.01)]);
+    for (name, mut table) in [("alone", alone()), ("a plate", with_plate()), ("a tube", with_tube())] {
+        let started = std::time::Instant::now();
+        let found = table.play(1.5);
+        println!("{name}: {found:?} {:?} a step", started.elapsed() / found.steps);
+        assert!(found.rest_m < 0.05e-3, "{name}: {} m deep", found.rest_m);
+        assert!((found.weight - 1.0).abs() < 0.05, "{name}: it weighs {}", found.weight);
+        assert!(found.gain_j < 1e-3, "{name}: {} J made", found.gain_j);
+    }
+}
