@@ -56,13 +56,7 @@ impl Members {
 
     /// out ← ⊕ A/f x.
     pub fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
-        out.fill(DVec3::ZERO);
-        for block in &self.blocks {
-            out[block.row] += block.value * x[block.column];
-            if block.row != block.column {
-                out[block.column] += block.value.mul_transpose_vec3(x[block.row]);
-            }
-        }
+        super::problem::multiply(&self.blocks, x, out);
     }
 
     /// ‖r‖² of impulses on all blocks, J (eq. 15).

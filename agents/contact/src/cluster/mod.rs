@@ -72,7 +72,7 @@ mod validate;
 pub use error::ProblemError;
 pub use joint::{Hold, JointRow, Spring};
 pub use members::RIGID_BLOCKS;
-pub use problem::{Block, Contact, Member, Problem, Response};
+pub use problem::{Block, Contact, Member, Problem, Response, multiply};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};
 pub use sparse_factor::SparseFactor;

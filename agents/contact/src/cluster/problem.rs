@@ -26,6 +26,22 @@ pub struct Block {
     pub value: DMat3,
 }
 
+/// out ← A x of a symmetric matrix of which these blocks are the lower half. Blocks of one row in a row are summed at once.
+pub fn multiply(blocks: &[Block], x: &[DVec3], out: &mut [DVec3]) {
+    out.fill(DVec3::ZERO);
+    for row in blocks.chunk_by(|a, b| a.row == b.row) {
+        let at = row[0].row;
+        let (here, mut sum) = (x[at], DVec3::ZERO);
+        for Block { column, value, .. } in row {
+            sum += *value * x[*column];
+            if *column != at {
+                out[*column] += value.mul_transpose_vec3(here);
+            }
+        }
+        out[at] += sum;
+    }
+}
+
 /// A factor of a member's own, which it has made for its step already.
 pub trait Response: fmt::Debug + Sync {
     /// Replaces impulses on all blocks of the member by the velocities that they give: A⁻¹ of them, to rounding, by the A of its

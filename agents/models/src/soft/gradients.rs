@@ -4,7 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 4.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::Block;
+use metachron_contact::cluster::{Block, multiply};
 
 /// What is left may change no vertex by itself by more than this, m/s: a hundredth of what contacts are solved to.
 const LEFT_M_S: f64 = 5e-8;
@@ -75,17 +75,6 @@ impl Gradients {
             }
         }
         false
-    }
-}
-
-/// out ← A x.
-fn multiply(blocks: &[Block], x: &[DVec3], out: &mut [DVec3]) {
-    out.fill(DVec3::ZERO);
-    for Block { row, column, value } in blocks {
-        out[*row] += *value * x[*column];
-        if row != column {
-            out[*column] += value.mul_transpose_vec3(x[*row]);
-        }
     }
 }
 
