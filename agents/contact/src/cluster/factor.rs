@@ -115,15 +115,7 @@ impl Cholesky {
         if self.fits(size, pairs) {
             return false;
         }
-        let mut neighbours = vec![Vec::new(); size];
-        for pair in pairs.iter().filter(|pair| pair.row != pair.column) {
-            neighbours[pair.row].push(pair.column);
-            neighbours[pair.column].push(pair.row);
-        }
-        for list in &mut neighbours {
-            list.sort_unstable();
-            list.dedup();
-        }
+        let neighbours = neighbours(size, pairs);
         let kept = (self.order.len() == size).then(|| Fronts::new(&neighbours, &self.order));
         self.fronts = kept.filter(|fronts| fronts.cost <= KEEP_ORDER * self.fresh_cost).unwrap_or_else(|| {
             self.order = minimum_degree(&neighbours);
@@ -135,6 +127,12 @@ impl Cholesky {
         self.known.reserve(pairs.len());
         self.places.reserve(pairs.len());
         true
+    }
+
+    /// What a factor of a matrix with these couplings would cost, about in multiplications.
+    pub fn cost_of(size: usize, pairs: &[Pair]) -> f64 {
+        let neighbours = neighbours(size, pairs);
+        Fronts::new(&neighbours, &minimum_degree(&neighbours)).cost
     }
 
     /// Storage for the fronts as they are.
@@ -328,6 +326,20 @@ impl Cholesky {
         }
         fronts.rank.iter().zip(x).for_each(|(&rank, value)| *value = permuted[rank]);
     }
+}
+
+/// The blocks that each block is coupled with.
+fn neighbours(size: usize, pairs: &[Pair]) -> Vec<Vec<usize>> {
+    let mut neighbours = vec![Vec::new(); size];
+    for pair in pairs.iter().filter(|pair| pair.row != pair.column) {
+        neighbours[pair.row].push(pair.column);
+        neighbours[pair.column].push(pair.row);
+    }
+    for list in &mut neighbours {
+        list.sort_unstable();
+        list.dedup();
+    }
+    neighbours
 }
 
 /// One pass over the fronts that are to be factored again.

@@ -29,6 +29,13 @@ impl SparseFactor {
         }
     }
 
+    /// What a factor of such a matrix would cost, about in multiplications, without room for its numbers.
+    #[must_use]
+    pub fn cost_of(size: usize, blocks: &[Block]) -> f64 {
+        let pairs: Vec<Pair> = blocks.iter().map(|block| Pair { row: block.row, column: block.column }).collect();
+        Cholesky::cost_of(size, &pairs)
+    }
+
     /// Factors the matrix of `size` blocks that is given by its lower half; entries with one place add up.
     ///
     /// # Errors

@@ -8,20 +8,23 @@ use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
 
-/// Where vertices fill a volume, a factor that takes more multiplications than this is not made for a step of the body's own: conjugate
-/// gradients then take less. For a problem that the body shares with others a factor pays up to here, and fits in memory up to here.
-const OWN_FACTOR_MAX: f64 = 3e6;
-const LENT_FACTOR_MAX: f64 = 6e7;
+/// Products that conjugate gradients take for each root of how far stiffness outweighs inertia, in solids of some hundred to some thousand
+/// vertices; multiplications of a product for each block.
+const PRODUCTS_PER_ROOT: f64 = 4.0;
+const PER_BLOCK: f64 = 18.0;
+/// How many solutions a problem that the body shares with others takes by gradients, and by factors.
+const SHARED_SOLUTIONS: f64 = 5.0;
+const SHARED_FACTORS: f64 = 2.0;
+/// What fills a volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
 const FACTOR_VERTICES_MAX: usize = 3000;
 
 /// A = (1 + h c) M + h² K, vertices that are held left out.
 #[derive(Debug, Default)]
 pub(super) struct System {
-    /// Made where it may serve at all.
-    factor: Option<SparseFactor>,
+    factor: SparseFactor,
     gradients: Gradients,
-    /// Whether the vertices fill a volume.
-    bulky: bool,
+    /// What a factor costs, multiplications, where the vertices fill a volume and gradients may cost less: infinite for too many of them.
+    factor_cost: Option<f64>,
     /// Whether the last solution was made by the factor.
     by_factor: bool,
     /// The row of each vertex; none for held ones. Rows rise with the vertices.
@@ -36,8 +39,9 @@ pub(super) struct System {
     diagonal: Vec<u32>,
     slots: Vec<u32>,
     added: usize,
-    /// h², s²: the factor of every stiffness.
+    /// h², s²: the factor of every stiffness; the inertia of each moving vertex, kg.
     square: f64,
+    inertia_kg: Vec<f64>,
     /// The right side and the solution, moving vertices alone.
     right: Vec<DVec3>,
     solution: Vec<DVec3>,
@@ -59,15 +63,17 @@ impl System {
         let mut next = 0..;
         let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
         let moving = held.iter().filter(|held| !**held).count();
-        let mut system = Self { rows, moving, bulky, forces: vec![DVec3::ZERO; held.len()], ..Self::default() };
+        let inertia_kg = vec![0.0; moving];
+        let mut system = Self { rows, moving, inertia_kg, forces: vec![DVec3::ZERO; held.len()], ..Self::default() };
         add_all(&mut system);
         system.merge();
-        if !(bulky && moving > FACTOR_VERTICES_MAX) {
-            let mut factor = SparseFactor::default();
-            factor.shape(moving, &system.blocks);
-            system.factor = (!bulky || factor.cost() <= LENT_FACTOR_MAX).then_some(factor);
+        let fits = moving <= FACTOR_VERTICES_MAX;
+        system.factor_cost =
+            bulky.then(|| if fits { SparseFactor::cost_of(moving, &system.blocks) } else { f64::INFINITY });
+        system.by_factor = !bulky;
+        if !bulky {
+            system.factor.shape(moving, &system.blocks);
         }
-        system.by_factor = system.takes_factor(Purpose::Shared);
         system
     }
 
@@ -84,16 +90,31 @@ impl System {
         self.blocks = places.iter().map(|&(row, column)| Block { row, column, value: DMat3::ZERO }).collect();
     }
 
-    /// Whether the factor serves.
+    /// Whether a factor is cheaper than gradients.
     fn takes_factor(&self, purpose: Purpose) -> bool {
-        let own = |factor: &SparseFactor| !self.bulky || factor.cost() <= OWN_FACTOR_MAX;
-        self.factor.as_ref().is_some_and(|factor| purpose == Purpose::Shared || own(factor))
+        let Some(cost) = self.factor_cost else { return true };
+        let (solutions, factors) = match purpose {
+            Purpose::Own => (1.0, 1.0),
+            Purpose::Shared => (SHARED_SOLUTIONS, SHARED_FACTORS),
+        };
+        let products = PRODUCTS_PER_ROOT * self.stiffness_ratio().sqrt();
+        factors * cost <= solutions * products * PER_BLOCK * self.blocks.len() as f64
+    }
+
+    /// How far the stiffness of a vertex outweighs its inertia in this step, at most.
+    fn stiffness_ratio(&self) -> f64 {
+        let of = |(at, inertia): (&u32, &f64)| {
+            let block = &self.blocks[*at as usize].value;
+            (block.x_axis.x + block.y_axis.y + block.z_axis.z) / (3.0 * inertia)
+        };
+        self.diagonal.iter().zip(&self.inertia_kg).map(of).fold(1.0, f64::max)
     }
 
     /// Begins a substep of `h` seconds: no force, no stiffness.
     pub fn begin(&mut self, h: f64) {
         self.blocks.iter_mut().for_each(|block| block.value = DMat3::ZERO);
         self.forces.fill(DVec3::ZERO);
+        self.inertia_kg.fill(0.0);
         (self.square, self.added) = (h * h, 0);
     }
 
@@ -121,9 +142,9 @@ impl System {
 
     /// Adds an inertia to a vertex, kg.
     pub fn weigh(&mut self, vertex: usize, inertia: DMat3) {
-        // before the structure is known there is no diagonal
-        if let Some(&at) = self.rows[vertex].and_then(|row| self.diagonal.get(row as usize)) {
-            self.blocks[at as usize].value += inertia;
+        if let Some(row) = self.rows[vertex] {
+            self.blocks[self.diagonal[row as usize] as usize].value += inertia;
+            self.inertia_kg[row as usize] += (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z) / 3.0;
         }
     }
 
@@ -137,20 +158,17 @@ impl System {
             into.extend(rows.iter().zip(list).filter_map(|(row, value)| row.map(|_| *value)));
         };
         moved(impulses, right);
-        let solved = match factor.as_mut().filter(|_| self.by_factor) {
-            Some(factor) => {
-                solution.clone_from(right);
-                // members of a cluster begin side by side: a factor is one thread's
-                let made = factor.factor(*moving, blocks, &PlainLoop).is_ok();
-                if made {
-                    factor.respond(solution);
-                }
-                made
+        let solved = if self.by_factor {
+            solution.clone_from(right);
+            // members of a cluster begin side by side: a factor is one thread's
+            let made = factor.factor(*moving, blocks, &PlainLoop).is_ok();
+            if made {
+                factor.respond(solution);
             }
-            None => {
-                moved(x, solution);
-                gradients.solve(blocks, diagonal, right, solution)
-            }
+            made
+        } else {
+            moved(x, solution);
+            gradients.solve(blocks, diagonal, right, solution)
         };
         for (x, row) in x.iter_mut().zip(rows) {
             *x = row.map_or(DVec3::ZERO, |row| solution[row as usize]);
@@ -160,7 +178,7 @@ impl System {
 
     /// The factor of the last solution, where it was made by one.
     pub fn response(&self) -> Option<&SparseFactor> {
-        self.factor.as_ref().filter(|_| self.by_factor)
+        self.by_factor.then_some(&self.factor)
     }
 
     /// The lower half of the matrix, in blocks of moving vertices.
@@ -175,7 +193,7 @@ impl System {
 
     /// What the last solution cost, multiplications.
     pub fn work(&self) -> f64 {
-        let by_products = || 18.0 * self.blocks.len() as f64 * f64::from(self.gradients.products.max(1));
+        let by_products = || PER_BLOCK * self.blocks.len() as f64 * f64::from(self.gradients.products.max(1));
         self.response().map_or_else(by_products, SparseFactor::cost)
     }
 }
