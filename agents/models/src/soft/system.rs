@@ -8,8 +8,9 @@ use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
 
-/// Products that conjugate gradients take for each root of how far stiffness outweighs inertia, in solids of some hundred to some thousand
-/// vertices; multiplications of a product for each block.
+/// Products that conjugate gradients take at least, and for each root of how far stiffness outweighs inertia, in solids of some hundred to
+/// some thousand vertices; multiplications of a product for each block.
+const PRODUCTS_LEAST: f64 = 16.0;
 const PRODUCTS_PER_ROOT: f64 = 4.0;
 const PER_BLOCK: f64 = 18.0;
 /// How many solutions a problem that the body shares with others takes by gradients, and by factors.
@@ -97,7 +98,7 @@ impl System {
             Purpose::Own => (1.0, 1.0),
             Purpose::Shared => (SHARED_SOLUTIONS, SHARED_FACTORS),
         };
-        let products = PRODUCTS_PER_ROOT * self.stiffness_ratio().sqrt();
+        let products = PRODUCTS_LEAST + PRODUCTS_PER_ROOT * self.stiffness_ratio().sqrt();
         factors * cost <= solutions * products * PER_BLOCK * self.blocks.len() as f64
     }
 
