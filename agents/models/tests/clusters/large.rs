@@ -13,17 +13,14 @@ fn organ(cells: u32, bottom_m: f64) -> Placed {
 }
 
 #[test]
-fn a_solid_of_a_thousand_nodes_lies_on_the_floor_with_what_lies_on_it() {
-    let alone = || Table::new(vec![organ(9, 0.0002)]);
-    let plate = || block(DVec3::Z * 0.1055, DVec3::new(0.05, 0.05, 0.005), 0.2, 0.0);
-    let with_plate = || Table::new(vec![organ(9, 0.0002), plate()]);
-    let with_tube = || Table::new(vec![organ(9, 0.0002), tube(DVec3::Z * 0.1105, DVec3::X * 0.08, 0.01)]);
-    for (name, mut table) in [("alone", alone()), ("a plate", with_plate()), ("a tube", with_tube())] {
-        let started = std::time::Instant::now();
-        let found = table.play(1.5);
-        println!("{name}: {found:?} {:?} a step", started.elapsed() / found.steps);
+fn a_solid_of_1728_vertices_lies_on_the_floor_and_bears_a_plate_and_a_tube() {
+    let plate = block(DVec3::Z * 0.1055, DVec3::new(0.05, 0.05, 0.005), 0.2, 0.0);
+    let tube = tube(DVec3::Z * 0.1105, DVec3::X * 0.08, 0.01);
+    for (name, above) in [("a plate", plate), ("a tube", tube)] {
+        let found = Table::new(vec![organ(11, 0.0002), above]).play(0.8);
+        assert_eq!(found.factors, 0, "{name}: it was solved by factors");
         assert!(found.rest_m < 0.05e-3, "{name}: {} m deep", found.rest_m);
-        assert!((found.weight - 1.0).abs() < 0.05, "{name}: it weighs {}", found.weight);
+        assert!((found.weight - 1.0).abs() < 0.02, "{name}: it weighs {}", found.weight);
         assert!(found.gain_j < 1e-3, "{name}: {} J made", found.gain_j);
     }
 }
