@@ -6,7 +6,7 @@ use super::problem::{Block, Problem};
 use glam::{DMat3, DVec3};
 
 /// A member of no more blocks than a rigid body's.
-pub const RIGID_BLOCKS: usize = 2;
+const RIGID_BLOCKS: usize = 2;
 
 /// ⊕ A/f, blocks counted over all members.
 #[derive(Debug, Clone, Default)]

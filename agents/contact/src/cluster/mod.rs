@@ -71,7 +71,6 @@ mod validate;
 
 pub use error::ProblemError;
 pub use joint::{Hold, JointRow, Spring};
-pub use members::RIGID_BLOCKS;
 pub use problem::{Block, Contact, Member, Problem, Response, multiply};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};

@@ -173,6 +173,8 @@ pub struct ClusterStepper {
     fine_s: f64,
     /// How many times as many fine steps joints ask for that do not hold, or in which bodies turn too far.
     joints_ask: u32,
+    /// What joints missed in this macro step when they did not hold last, metres or radians.
+    joints_missed_m: f64,
 }
 
 impl Default for ClusterStepper {
@@ -203,6 +205,7 @@ impl ClusterStepper {
             macro_s: 0.0,
             fine_s: 0.0,
             joints_ask: 1,
+            joints_missed_m: f64::INFINITY,
         }
     }
 
@@ -220,7 +223,8 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it after, from the start of the macro step. What members do by themselves they do on `threads`, if there are enough of
+    /// solve makes of it after, from the start of the macro step; so do all rigid members where blows follow each other, or where joints turn
+    /// far or do not hold. What members do by themselves they do on `threads`, if there are enough of
     /// them; the bits are the same on however many.
     ///
     /// # Errors
@@ -238,6 +242,7 @@ impl ClusterStepper {
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
+        self.joints_missed_m = f64::INFINITY;
         self.foresee(all, self.macro_s, threads)?;
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with

@@ -8,15 +8,20 @@ use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
 use super::{ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Member, Problem, ProblemError, RIGID_BLOCKS, StepForm};
+use crate::cluster::{Member, Problem, ProblemError, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
+/// A member of more blocks that lends no factor gets none: the problem is solved by conjugate gradients.
+const FACTORED_BLOCKS_MAX: usize = 1000;
 /// Joints hold to this share of the depth of contacts, in metres and radians.
 const JOINT_SHARE: f64 = 0.25;
-/// By how much a body in a joint may turn in a fine step: the force of the joint is where it is at the start.
+/// From so many fine steps on, joints that do not hold ask for more only while that brings what they miss below this share of it.
+const PARTS_HOPED: f64 = 16.0;
+const MISS_SHRINKS: f64 = 0.7;
+/// By how much the arm of a joint may turn in a fine step: the force of the joint is where it is at the start.
 const TURN_MAX_RAD: f64 = 0.15;
 
 impl ClusterStepper {
@@ -36,11 +41,24 @@ impl ClusterStepper {
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
-        let mut last_miss_m = f64::INFINITY;
+        let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
         for round in 1..=ROUNDS_MAX {
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
-            let Self { solver, search, ties, joints, joints_ask, progress, depth_m, rebounds, heap, .. } = &mut *self;
+            let Self {
+                solver,
+                search,
+                ties,
+                joints,
+                joints_ask,
+                joints_missed_m,
+                macro_s,
+                progress,
+                depth_m,
+                rebounds,
+                heap,
+                ..
+            } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -56,8 +74,12 @@ impl ClusterStepper {
             let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
-            let opens = if miss_m < JOINT_SHARE * *depth_m { 1 } else { 2 };
-            *joints_ask = times(turn_rad / TURN_MAX_RAD).max(opens);
+            let holds = miss_m < JOINT_SHARE * *depth_m;
+            let made = (*macro_s / h_s).round();
+            // what cannot hold does not in shorter steps either
+            let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * *joints_missed_m;
+            *joints_ask = times(turn_rad / TURN_MAX_RAD).max(if holds || !helps { 1 } else { 2 });
+            missed_m = if holds { *joints_missed_m } else { miss_m };
             if round == ROUNDS_MAX || !passed && joints_done {
                 break;
             }
@@ -67,6 +89,7 @@ impl ClusterStepper {
                 return Ok(());
             }
         }
+        self.joints_missed_m = missed_m;
         self.give(report);
         Ok(())
     }
@@ -96,9 +119,8 @@ impl ClusterStepper {
             share: f64::from(state.part),
         }));
         move_sides(search, ties, |member| progress[member].place);
-        // one that bends and lends no factor is too large for one
-        let lends = |member: &Member<'_>| member.response.is_some() || member.free.len() <= RIGID_BLOCKS;
-        solver.set_form(if list.iter().all(lends) { StepForm::Direct } else { StepForm::Iterative });
+        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
+        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
         let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         *members = recycled(list);

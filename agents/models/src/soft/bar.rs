@@ -22,10 +22,8 @@ impl Bar {
         let [a, b] = self.ends;
         let way = positions[b as usize] - positions[a as usize];
         let length = way.length();
-        if length == 0.0 {
-            return;
-        }
-        let along = way / length;
+        // without a length it has no direction; entries are added all the same, as their order is the matrix's structure
+        let along = if length == 0.0 { DVec3::ZERO } else { way / length };
         let k = self.ea_n / self.rest_m;
         let force = along * (k * (length - self.rest_m));
         system.push(a, force);

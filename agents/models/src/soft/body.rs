@@ -26,7 +26,7 @@ pub struct SoftBody {
     pub(super) velocities: Vec<DVec3>,
     /// The velocities at the end of a substep without contact.
     pub(super) free: Vec<DVec3>,
-    /// What they would have at its end if nothing held them together, kg·m/s.
+    /// The right side of eq. 1: the momenta of the vertices with what forces add in the substep, kg·m/s.
     pub(super) impulses: Vec<DVec3>,
     pub(super) ties: Vec<VertexSpring>,
     pub(super) form: Arc<CollisionShape>,
@@ -196,7 +196,7 @@ impl Agent for SoftBody {
 }
 
 impl SoftBody {
-    /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
+    /// Work of a substep in thousands of multiplications: of the factor or of its products, and some 500 an element.
     pub(super) fn work(&self) -> f64 {
         1e-3 * self.system.work() + 0.5 * self.mesh.elements() as f64
     }

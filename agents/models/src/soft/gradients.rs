@@ -3,13 +3,14 @@
 //! In: the lower half of a symmetric positive definite matrix in 3 × 3 blocks, a right side, a start. Out: a solution. Never here: elements.
 //! Theory: docs/theory/soft.md, eq. 4.
 
+use super::system::{NOT_POSITIVE, UNENDED};
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, multiply};
 
 /// What is left may change no vertex by itself by more than this, m/s: a hundredth of what contacts are solved to.
 const LEFT_M_S: f64 = 5e-8;
-/// The most products of one solution: far beyond what a solid takes.
-const PRODUCTS_MAX: u32 = 2000;
+/// The most products of one solution: tens for soft tissue, thousands for what is stiff and has no factor.
+const PRODUCTS_MAX: u32 = 20_000;
 
 /// The storage of conjugate gradients.
 #[derive(Debug, Default)]
@@ -24,24 +25,27 @@ pub(super) struct Gradients {
 }
 
 impl Gradients {
-    /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places; `false` where A is found
-    /// not to be positive definite, or the solution not to end.
-    pub fn solve(&mut self, blocks: &[Block], diagonal: &[u32], right: &[DVec3], x: &mut [DVec3]) -> bool {
+    /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places.
+    ///
+    /// # Errors
+    /// What is wrong where A is found not to be positive definite, or the solution not to end.
+    pub fn solve(
+        &mut self,
+        blocks: &[Block],
+        diagonal: &[u32],
+        right: &[DVec3],
+        x: &mut [DVec3],
+    ) -> Result<(), &'static str> {
         let Self { mobilities, left, direction, image, products } = self;
         mobilities.clear();
         mobilities.extend(diagonal.iter().map(|at| blocks[*at as usize].value.inverse()));
         image.resize(x.len(), DVec3::ZERO);
         let together = together(blocks).inverse();
-        // what falls freely is solved by the second of these alone
-        for products_so_far in 1..=2 {
-            multiply(blocks, x, image);
-            *products = products_so_far;
-            left.clear();
-            left.extend(right.iter().zip(&*image).map(|(right, image)| *right - *image));
-            if products_so_far == 1 {
-                shift(x, together, left);
-            }
-        }
+        measure(blocks, right, x, image, left);
+        // what falls freely needs no more than this
+        shift(x, together, left);
+        measure(blocks, right, x, image, left);
+        *products = 2;
         direction.clear();
         direction.resize(x.len(), DVec3::ZERO);
         let mut power = f64::INFINITY;
@@ -54,11 +58,11 @@ impl Gradients {
             }
             if worst <= LEFT_M_S {
                 shift(x, together, left);
-                return x.iter().all(|x| x.is_finite());
+                return if x.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(NOT_POSITIVE) };
             }
             let kept = size / std::mem::replace(&mut power, size);
             if !(size > 0.0 && size.is_finite()) {
-                return false;
+                return Err(NOT_POSITIVE);
             }
             for ((direction, left), mobility) in direction.iter_mut().zip(&*left).zip(&*mobilities) {
                 *direction = *mobility * *left + *direction * kept;
@@ -67,15 +71,22 @@ impl Gradients {
             *products += 1;
             let along = power / dot(direction, image);
             if !(along > 0.0 && along.is_finite()) {
-                return false;
+                return Err(NOT_POSITIVE);
             }
             for ((x, left), (direction, image)) in x.iter_mut().zip(&mut *left).zip(direction.iter().zip(&*image)) {
                 *x += *direction * along;
                 *left -= *image * along;
             }
         }
-        false
+        Err(UNENDED)
     }
+}
+
+/// What a solution leaves of the right side.
+fn measure(blocks: &[Block], right: &[DVec3], x: &[DVec3], image: &mut [DVec3], left: &mut Vec<DVec3>) {
+    multiply(blocks, x, image);
+    left.clear();
+    left.extend(right.iter().zip(&*image).map(|(right, image)| *right - *image));
 }
 
 /// Moves all vertices alike, so that what is `left` sums to nothing: momentum is kept to rounding.
@@ -113,7 +124,7 @@ mod tests {
         let count = 50;
         let (blocks, diagonal) = chain(count);
         let mut x = vec![DVec3::ONE; count];
-        assert!(Gradients::default().solve(&blocks, &diagonal, &vec![DVec3::Z * 3e-3; count], &mut x));
+        Gradients::default().solve(&blocks, &diagonal, &vec![DVec3::Z * 3e-3; count], &mut x).unwrap();
         for (at, x) in x.iter().enumerate() {
             // k u'' = −f between two walls
             let exact = 1e-3 * 0.5 * (at as f64 + 1.0) * (count - at) as f64;
@@ -125,6 +136,7 @@ mod tests {
     fn a_matrix_that_is_not_positive_is_told() {
         let (mut blocks, diagonal) = chain(5);
         blocks[4].value = DMat3::from_diagonal(DVec3::splat(-1.0));
-        assert!(!Gradients::default().solve(&blocks, &diagonal, &[DVec3::ONE; 5], &mut [DVec3::ZERO; 5]));
+        let told = Gradients::default().solve(&blocks, &diagonal, &[DVec3::ONE; 5], &mut [DVec3::ZERO; 5]);
+        assert_eq!(told, Err(NOT_POSITIVE));
     }
 }

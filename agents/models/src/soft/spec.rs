@@ -115,7 +115,7 @@ pub enum SoftError {
     },
 }
 
-/// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.
+/// The most vertices of a soft body: a step of a cube of as many takes 30 ms alone, and seconds where it lands.
 pub const VERTICES_MAX: u64 = 10_000;
 
 impl SoftShape {

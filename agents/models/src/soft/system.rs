@@ -19,6 +19,10 @@ const SHARED_FACTORS: f64 = 2.0;
 /// What fills a volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
 const FACTOR_VERTICES_MAX: usize = 3000;
 
+/// Why a step has no solution.
+pub(super) const NOT_POSITIVE: &str = "the stiffness matrix is not positive definite";
+pub(super) const UNENDED: &str = "conjugate gradients did not end: it is too stiff for so many vertices";
+
 /// A = (1 + h c) M + h² K, vertices that are held left out.
 #[derive(Debug, Default)]
 pub(super) struct System {
@@ -40,6 +44,8 @@ pub(super) struct System {
     diagonal: Vec<u32>,
     slots: Vec<u32>,
     added: usize,
+    /// Whether the structure is known.
+    merged: bool,
     /// h², s²: the factor of every stiffness; the inertia of each moving vertex, kg.
     square: f64,
     inertia_kg: Vec<f64>,
@@ -89,6 +95,7 @@ impl System {
         self.slots = added.iter().map(|block| at(place(block))).collect();
         self.diagonal = (0..self.moving).map(|row| at((row, row))).collect();
         self.blocks = places.iter().map(|&(row, column)| Block { row, column, value: DMat3::ZERO }).collect();
+        self.merged = true;
     }
 
     /// Whether a factor is cheaper than gradients.
@@ -131,11 +138,10 @@ impl System {
         }
         let (Some(row), Some(column)) = (self.rows[i as usize], self.rows[j as usize]) else { return };
         let (row, column) = (row as usize, column as usize);
-        let Some(&slot) = self.slots.get(self.added) else {
-            // the structure is not known yet
+        if !self.merged {
             return self.blocks.push(Block { row, column, value: DMat3::ZERO });
-        };
-        let block = &mut self.blocks[slot as usize];
+        }
+        let block = &mut self.blocks[self.slots[self.added] as usize];
         debug_assert_eq!((block.row, block.column), (row, column), "stiffness is added in the same order every time");
         block.value += stiffness * self.square;
         self.added += 1;
@@ -150,8 +156,11 @@ impl System {
     }
 
     /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s); held vertices stay
-    /// still. `false` where the matrix is not positive.
-    pub fn solve(&mut self, impulses: &[DVec3], x: &mut [DVec3], purpose: Purpose) -> bool {
+    /// still.
+    ///
+    /// # Errors
+    /// What is wrong where there is no solution.
+    pub fn solve(&mut self, impulses: &[DVec3], x: &mut [DVec3], purpose: Purpose) -> Result<(), &'static str> {
         self.by_factor = self.takes_factor(purpose);
         let Self { factor, gradients, rows, moving, blocks, diagonal, right, solution, .. } = self;
         let moved = |list: &[DVec3], into: &mut Vec<DVec3>| {
@@ -162,11 +171,8 @@ impl System {
         let solved = if self.by_factor {
             solution.clone_from(right);
             // members of a cluster begin side by side: a factor is one thread's
-            let made = factor.factor(*moving, blocks, &PlainLoop).is_ok();
-            if made {
-                factor.respond(solution);
-            }
-            made
+            let made = factor.factor(*moving, blocks, &PlainLoop).map_err(|_| NOT_POSITIVE);
+            made.map(|()| factor.respond(solution))
         } else {
             moved(x, solution);
             gradients.solve(blocks, diagonal, right, solution)
