@@ -35,9 +35,9 @@ pub(super) struct Joints {
 struct Held {
     joint: Joint,
     members: (usize, Option<usize>),
-    /// How far it is off when the step begins, and the arms of both bodies.
+    /// How far it is off when the step begins, and the rotations of both.
     now: Off,
-    arms_m: [DVec3; 2],
+    rotations: [DQuat; 2],
 }
 
 /// What joints do with some velocities by the end of a fine step.
@@ -45,7 +45,7 @@ struct Held {
 pub(super) struct Aimed {
     /// By how much one misses what it is to hold, metres or radians.
     pub miss_m: f64,
-    /// By how much an arm of a joint turns, in lengths of the longer of its two: a wheel turns about its own hinge as it likes.
+    /// By how much a body in a joint turns.
     pub turn_rad: f64,
 }
 
@@ -132,8 +132,7 @@ impl Joints {
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
-        let arms_m = joint.arms_m(&a, second.map(|_| &b));
-        self.held.push(Held { joint: *joint, members: (first, second), now, arms_m });
+        self.held.push(Held { joint: *joint, members: (first, second), now, rotations: [a.rotation, b.rotation] });
         let held = self.held.len() - 1;
         let axis = joint.axis(&a, anchors[1] - anchors[0]);
         let mut key = 0;
@@ -206,15 +205,13 @@ impl Joints {
 }
 
 impl Held {
-    /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much its arms have turned then.
+    /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much one of them has turned then.
     fn after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> (Off, f64) {
         let at = |member: usize| all[member].member.pose(velocities(member), h_s);
         let (a, b) = self.members;
         let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return (self.now, 0.0) };
-        let arms_m = self.joint.arms_m(&a, self.members.1.map(|_| &b));
-        let longest_m = self.arms_m.iter().map(|arm| arm.length()).fold(0.0, f64::max);
-        let moved_m = arms_m.iter().zip(self.arms_m).map(|(then, now)| then.distance(now)).fold(0.0, f64::max);
-        let turn_rad = if longest_m > 0.0 { moved_m / longest_m } else { 0.0 };
+        let turned = [&a, &b].into_iter().zip(self.rotations).map(|(then, now)| then.rotation.angle_between(now));
+        let turn_rad = turned.fold(0.0, f64::max);
         let mut off = self.joint.off(&a, &b);
         if matches!(self.joint.kind, JointKind::Revolute { .. }) {
             // angles are known but for whole turns
@@ -260,12 +257,6 @@ impl Way {
 }
 
 impl Joint {
-    /// From the centre of mass of each body to its anchor, world axes; the world has none.
-    fn arms_m(&self, a: &Pose, b: Option<&Pose>) -> [DVec3; 2] {
-        let of = |pose: &Pose, anchor_m: DVec3| pose.place(anchor_m) - pose.centre_m;
-        [of(a, self.anchor_a_m), b.map_or(DVec3::ZERO, |b| of(b, self.anchor_b_m))]
-    }
-
     /// How far the joint is off where its bodies are in these poses.
     fn off(&self, a: &Pose, b: &Pose) -> Off {
         let apart = a.place(self.anchor_a_m) - b.place(self.anchor_b_m);

@@ -21,7 +21,7 @@ const JOINT_SHARE: f64 = 0.25;
 /// From so many fine steps on, joints that do not hold ask for more only while that brings what they miss below this share of it.
 const PARTS_HOPED: f64 = 16.0;
 const MISS_SHRINKS: f64 = 0.7;
-/// By how much the arm of a joint may turn in a fine step: the force of the joint is where it is at the start.
+/// By how much a body in a joint may turn in a fine step: the force of the joint is where it is at the start.
 const TURN_MAX_RAD: f64 = 0.15;
 
 impl ClusterStepper {
