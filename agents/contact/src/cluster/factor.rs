@@ -93,12 +93,6 @@ pub(super) struct Cholesky {
     stale: Vec<bool>,
     /// What such fronts cost before each front, and in all.
     costs: Vec<f64>,
-    work: Workspace,
-}
-
-/// What a solution is made in.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Workspace {
     permuted: Vec<DVec3>,
     local: Vec<f64>,
 }
@@ -170,19 +164,15 @@ impl Cholesky {
                 targets.extend((start..start + 3).map(|at| Target::new(at, room)));
             }
         }
+        let longest = layouts.iter().map(|layout| layout.columns + layout.rows).max().unwrap_or_default();
+        self.local = vec![0.0; longest];
         self.base = vec![0.0; next.lower];
         self.before = vec![f64::NAN; next.lower];
         self.lower = vec![0.0; next.lower];
         self.update = vec![0.0; next.update];
         self.stale = vec![true; count];
         self.costs = vec![0.0; count + 1];
-        self.work = self.workspace();
-    }
-
-    /// What a solution is made in.
-    pub fn workspace(&self) -> Workspace {
-        let longest = self.layouts.iter().map(|layout| layout.columns + layout.rows).max().unwrap_or_default();
-        Workspace { permuted: vec![DVec3::ZERO; self.owners.len()], local: vec![0.0; longest] }
+        self.permuted = vec![DVec3::ZERO; self.owners.len()];
     }
 
     /// What a factor costs, about in multiplications.
@@ -289,22 +279,14 @@ impl Cholesky {
 
     /// Replaces the right side, one vector for each block, by the solution; the matrix must be factored.
     pub fn solve(&mut self, x: &mut [DVec3]) {
-        let mut work = std::mem::take(&mut self.work);
-        self.solve_in(&mut work, x);
-        self.work = work;
-    }
-
-    /// The same in a workspace of the caller's.
-    pub fn solve_in(&self, work: &mut Workspace, x: &mut [DVec3]) {
-        dispatch!(Level::new(), _ => self.solve_by(work, x));
+        dispatch!(Level::new(), _ => self.solve_by(x));
     }
 
     #[inline(always)]
-    fn solve_by(&self, work: &mut Workspace, x: &mut [DVec3]) {
-        let Self { fronts, layouts, lower, .. } = self;
-        let Workspace { permuted, local } = work;
+    fn solve_by(&mut self, x: &mut [DVec3]) {
+        let Self { fronts, layouts, lower, permuted, local, .. } = self;
         fronts.rank.iter().zip(&*x).for_each(|(&rank, value)| permuted[rank] = *value);
-        for (front, layout) in fronts.fronts.iter().zip(layouts) {
+        for (front, layout) in fronts.fronts.iter().zip(&*layouts) {
             let local = &mut local[..layout.columns + layout.rows];
             local.fill(0.0);
             front.load_columns(permuted, local);
@@ -314,7 +296,7 @@ impl Cholesky {
                 permuted[row] += DVec3::from_array(*given);
             }
         }
-        for (front, layout) in fronts.fronts.iter().zip(layouts).rev() {
+        for (front, layout) in fronts.fronts.iter().zip(&*layouts).rev() {
             let local = &mut local[..layout.columns + layout.rows];
             local.fill(0.0);
             front.load_columns(permuted, local);

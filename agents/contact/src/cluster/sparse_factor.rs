@@ -2,7 +2,7 @@
 //!
 //! In: blocks of a symmetric positive definite matrix. Out: A⁻¹ of impulses. Never here: contacts, other bodies.
 
-use super::factor::{Cholesky, Pair, Workspace};
+use super::factor::{Cholesky, Pair};
 use super::problem::{Block, Response};
 use glam::DVec3;
 use metachron_core::ParallelFor;
@@ -14,9 +14,10 @@ use std::sync::{Mutex, PoisonError};
 /// again. Its numbers have the same bits on every processor and by however many threads.
 #[derive(Debug, Default)]
 pub struct SparseFactor {
-    factor: Cholesky,
+    /// Locked for its storage: a solution changes nothing that another sees.
+    factor: Mutex<Cholesky>,
     pairs: Vec<Pair>,
-    work: Mutex<Workspace>,
+    cost: f64,
 }
 
 impl SparseFactor {
@@ -24,9 +25,9 @@ impl SparseFactor {
     pub fn shape(&mut self, size: usize, blocks: &[Block]) {
         self.pairs.clear();
         self.pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
-        if self.factor.shape(size, &self.pairs) {
-            self.work = Mutex::new(self.factor.workspace());
-        }
+        let factor = self.factor.get_mut().unwrap_or_else(PoisonError::into_inner);
+        factor.shape(size, &self.pairs);
+        self.cost = factor.cost();
     }
 
     /// What a factor of such a matrix would cost, about in multiplications, without room for its numbers.
@@ -42,21 +43,20 @@ impl SparseFactor {
     /// The first block at which it is not positive definite; what was factored before is lost.
     pub fn factor(&mut self, size: usize, blocks: &[Block], threads: &dyn ParallelFor) -> Result<(), usize> {
         self.shape(size, blocks);
-        self.factor.set(blocks);
-        self.factor.factor(threads, |_, _| ())
+        let factor = self.factor.get_mut().unwrap_or_else(PoisonError::into_inner);
+        factor.set(blocks);
+        factor.factor(threads, |_, _| ())
     }
 
     /// What a factor of this structure costs, about in multiplications.
     #[must_use]
-    pub fn cost(&self) -> f64 {
-        self.factor.cost()
+    pub const fn cost(&self) -> f64 {
+        self.cost
     }
 }
 
 impl Response for SparseFactor {
     fn respond(&self, impulses: &mut [DVec3]) {
-        // a workspace holds nothing from one solution to the next
-        let mut work = self.work.lock().unwrap_or_else(PoisonError::into_inner);
-        self.factor.solve_in(&mut work, impulses);
+        self.factor.lock().unwrap_or_else(PoisonError::into_inner).solve(impulses);
     }
 }

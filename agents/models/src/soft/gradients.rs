@@ -136,7 +136,7 @@ mod tests {
     fn a_matrix_that_is_not_positive_is_told() {
         let (mut blocks, diagonal) = chain(5);
         blocks[4].value = DMat3::from_diagonal(DVec3::splat(-1.0));
-        let told = Gradients::default().solve(&blocks, &diagonal, &[DVec3::ONE; 5], &mut [DVec3::ZERO; 5]);
-        assert_eq!(told, Err(NOT_POSITIVE));
+        let refused = Gradients::default().solve(&blocks, &diagonal, &[DVec3::ONE; 5], &mut [DVec3::ZERO; 5]);
+        assert_eq!(refused, Err(NOT_POSITIVE));
     }
 }

@@ -54,7 +54,7 @@ pub(super) struct System {
     solution: Vec<DVec3>,
 }
 
-/// Whom a solution is for.
+/// Who takes a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// The body alone.
