@@ -21,6 +21,7 @@
 //! ```
 
 pub mod aabb;
+pub mod cage;
 pub mod capsule_chain;
 pub mod closest_points;
 pub mod collision_shape;
@@ -45,6 +46,7 @@ pub mod tool;
 pub mod topology;
 
 pub use aabb::Aabb;
+pub use cage::{Cage, CageCell, Carried, cage_counts};
 pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,

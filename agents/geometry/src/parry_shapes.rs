@@ -55,7 +55,7 @@ pub enum ShapeError {
 }
 
 /// Triangles over points, counter-clockwise seen from outside.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Triangles {
     /// Corners, metres.
     pub points: Vec<DVec3>,

@@ -4,17 +4,18 @@
 //! Theory: docs/theory/soft.md, eq. 3.
 
 use super::system::System;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Anchor};
+use metachron_geometry::Carried;
 
 /// A spring on one vertex.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct VertexSpring {
     /// The pulling agent; `None` for a user spring.
     pub by: Option<AgentId>,
-    /// Which vertex.
-    pub vertex: usize,
+    /// What carries the point that it pulls at.
+    pub at: Carried,
     /// Position of the other end at the start of the substep, metres, and its velocity, m/s.
     target: DVec3,
     target_velocity: DVec3,
@@ -28,18 +29,22 @@ pub(super) struct VertexSpring {
 }
 
 impl VertexSpring {
-    /// The spring of a pull on a body of `count` vertices; `None` where it has no such vertex or is not finite.
-    pub fn new(pull: &AnchorSpring, count: usize) -> Option<Self> {
-        let AnchorSpring { by, anchor, target, target_velocity, stiffness_n_m, damping_n_s_m } = *pull;
-        let Anchor::Vertex(vertex) = anchor else { return None };
-        let vertex = vertex as usize;
+    /// The vertex that a pull on a body of `count` vertices is at; `None` where it has no such vertex.
+    pub fn vertex_of(pull: &AnchorSpring, count: usize) -> Option<u32> {
+        let Anchor::Vertex(vertex) = pull.anchor else { return None };
+        ((vertex as usize) < count).then_some(vertex)
+    }
+
+    /// The spring of a pull on the point carried so; `None` where it is not finite.
+    pub fn new(pull: &AnchorSpring, at: Carried) -> Option<Self> {
+        let AnchorSpring { by, target, target_velocity, stiffness_n_m, damping_n_s_m, .. } = *pull;
         let fair = |c: f64| c.is_finite() && c >= 0.0;
         let finite = target.is_finite() && target_velocity.is_finite();
-        let known = finite && vertex < count && fair(stiffness_n_m) && fair(damping_n_s_m);
+        let known = finite && fair(stiffness_n_m) && fair(damping_n_s_m);
         let (still, impulse, resistance_kg) = (DVec3::ZERO, DVec3::ZERO, 0.0);
         known.then_some(Self {
             by,
-            vertex,
+            at,
             target,
             target_velocity,
             stiffness_n_m,
@@ -51,17 +56,22 @@ impl VertexSpring {
     }
 
     /// Adds its force and stiffness in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
-    pub fn add(&mut self, position: DVec3, h: f64, system: &mut System) {
+    pub fn add(&mut self, positions: &[DVec3], h: f64, system: &mut System) {
         self.resistance_kg = self.stiffness_n_m * (h * h) + self.damping_n_s_m * h;
-        let apart = self.target + self.target_velocity * h - position;
+        let apart = self.target + self.target_velocity * h - self.at.mean(positions);
         let force = apart * self.stiffness_n_m + self.target_velocity * self.damping_n_s_m;
         self.still = force * h;
-        system.weigh(self.vertex, DMat3::from_diagonal(DVec3::splat(self.resistance_kg)));
-        system.push(self.vertex as u32, force);
+        for (node, weight) in self.at.terms() {
+            system.push(node as u32, force * weight);
+            for (other, share) in self.at.terms() {
+                system.resist([node, other], self.resistance_kg * weight * share);
+            }
+        }
     }
 
-    /// Books its impulse in a substep of `h` seconds that ended with `velocity`, and moves its other end on.
-    pub fn book(&mut self, velocity: DVec3, h: f64) {
+    /// Books its impulse in a substep of `h` seconds that ended with these velocities, and moves its other end on.
+    pub fn book(&mut self, velocities: &[DVec3], h: f64) {
+        let velocity = self.at.mean(velocities);
         self.impulse += self.still - velocity * self.resistance_kg;
         self.target += self.target_velocity * h;
     }

@@ -4,9 +4,10 @@
 //! Theory: docs/theory/soft.md.
 
 use super::anchor_springs::VertexSpring;
-use super::fe_mesh::FeMesh;
+use super::fe_mesh::{FeMesh, closed_surface};
 use super::member::Unknowns;
-use super::spec::{SoftError, SoftSpec};
+use super::skin::Skin;
+use super::spec::{SoftError, SoftShape, SoftSpec, VERTICES_MAX};
 use super::step_doubling::Doubling;
 use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
@@ -14,7 +15,7 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{Aabb, CollisionShape, ShapeKind};
+use metachron_geometry::{Aabb, Cage, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
@@ -22,6 +23,10 @@ pub struct SoftBody {
     pub(super) spec: SoftSpec,
     pub(super) mesh: FeMesh,
     pub(super) system: System,
+    /// What others see of it, where that is not its vertices.
+    pub(super) skin: Option<Skin>,
+    /// The level n that was asked for: its picture's.
+    pub(super) level: u8,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
     /// The velocities at the end of a substep without contact.
@@ -46,18 +51,35 @@ impl SoftBody {
     /// Builds the body of `spec` in its rest shape.
     ///
     /// # Errors
-    /// [`SoftError`] for a number outside its range, a side it does not have.
+    /// [`SoftError`] for a number outside its range, a side it does not have, a surface without an inside.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let mut mesh = FeMesh::new(&spec);
+        let mut skin = None;
+        let mut mesh = match &spec.shape {
+            SoftShape::Embedded { surface, eps_m, range_m } => {
+                let fitting =
+                    |eps_m: f64| Cage::new(surface, eps_m, VERTICES_MAX as usize).ok_or(SoftError::FineCage { eps_m });
+                fitting(range_m.0)?;
+                let cage = fitting(*eps_m)?;
+                let mesh = FeMesh::caged(&cage, &spec);
+                skin = Some(Skin::new(surface.clone(), cage));
+                mesh
+            }
+            _ => FeMesh::new(&spec),
+        };
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let surface = mesh.surface();
+        let surface = match &spec.shape {
+            SoftShape::Embedded { surface, .. } => closed_surface(surface),
+            _ => mesh.surface(),
+        };
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let system = mesh.system(&positions);
-        Ok(Self {
+        let mut body = Self {
             system,
+            skin,
+            level: 0,
             impulses: vec![],
             free: positions.clone(),
             before: velocities.clone(),
@@ -74,13 +96,42 @@ impl SoftBody {
             steps: 0,
             unknowns: Unknowns::default(),
             spec,
-        })
+        };
+        body.follow();
+        Ok(body)
     }
 
-    /// Its vertices in the form of a snapshot.
+    /// Moves its skin to where its vertices are.
+    pub(super) fn follow(&mut self) {
+        let Self { skin, positions, velocities, .. } = self;
+        if let Some(skin) = skin {
+            skin.follow(positions, velocities);
+        }
+    }
+
+    /// Positions of its skin's vertices, metres: what others see of it.
+    pub(super) fn seen(&self) -> &[DVec3] {
+        self.skin.as_ref().map_or(&self.positions, |skin| &skin.positions)
+    }
+
+    /// What carries a vertex of its skin.
+    pub(super) fn carried(&self, vertex: u32) -> Carried {
+        self.skin.as_ref().map_or(Carried::by_node(vertex), |skin| skin.carried()[vertex as usize])
+    }
+
+    /// Wakes it, and forgets what holds for steps before.
+    pub(super) fn woken(&mut self) {
+        self.doubling.watch.cancel();
+        self.before.clone_from(&self.velocities);
+        (self.quiet_s, self.at_rest) = (0.0, false);
+        self.follow();
+    }
+
+    /// Its skin in the form of a snapshot.
     #[must_use]
     pub fn start(&self) -> Body {
-        Body::Soft(SoftState { positions: self.positions.clone(), velocities: self.velocities.clone() })
+        let velocities = self.skin.as_ref().map_or(&self.velocities, |skin| &skin.velocities);
+        Body::Soft(SoftState { positions: self.seen().to_vec(), velocities: velocities.clone() })
     }
 
     /// The specification it was built from.
@@ -100,7 +151,7 @@ impl SoftBody {
 
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
-        let Aabb { low, high } = Aabb::of(&self.positions);
+        let Aabb { low, high } = Aabb::of(self.seen());
         let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let radius_m = match &self.form.kind {
             ShapeKind::Surface(surface) => surface.radius_m,
@@ -111,9 +162,13 @@ impl SoftBody {
 
     /// Lists this step's springs: the user's, and those of tools that grasp it.
     pub(super) fn gather_springs(&mut self, context: &StepContext<'_>) {
-        let count = self.positions.len();
-        self.ties.clear();
-        self.ties.extend(context.anchor_springs().filter_map(|pull| VertexSpring::new(&pull, count)));
+        let mut ties = std::mem::take(&mut self.ties);
+        ties.clear();
+        ties.extend(context.anchor_springs().filter_map(|pull| {
+            let vertex = VertexSpring::vertex_of(&pull, self.seen().len())?;
+            VertexSpring::new(&pull, self.carried(vertex))
+        }));
+        self.ties = ties;
     }
 
     /// Counts quiet time; returns whether it has been quiet for long enough.
@@ -160,15 +215,18 @@ impl Agent for SoftBody {
         let before = self.linear_momentum();
         let (substeps, doubled) = self.advance(context, dt_s)?;
         self.finish_step(before, dt_s);
+        self.follow();
         Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })
     }
 
     fn resolution(&self) -> Option<Resolution> {
-        None
+        self.present_resolution()
     }
 
-    /// The division of a soft body is fixed by its scene: nothing changes.
-    fn set_resolution(&mut self, _wanted: Resolution) {}
+    /// An embedded solid is divided anew; the division of any other soft body is fixed by its scene.
+    fn set_resolution(&mut self, wanted: Resolution) {
+        self.divide_anew(wanted);
+    }
 
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {
         Some(self)

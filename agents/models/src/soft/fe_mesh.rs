@@ -10,8 +10,8 @@ use super::membrane::Membrane;
 use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::system::System;
 use glam::{DQuat, DVec2, DVec3};
-use metachron_geometry::SurfaceShape;
 use metachron_geometry::narrow_phase::VoronoiRegions;
+use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles};
 
 /// A divided soft body.
 #[derive(Debug, Clone, Default)]
@@ -30,12 +30,45 @@ pub(super) struct FeMesh {
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     rows: Vec<([u32; 3], f64)>,
     triangles: Vec<[u32; 3]>,
+    /// Pairs of vertices whose distance says how far a step bends the body: of a lattice those of its skin.
     edges: Vec<[u32; 2]>,
     radius_m: f64,
 }
 
 impl FeMesh {
-    /// Divides the body of `spec`.
+    /// Divides the body of `spec` into the cells of `cage`.
+    pub fn caged(cage: &Cage, spec: &SoftSpec) -> Self {
+        let count = cage.nodes_m().len();
+        let mut mesh = Self {
+            rest: cage.nodes_m().to_vec(),
+            mass_kg: vec![0.0; count],
+            held: vec![false; count],
+            ..Self::default()
+        };
+        for side in &spec.held {
+            let (axis, last) = side.place();
+            cage.on_side(axis, last).for_each(|node| mesh.held[node as usize] = true);
+        }
+        let place = |bits: usize| DVec3::from_array([0, 1, 2].map(|axis| (bits >> axis & 1) as f64));
+        mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.matter));
+        for CageCell { corners, fill, volumes_m3 } in cage.cells() {
+            for (node, volume) in corners.iter().zip(volumes_m3) {
+                mesh.mass_kg[*node as usize] += volume * spec.matter.density_kg_m3;
+            }
+            mesh.hexahedra.push(Hexahedron { vertices: *corners, kind: 0, fill: *fill, turn: DQuat::IDENTITY });
+            let of_axis = |axis: usize| {
+                (0..8).filter(move |bits| bits >> axis & 1 == 0).map(move |bits| [bits, bits | 1 << axis])
+            };
+            mesh.edges.extend((0..3).flat_map(of_axis).map(|ends| ends.map(|bits: usize| corners[bits])));
+        }
+        mesh.edges.sort_unstable();
+        mesh.edges.dedup();
+        // a cage is straight at rest
+        mesh.rows = cage.rows().into_iter().map(|row| (row, 0.0)).collect();
+        mesh
+    }
+
+    /// Divides the body of `spec` into a lattice.
     pub fn new(spec: &SoftSpec) -> Self {
         let grid = Grid::of(&spec.shape);
         let count = grid.count();
@@ -52,6 +85,7 @@ impl FeMesh {
             SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.matter),
             SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
             SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
+            SoftShape::Embedded { .. } => {} // its mesh is that of a cage
             SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.matter),
         }
         let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
@@ -121,19 +155,20 @@ impl FeMesh {
 
     /// Lists the edges of all triangles.
     fn list_edges(&mut self) {
-        let sides = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-        self.edges = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        self.edges.sort_unstable();
-        self.edges.dedup();
+        self.edges = edges_of(&self.triangles);
+    }
+
+    /// Places the vertices of a solid.
+    fn place(&mut self, grid: &Grid, place_of: impl Fn(DVec3) -> DVec3) {
+        let cells = DVec3::from_array(grid.cells.map(|count| count as f64));
+        for place in grid.places() {
+            let share = DVec3::from_array(place.map(|count| count as f64)) / cells;
+            self.rest[grid.at(place) as usize] = place_of(share);
+        }
     }
 
     fn solid(&mut self, grid: &Grid, matter: &SoftMatter, place_of: impl Fn(DVec3) -> DVec3) {
-        let [nx, ny, nz] = grid.cells;
-        let cells = DVec3::new(nx as f64, ny as f64, nz as f64);
-        for place in grid.places() {
-            let share = DVec3::new(place[0] as f64, place[1] as f64, place[2] as f64) / cells;
-            self.rest[grid.at(place) as usize] = place_of(share);
-        }
+        self.place(grid, place_of);
         for [i, j, k] in grid.places().filter(|place| (0..3).all(|axis| place[axis] < grid.cells[axis])) {
             let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
             let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
@@ -141,7 +176,7 @@ impl FeMesh {
             for (vertex, volume) in vertices.iter().zip(self.kinds[kind].volumes_m3) {
                 self.mass_kg[*vertex as usize] += volume * matter.density_kg_m3;
             }
-            self.hexahedra.push(Hexahedron { vertices, kind, turn: DQuat::IDENTITY });
+            self.hexahedra.push(Hexahedron { vertices, kind, fill: 1.0, turn: DQuat::IDENTITY });
         }
         self.skin(grid);
         self.list_edges();
@@ -254,14 +289,12 @@ impl FeMesh {
         self.edges.iter().map(share).fold(0.0, f64::max)
     }
 
-    /// The skin, as others touch it.
+    /// The skin of a lattice, as others touch it.
     pub fn surface(&self) -> SurfaceShape {
         let mut on = vec![false; self.rest.len()];
         self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
-        let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
-        let edge_m = lengths.sum::<f64>() / self.edges.len() as f64;
         SurfaceShape {
-            edge_m,
+            edge_m: mean_length_m(&self.edges, &self.rest),
             vertices: (0..on.len() as u32).filter(|vertex| on[*vertex as usize]).collect(),
             edges: self.edges.clone().into(),
             triangles: self.triangles.clone().into(),
@@ -275,6 +308,57 @@ impl FeMesh {
     pub fn elements(&self) -> usize {
         self.bars.len() + self.membranes.len() + self.hexahedra.len()
     }
+}
+
+/// A closed surface, as others touch it.
+pub(super) fn closed_surface(surface: &Triangles) -> SurfaceShape {
+    let edges = edges_of(&surface.triangles);
+    SurfaceShape {
+        edge_m: mean_length_m(&edges, &surface.points),
+        vertices: (0..surface.points.len() as u32).collect(),
+        fans: VoronoiRegions::of(&edges, &surface.triangles).into(),
+        edges: edges.into(),
+        triangles: surface.triangles.clone().into(),
+        radius_m: 0.0,
+        closed: true,
+    }
+}
+
+/// The skin of a box or a ball at rest, in its own axes; `None` for other shapes.
+pub(super) fn skin_of(shape: &SoftShape) -> Option<Triangles> {
+    let grid = Grid::of(shape);
+    let mut mesh = FeMesh { rest: vec![DVec3::ZERO; grid.count()], ..FeMesh::default() };
+    match shape {
+        SoftShape::Box { size_m, .. } => mesh.place(&grid, |share| *size_m * share),
+        SoftShape::Ball { radius_m, .. } => mesh.place(&grid, |share| ball(share) * *radius_m),
+        SoftShape::Sheet { .. } | SoftShape::Embedded { .. } | SoftShape::Rope { .. } => return None,
+    }
+    mesh.skin(&grid);
+    let mut number = vec![u32::MAX; mesh.rest.len()];
+    let mut points = vec![];
+    for corner in mesh.triangles.iter_mut().flatten() {
+        let known = &mut number[*corner as usize];
+        if *known == u32::MAX {
+            *known = points.len() as u32;
+            points.push(mesh.rest[*corner as usize]);
+        }
+        *corner = *known;
+    }
+    Some(Triangles { points, triangles: mesh.triangles })
+}
+
+/// The edges of all triangles, each once, its lesser vertex first.
+fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<_> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+fn mean_length_m(edges: &[[u32; 2]], points: &[DVec3]) -> f64 {
+    let lengths = edges.iter().map(|[a, b]| points[*a as usize].distance(points[*b as usize]));
+    lengths.sum::<f64>() / edges.len() as f64
 }
 
 /// Distance of the middle of three points from the line between the others, metres: an eighth of the second difference.

@@ -37,7 +37,7 @@ impl Side {
     }
 
     /// Its axis, and whether it is where that coordinate is largest.
-    const fn place(self) -> (usize, bool) {
+    pub(super) const fn place(self) -> (usize, bool) {
         match self {
             Self::Left => (0, false),
             Self::Right => (0, true),
@@ -54,7 +54,7 @@ impl Side {
         let axes = match shape {
             SoftShape::Rope { .. } => 1,
             SoftShape::Sheet { .. } => 2,
-            SoftShape::Box { .. } => 3,
+            SoftShape::Box { .. } | SoftShape::Embedded { .. } => 3,
             SoftShape::Ball { .. } => 0,
         };
         self.place().0 < axes
@@ -77,6 +77,7 @@ impl Grid {
             SoftShape::Sheet { segments: [x, y], .. } => [x, y, 0],
             SoftShape::Box { segments, .. } => segments,
             SoftShape::Ball { segments, .. } => [segments; 3],
+            SoftShape::Embedded { .. } => [0; 3], // it has a cage
         };
         let cells = cells.map(|count| count as usize);
         let mut axes = [2, 1, 0];

@@ -28,6 +28,8 @@ pub(super) struct Hexahedron {
     pub vertices: [u32; 8],
     /// Index of its kind.
     pub kind: usize,
+    /// The share of its volume that is matter, 0 … 1: less in cells that a surface cuts.
+    pub fill: f64,
     /// Rotation from rest.
     pub turn: DQuat,
 }
@@ -174,7 +176,9 @@ impl Hexahedron {
         let origin = positions[self.vertices[0] as usize];
         let by: [DVec3; 8] =
             std::array::from_fn(|i| back * (positions[self.vertices[i] as usize] - origin) - kind.rest[i]);
-        let force = std::array::from_fn(|i| kind.stiffness[i].iter().zip(by).map(|(block, u)| *block * u).sum());
+        let force = std::array::from_fn(|i| {
+            kind.stiffness[i].iter().zip(by).map(|(block, u)| *block * u).sum::<DVec3>() * self.fill
+        });
         Bent { turn, by, force }
     }
 
@@ -185,10 +189,11 @@ impl Hexahedron {
         let arms = self.vertices.map(|vertex| positions[vertex as usize] - origin);
         let torque: DVec3 = arms.iter().zip(force).map(|(arm, f)| arm.cross(turn * f)).sum();
         let turning = firm * torque;
+        let filled = turn * self.fill;
         for (i, &row) in self.vertices.iter().enumerate() {
             system.push(row, turning.cross(turn * kind.gradients[i]) - turn * force[i]);
             for (j, &column) in self.vertices.iter().enumerate().filter(|(_, column)| row >= **column) {
-                system.stiffen(row, column, turn * kind.stiffness[i][j] * turn.transpose());
+                system.stiffen(row, column, filled * kind.stiffness[i][j] * turn.transpose());
             }
         }
     }

@@ -11,7 +11,7 @@ use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
-use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};
 
 /// No edge may turn or stretch further in a step, radians: a turn by φ stretches it by φ²/2, here 1 %, and makes E φ⁴/8 a volume.
 const TURN_MAX_RAD: f64 = 0.15;
@@ -49,14 +49,14 @@ impl SoftBody {
         }
     }
 
-    /// The side of a point of some vertices with shares.
-    fn shared_side(&self, vertices: [u32; 3], shares: [f64; 3]) -> Side {
+    /// The side of what is carried so.
+    fn carried_side(&self, carried: &Carried) -> Side {
         let rows = self.system.rows();
-        let mut terms = [SideTerm::weighted(0, 0.0); 3];
+        let mut terms = [SideTerm::weighted(0, 0.0); 4];
         let mut count = 0;
-        for (vertex, share) in vertices.into_iter().zip(shares) {
-            if let (Some(row), true) = (rows[vertex as usize], share != 0.0) {
-                terms[count] = SideTerm::weighted(row as usize, share);
+        for (node, weight) in carried.terms() {
+            if let Some(row) = rows[node] {
+                terms[count] = SideTerm::weighted(row as usize, weight);
                 count += 1;
             }
         }
@@ -100,32 +100,44 @@ impl ClusterMember for SoftBody {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(&self.positions) })
+        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(self.seen()) })
     }
 
     fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
         let moved = |row: Option<u32>| row.map_or(DVec3::ZERO, |row| v[row as usize] * t_s);
+        let rows = self.system.rows();
         nodes.clear();
-        nodes.extend(self.positions.iter().zip(self.system.rows()).map(|(at, row)| *at + moved(*row)));
+        match &self.skin {
+            Some(skin) => nodes.extend(skin.carried().iter().map(|carried| {
+                carried.terms().map(|(node, w)| (self.positions[node] + moved(rows[node])) * w).sum::<DVec3>()
+            })),
+            None => nodes.extend(self.positions.iter().zip(rows).map(|(at, row)| *at + moved(*row))),
+        }
         Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {
         match *place {
-            Place::Surface { vertices, shares } => self.shared_side(vertices, shares),
+            Place::Surface { vertices, shares } => {
+                let [a, b, c] = vertices;
+                let own = || Carried { nodes: [a, b, c, c], weights: [shares[0], shares[1], shares[2], 0.0] };
+                let carried = self.skin.as_ref().map_or_else(own, |skin| skin.carried_at(vertices, shares));
+                self.carried_side(&carried)
+            }
             Place::Point(_) | Place::Chain { .. } => Side::FIXED,
         }
     }
 
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let Anchor::Vertex(vertex) = anchor else { return None };
-        let position = *self.positions.get(vertex as usize)?;
-        Some(MaterialPoint::new(position, self.shared_side([vertex; 3], [1.0, 0.0, 0.0])))
+        let position = *self.seen().get(vertex as usize)?;
+        Some(MaterialPoint::new(position, self.carried_side(&self.carried(vertex))))
     }
 
     fn slot_of(&self, block: usize) -> u32 {
         let mut rows = self.system.rows().iter();
-        rows.position(|row| *row == Some(block as u32)).unwrap_or_default() as u32
+        let node = rows.position(|row| *row == Some(block as u32)).unwrap_or_default();
+        self.skin.as_ref().map_or(node as u32, |skin| skin.point_of(node))
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
@@ -151,11 +163,13 @@ impl ClusterMember for SoftBody {
         self.mesh.set_turns(&kept.turns);
         self.acceleration = kept.acceleration;
         (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
+        self.follow();
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {
         self.positions.clone_from(&self.unknowns.start);
         self.add_moving(v, t_s);
+        self.follow();
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
@@ -163,13 +177,16 @@ impl ClusterMember for SoftBody {
         let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
         if !finite {
             self.positions.clone_from(&self.unknowns.start);
+            self.follow();
             return Err(self.diverged("a vertex left the coordinate range", h_s));
         }
         let before = self.linear_momentum();
-        let Self { system, velocities, unknowns, .. } = self;
+        let Self { system, velocities, .. } = self;
         for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
             *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
         }
+        self.follow();
+        let Self { unknowns, .. } = self;
         let quiet = v
             .iter()
             .zip(&unknowns.now)
@@ -190,6 +207,7 @@ impl ClusterMember for SoftBody {
         self.at_rest = true;
         self.acceleration = DVec3::ZERO;
         self.velocities.fill(DVec3::ZERO);
+        self.follow();
     }
 
     fn work(&self) -> f64 {

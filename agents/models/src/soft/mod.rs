@@ -16,6 +16,8 @@ mod hexahedron;
 mod member;
 mod membrane;
 mod publish;
+mod remesh;
+mod skin;
 mod spec;
 mod step;
 mod step_doubling;

@@ -10,7 +10,7 @@ impl SoftBody {
     pub(super) fn publish(&self, into: &mut Snapshot) {
         into.clear();
         into.steps = self.steps;
-        into.resolution = None;
+        into.resolution = self.present_resolution();
         into.energy_j = self.energy_j();
         into.drift_m = self.doubling.watch.error_m();
         into.residual_m = self.mesh.residual_m(&self.positions) + into.drift_m;
@@ -18,7 +18,9 @@ impl SoftBody {
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(self.bounds());
         let soft = into.body.soft_mut();
-        soft.positions.clone_from(&self.positions);
-        soft.velocities.clone_from(&self.velocities);
+        let (positions, velocities) =
+            self.skin.as_ref().map_or((&self.positions, &self.velocities), |skin| (&skin.positions, &skin.velocities));
+        soft.positions.clone_from(positions);
+        soft.velocities.clone_from(velocities);
     }
 }

@@ -2,6 +2,9 @@
 
 use super::grid::Side;
 use glam::{DQuat, DVec3};
+use metachron_core::ResolutionRange;
+use metachron_geometry::{Aabb, Triangles, cage_counts, is_closed};
+use std::sync::Arc;
 
 /// A soft body before it is built.
 #[derive(Debug, Clone)]
@@ -65,6 +68,16 @@ pub enum SoftShape {
         /// Cells across it.
         segments: u32,
     },
+    /// What a closed surface encloses, divided into a cage of cells around it. The surface moves with the cage: it is what others touch, grasp
+    /// and draw, and it stays the same when the cage is made anew at another ε.
+    Embedded {
+        /// The surface in the body's own axes, metres, its triangles counter-clockwise seen from outside.
+        surface: Arc<Triangles>,
+        /// Largest length of a cell at the start, metres.
+        eps_m: f64,
+        /// The finest and the coarsest one that it may take, metres.
+        range_m: (f64, f64),
+    },
     /// A rope along a path.
     Rope {
         /// Points, metres, in the rope's own axes; vertices divide it into equal lengths.
@@ -105,6 +118,20 @@ pub enum SoftError {
         /// How many it would have.
         vertices: u64,
     },
+    /// A surface has no inside.
+    #[error("the surface of the soft body {why}")]
+    NoInside {
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// A cage has more vertices than a step can take.
+    #[error(
+        "a cage of cells of {eps_m} m has more than the {VERTICES_MAX} vertices that are supported: use a larger ε"
+    )]
+    FineCage {
+        /// The spacing asked for, metres.
+        eps_m: f64,
+    },
     /// A side that its shape does not have.
     #[error("a {model} has no side `{side}`")]
     NoSide {
@@ -124,12 +151,19 @@ impl SoftShape {
     pub const fn model(&self) -> &'static str {
         match self {
             Self::Sheet { .. } => "sheet",
-            Self::Box { .. } | Self::Ball { .. } => "solid",
+            Self::Box { .. } | Self::Ball { .. } | Self::Embedded { .. } => "solid",
             Self::Rope { .. } => "rope",
         }
     }
 
-    /// How many vertices it has.
+    /// A box or ball as an embedded solid whose surface is the skin of its lattice; `None` for other shapes.
+    #[must_use]
+    pub fn embedded(&self, eps_m: f64, range_m: (f64, f64)) -> Option<Self> {
+        let surface = Arc::new(super::fe_mesh::skin_of(self)?);
+        Some(Self::Embedded { surface, eps_m, range_m })
+    }
+
+    /// How many vertices its lattice has; for a cage, of a box around it.
     #[must_use]
     pub fn vertices(&self) -> u64 {
         let along = |segments: u32| u64::from(segments) + 1;
@@ -137,6 +171,11 @@ impl SoftShape {
             Self::Sheet { segments: [x, y], .. } => along(*x).saturating_mul(along(*y)),
             Self::Box { segments: [x, y, z], .. } => along(*x).saturating_mul(along(*y)).saturating_mul(along(*z)),
             Self::Ball { segments, .. } => along(*segments).saturating_pow(3),
+            Self::Embedded { surface, eps_m, .. } => {
+                let Aabb { low, high } = Aabb::of(&surface.points);
+                let along = cage_counts(high - low, *eps_m).map(|count| count as u64 + 1);
+                along.into_iter().fold(1, u64::saturating_mul)
+            }
             Self::Rope { segments, .. } => along(*segments),
         }
     }
@@ -158,6 +197,13 @@ impl SoftShape {
                 length("the radius", *radius_m)?;
                 number("the number of segments", f64::from(*segments), (2.0, 2047.0), "between 2 and 2047")?;
             }
+            // how many vertices a cage has is known when it is made
+            Self::Embedded { surface, eps_m, range_m } => {
+                for (what, value) in [("ε", *eps_m), ("the finest ε", range_m.0), ("the coarsest ε", range_m.1)] {
+                    length(what, value)?;
+                }
+                return check_surface(surface);
+            }
             Self::Rope { path_m, radius_m, segments } => {
                 length("the radius", *radius_m)?;
                 count("the number of segments", *segments)?;
@@ -173,7 +219,31 @@ impl SoftShape {
     }
 }
 
+/// Whether a surface encloses a volume.
+fn check_surface(surface: &Triangles) -> Result<(), SoftError> {
+    let no = |why| Err(SoftError::NoInside { why });
+    let count = surface.points.len();
+    surface.points.iter().try_for_each(|point| vector("a point of the surface", *point))?;
+    if surface.triangles.is_empty() || surface.triangles.iter().flatten().any(|corner| *corner as usize >= count) {
+        return no("has no triangles, or corners that do not exist");
+    }
+    if !is_closed(surface) {
+        return no("is not closed: an edge has not equally many triangles in either direction");
+    }
+    let volume_m3 = surface.volume_m3();
+    if volume_m3 < 0.0 {
+        return no("is turned inside out: its triangles face inwards");
+    }
+    if volume_m3 > 0.0 { Ok(()) } else { no("encloses no volume") }
+}
+
 impl SoftSpec {
+    /// The resolutions that it may take; none where its division never changes.
+    pub(super) fn resolutions(&self) -> Option<ResolutionRange> {
+        let SoftShape::Embedded { range_m, .. } = &self.shape else { return None };
+        (range_m.0 < range_m.1).then_some(ResolutionRange { eps_m: *range_m, n: (0, metachron_core::N_MAX) })
+    }
+
     /// Whether every number is in its range.
     pub(super) fn check(&self) -> Result<(), SoftError> {
         let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s } = self.matter;

@@ -62,7 +62,7 @@ impl SoftBody {
             system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
             system.push(vertex as u32, spec.gravity * mass);
         }
-        ties.iter_mut().for_each(|tie| tie.add(positions[tie.vertex], h, system));
+        ties.iter_mut().for_each(|tie| tie.add(positions, h, system));
     }
 
     /// Moves with the predicted velocities.
@@ -70,7 +70,7 @@ impl SoftBody {
         let Self { positions, velocities, free, ties, .. } = self;
         std::mem::swap(velocities, free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
-        ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
+        ties.iter_mut().for_each(|tie| tie.book(velocities, h));
     }
 
     pub(super) fn diverged(&self, what: &str, dt_s: f64) -> StepError {

@@ -63,7 +63,7 @@ impl SoftBody {
         let Self { positions, velocities, free, ties, .. } = self;
         velocities.clone_from(free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
-        ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
+        ties.iter_mut().for_each(|tie| tie.book(velocities, h));
         true
     }
 

@@ -1,5 +1,6 @@
 //! What a soft body must do, against closed forms.
 
+mod embedded;
 mod error;
 mod large;
 mod promises;

@@ -1,0 +1,201 @@
+//! Embedded solids: what a closed surface encloses, in a cage of cells whose size may change.
+
+use super::*;
+use metachron_core::Resolution;
+use metachron_geometry::Triangles;
+use std::sync::Arc;
+
+const BAR: SoftShape = SoftShape::Box { size_m: DVec3::new(0.4, 0.1, 0.1), segments: [16, 4, 4] };
+
+fn at(eps_m: f64) -> Resolution {
+    Resolution { eps_m, n: 0 }
+}
+
+/// A bar of fine skin in a cage.
+fn bar(eps_m: f64) -> SoftShape {
+    BAR.embedded(eps_m, (0.0125, 0.1)).unwrap()
+}
+
+fn ball_shape(eps_m: f64) -> SoftShape {
+    SoftShape::Ball { radius_m: 0.1, segments: 10 }.embedded(eps_m, (0.02, 0.2)).unwrap()
+}
+
+/// The deepest point of a body held at its left after it has come to rest.
+fn sag(shape: SoftShape, young_pa: f64, gravity: DVec3) -> f64 {
+    let matter = SoftMatter { young_pa, damping_per_s: 20.0, ..MATTER };
+    let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], gravity, ..spec(shape) }).unwrap();
+    let start = state(&body);
+    run(&mut body, 0.01, 600);
+    let moved =
+        state(&body).positions.iter().zip(&start.positions).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max);
+    moved
+}
+
+#[test]
+fn a_cage_that_fits_a_box_sags_as_the_lattice_of_the_box_does() {
+    let lattice = SoftShape::Box { size_m: DVec3::new(0.4, 0.1, 0.1), segments: [8, 2, 2] };
+    let [caged, of_lattice] = [bar(0.05), lattice].map(|shape| sag(shape, 1e6, G));
+    assert!((caged / of_lattice - 1.0).abs() < 1e-3, "{caged} {of_lattice}");
+}
+
+#[test]
+fn a_beam_that_lies_across_its_cage_bends_as_timoshenko_says() {
+    // turned in its own axes: the surface cuts the cells of its cage
+    let turn = DQuat::from_rotation_z(0.5);
+    let SoftShape::Embedded { surface, .. } = bar(0.02) else { panic!() };
+    let turned: Vec<DVec3> = surface.points.iter().map(|point| turn * *point).collect();
+    let surface = Arc::new(Triangles { points: turned, triangles: surface.triangles.clone() });
+    let frequency = |eps_m: f64| {
+        let shape = SoftShape::Embedded { surface: surface.clone(), eps_m, range_m: (eps_m, eps_m) };
+        let matter = SoftMatter { young_pa: 1e6, poisson: 0.3, ..MATTER };
+        let mut body = SoftBody::new(SoftSpec { matter, ..spec(shape) }).unwrap();
+        // nearly the first bending mode of a free beam
+        let along = |x: DVec3| (turn.inverse() * x).x / 0.4 - 0.5;
+        for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
+            let s = along(*x);
+            *v = DVec3::Z * (0.01 * (12.0 * s * s - 1.0));
+        }
+        let momentum = body.linear_momentum() / body.mass_kg();
+        body.velocities.iter_mut().for_each(|v| *v -= momentum);
+        let end =
+            (0..body.seen().len()).min_by(|a, b| along(body.seen()[*a]).total_cmp(&along(body.seen()[*b]))).unwrap();
+        let from = body.seen()[end].z;
+        // after half a period the end comes back through where it was
+        let mut steps = 0;
+        let mut above = f64::NEG_INFINITY;
+        loop {
+            run(&mut body, 2e-4, 1);
+            steps += 1;
+            let z = body.seen()[end].z - from;
+            if z < 0.0 && above > 0.0 {
+                let crossing = f64::from(steps) - z / (z - above);
+                return 0.5 / (crossing * 2e-4);
+            }
+            above = z;
+            assert!(steps < 5000);
+        }
+    };
+    // order two: cut cells count by their volume alone
+    let exact = timoshenko_free_hz(0.4, 0.1, 1e6, 0.3, 1000.0);
+    for (eps_m, within) in [(0.05, 0.1), (0.025, 0.025), (0.0125, 0.01)] {
+        let found = frequency(eps_m);
+        assert!((found / exact - 1.0).abs() < within, "ε {eps_m}: {found} Hz, {exact} exact");
+    }
+}
+
+/// The first bending frequency of a free square beam, Hz: the lowest root of Timoshenko's equation for symmetric modes.
+fn timoshenko_free_hz(length_m: f64, height_m: f64, young_pa: f64, poisson: f64, density: f64) -> f64 {
+    let area = height_m * height_m;
+    let inertia = height_m.powi(4) / 12.0;
+    let kga = 5.0 / 6.0 * young_pa / (2.0 * (1.0 + poisson)) * area;
+    let (mass, rotary, rigid) = (density * area, density * inertia, young_pa * inertia);
+    // deflection cosh(a x) and cos(b x), about the middle; moment and shear vanish at the ends
+    let residue = |w: f64| {
+        let w2 = w * w;
+        let p = w2 * (mass / kga + rotary / rigid);
+        let q = w2 * mass / rigid * (w2 * rotary / kga - 1.0);
+        let root = (0.25 * p * p - q).sqrt();
+        let (a, b) = ((root - 0.5 * p).sqrt(), (root + 0.5 * p).sqrt());
+        // turn of the section over the slope of each: ψ' from the balance of shear, kga (w'' − ψ') = −mass w² w
+        let of_cosh = (kga * a * a + mass * w2) / (kga * a);
+        let of_cos = (kga * b * b - mass * w2) / (kga * b);
+        let h = 0.5 * length_m;
+        // moment: ψ'; shear: w' − ψ
+        let moment = [of_cosh * a * (a * h).cosh(), -of_cos * b * (b * h).cos()];
+        let shear = [(a - of_cosh) * (a * h).sinh(), -(b - of_cos) * (b * h).sin()];
+        moment[0] * shear[1] - moment[1] * shear[0]
+    };
+    let euler = 22.3733 / (length_m * length_m) * (rigid / mass).sqrt();
+    let (mut low, mut high) = (0.3 * euler, 1.05 * euler);
+    let sign = residue(low).signum();
+    assert!(residue(high).signum() != sign);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if residue(middle).signum() == sign { low = middle } else { high = middle }
+    }
+    low / std::f64::consts::TAU
+}
+
+#[test]
+fn mass_is_that_of_the_volume_and_free_fall_is_exact() {
+    for eps_m in [0.2, 0.07, 0.03] {
+        let mut body = SoftBody::new(SoftSpec { gravity: G, ..spec(ball_shape(eps_m)) }).unwrap();
+        let SoftShape::Embedded { surface, .. } = &body.spec.shape else { panic!() };
+        let mass = surface.volume_m3() * MATTER.density_kg_m3;
+        assert!((body.mass_kg() / mass - 1.0).abs() < 1e-12);
+        run(&mut body, 0.01, 50);
+        for v in state(&body).velocities {
+            assert!(v.distance(G * 0.5) < 1e-6, "{eps_m}: {v}");
+        }
+    }
+}
+
+#[test]
+fn sixty_changes_of_spacing_a_second_keep_mass_and_momentum_and_never_add_energy() {
+    let mut body = shaken_in_cage(ball_shape(0.05));
+    let mass = body.mass_kg();
+    let mut highest = body.energy_j();
+    let (linear, angular) = body.momentum();
+    let swing: f64 = angular.length().max(1e-4);
+    for change in 0..600 {
+        let eps_m = [0.05, 0.029, 0.04, 0.067, 0.1][change % 5];
+        let (before, energy, spacing) = (body.momentum(), body.energy_j(), body.resolution().unwrap().eps_m);
+        body.set_resolution(at(eps_m));
+        let after = body.momentum();
+        assert!((body.mass_kg() / mass - 1.0).abs() < 1e-12);
+        assert!(after.0.distance(before.0) < 1e-12 * mass, "change {change}: momentum");
+        let coarsest = body.resolution().unwrap().eps_m.max(spacing);
+        let share = (coarsest / 0.2).powi(2);
+        assert!(after.1.distance(before.1) <= share * swing, "change {change}: {} {}", after.1, before.1);
+        assert!(body.energy_j() <= energy + 1e-9 * highest, "change {change}: {} J of {energy}", body.energy_j());
+        run(&mut body, 1.0 / 120.0, 2);
+        highest = highest.max(energy);
+        assert!(body.energy_j() <= highest * (1.0 + 1e-6), "change {change}: {} J after a step", body.energy_j());
+    }
+    assert!(body.momentum().0.distance(linear) < 1e-9 * mass);
+}
+
+/// A solid that was stretched and turned at once by velocities of its own.
+fn shaken_in_cage(shape: SoftShape) -> SoftBody {
+    let mut body = SoftBody::new(spec(shape)).unwrap();
+    for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
+        *v = DVec3::new(x.y - 3.0 * x.x, 2.0 * x.z + x.x, x.x * x.y * 20.0) + DVec3::splat(0.3);
+    }
+    body
+}
+
+#[test]
+fn a_change_of_spacing_leaves_the_skin_where_it_is() {
+    let matter = SoftMatter { young_pa: 1e6, damping_per_s: 20.0, ..MATTER };
+    let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], gravity: G, ..spec(bar(0.0125)) }).unwrap();
+    run(&mut body, 0.01, 300);
+    let before = state(&body).positions;
+    for (eps_m, within) in [(0.025, 1e-3), (0.05, 3e-3)] {
+        body.set_resolution(at(eps_m));
+        let off = state(&body).positions.iter().zip(&before).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max);
+        assert!(off < within, "ε {eps_m}: {off} m");
+        assert!((body.resolution().unwrap().eps_m - eps_m).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn surfaces_without_an_inside_are_refused_with_the_reason() {
+    let SoftShape::Embedded { surface, .. } = ball_shape(0.05) else { panic!() };
+    let refused = |points: Vec<DVec3>, triangles: Vec<[u32; 3]>| {
+        let shape = SoftShape::Embedded {
+            surface: Arc::new(Triangles { points, triangles }),
+            eps_m: 0.05,
+            range_m: (0.05, 0.05),
+        };
+        SoftBody::new(spec(shape)).err().unwrap().to_string()
+    };
+    let (points, triangles) = (surface.points.clone(), surface.triangles.clone());
+    assert!(refused(points.clone(), triangles[1..].to_vec()).contains("is not closed"));
+    let inwards = triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    assert!(refused(points.clone(), inwards).contains("inside out"));
+    assert!(refused(points.clone(), vec![]).contains("no triangles"));
+    assert!(refused(points.iter().map(|p| p.with_x(f64::NAN)).collect(), triangles.clone()).contains("not finite"));
+    assert!(refused(points.iter().map(|p| p.with_x(0.0)).collect(), triangles.clone()).contains("no volume"));
+    let fine = SoftShape::Embedded { surface, eps_m: 0.05, range_m: (1e-3, 0.05) };
+    assert!(matches!(SoftBody::new(spec(fine)), Err(super::super::SoftError::FineCage { eps_m }) if eps_m == 1e-3));
+}
