@@ -2,10 +2,10 @@
 //!
 //! In: a kind, a seed, a number of triangles. Out: a mesh about one metre in size. Never here: levels, files.
 
-use super::PrimitiveMesh;
 use super::furniture;
 use super::furniture::Part;
 use super::mesh::creased_mesh;
+use super::{PrimitiveMesh, Triangles};
 use glam::{DVec2, DVec3};
 
 /// Shape of a generated mesh.
@@ -33,11 +33,13 @@ pub enum Generator {
     Door,
     /// Five books side by side along x, their backs to −y, 0.3 wide and high, standing on z = 0.
     Books,
+    /// A liver, about 2 long along x: a thick right lobe at −x, a thin left one at +x, a flat underside with the hollow of the gallbladder.
+    Liver,
 }
 
 impl Generator {
     /// All of them, in the order of the list of names.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Sphere,
         Self::Torus,
         Self::Blob,
@@ -49,6 +51,7 @@ impl Generator {
         Self::Shelf,
         Self::Door,
         Self::Books,
+        Self::Liver,
     ];
 
     /// The name in scene files.
@@ -66,6 +69,7 @@ impl Generator {
             Self::Shelf => "shelf",
             Self::Door => "door",
             Self::Books => "books",
+            Self::Liver => "liver",
         }
     }
 }
@@ -74,6 +78,13 @@ impl Generator {
 /// Equal arguments give bit-identical results.
 #[must_use]
 pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
+    let surface = generate_surface(kind, seed, triangles);
+    creased_mesh(&surface.points, &surface.triangles)
+}
+
+/// The same as bare points and triangles.
+#[must_use]
+pub fn generate_surface(kind: Generator, seed: u64, triangles: u32) -> Triangles {
     let mut sheet = MeshBuilder::default();
     match kind {
         Generator::Sphere => sheet.ball(side(triangles, 12), |way| way),
@@ -87,8 +98,38 @@ pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
         Generator::Shelf => sheet.boxes(triangles, &furniture::SHELF),
         Generator::Door => sheet.boxes(triangles, &furniture::DOOR),
         Generator::Books => sheet.boxes(triangles, &furniture::BOOKS),
+        Generator::Liver => sheet.ball(side(triangles, 12), |way| way * liver_m(way, seed)),
     }
-    creased_mesh(&sheet.points, &sheet.triangles)
+    Triangles { points: sheet.points, triangles: sheet.triangles }
+}
+
+/// How far the surface of a liver is from its middle in the direction `way`.
+fn liver_m(way: DVec3, seed: u64) -> f64 {
+    let ball = |at: DVec3, centre: [f64; 3], half: [f64; 3]| {
+        let half = DVec3::from(half);
+        (((at - DVec3::from(centre)) / half).length() - 1.0) * half.min_element()
+    };
+    // outside above zero; parts blend over a tenth
+    let outside = |at: DVec3| {
+        let right = ball(at, [-0.38, 0.0, 0.02], [0.62, 0.52, 0.46]);
+        let left = ball(at, [0.42, 0.04, 0.06], [0.72, 0.36, 0.24]);
+        let lobes = blend(right, left, 0.14);
+        let underside = -0.26 - at.z;
+        let hollow = -ball(at, [0.02, -0.3, -0.34], [0.16, 0.34, 0.2]);
+        -blend(-lobes, blend(-underside, -hollow, 0.08), 0.08)
+    };
+    let (mut inner, mut outer) = (0.02, 2.0);
+    for _ in 0..50 {
+        let middle = 0.5 * (inner + outer);
+        if outside(way * middle) > 0.0 { outer = middle } else { inner = middle }
+    }
+    inner * (1.0 + 0.015 * layers(seed, way * 3.0, 2))
+}
+
+/// The lesser of two numbers, rounded where they are within `over` of each other.
+fn blend(a: f64, b: f64, over: f64) -> f64 {
+    let near = (over - (a - b).abs()).max(0.0) / over;
+    a.min(b) - 0.25 * near * near * over
 }
 
 /// Cells along a grid so that `per` triangles per squared cell count make at least `triangles`.

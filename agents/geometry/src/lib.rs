@@ -52,7 +52,7 @@ pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
-pub use generate::{Generator, generate};
+pub use generate::{Generator, generate, generate_surface};
 pub use geodesic::geodesic_edges;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
 pub use model::{Extent, Model, Placement, proxy};
@@ -66,7 +66,7 @@ pub use solid::{Obstacle, Solid};
 pub use spatial_hash::{BoxGrid, Grid};
 pub use texture::{Pattern, Texture, Wrap};
 pub use topology::is_closed;
-pub use topology::{Branch, branch};
+pub use topology::{Branch, OpenEdge, branch, open_edge, pieces, welded};
 
 pub use tool::{ToolPart, ToolShape};
 

@@ -48,13 +48,77 @@ pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize
 
 /// Whether every edge has equally many triangles in either direction.
 pub fn is_closed(mesh: &Triangles) -> bool {
-    let sides = sides(&mesh.points, &places(&mesh.points), &mesh.triangles, |_| 0);
-    let balanced = |sharing: &[Side]| 2 * sharing.iter().filter(|side| side.forward).count() == sharing.len();
-    sides.chunk_by(same_edge).all(balanced)
+    open_edge(mesh).is_none()
 }
 
 fn same_edge(a: &Side, b: &Side) -> bool {
     (a.object, a.edge) == (b.object, b.edge)
+}
+
+/// An edge with a triangle on one side alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OpenEdge {
+    /// The first such triangle, from 0.
+    pub triangle: usize,
+    /// Its corners at the ends of the edge.
+    pub corners: [u32; 2],
+}
+
+/// The first open edge in the order of the triangles, or one that two triangles traverse in the same direction: `None` for a closed surface.
+#[must_use]
+pub fn open_edge(surface: &Triangles) -> Option<OpenEdge> {
+    let place = places(&surface.points);
+    let sides = sides(&surface.points, &place, &surface.triangles, |_| 0);
+    let balanced = |sharing: &[Side]| 2 * sharing.iter().filter(|side| side.forward).count() == sharing.len();
+    let open = sides.chunk_by(same_edge).filter(|sharing| !balanced(sharing)).map(|sharing| sharing[0]);
+    let Side { edge, triangle, .. } = open.min_by_key(|side| side.triangle)?;
+    let corners = surface.triangles[triangle as usize];
+    let at = |end: u32| corners.into_iter().find(|&i| place[i as usize] == end).unwrap_or(end);
+    Some(OpenEdge { triangle: triangle as usize, corners: edge.map(at) })
+}
+
+/// How many separate pieces a surface has: triangles that share a point, or coincident ones, belong to one piece.
+#[must_use]
+pub fn pieces(surface: &Triangles) -> usize {
+    let place = places(&surface.points);
+    let mut parent: Vec<u32> = (0..surface.points.len() as u32).collect();
+    let root = |parent: &mut Vec<u32>, mut at: u32| {
+        while parent[at as usize] != at {
+            parent[at as usize] = parent[parent[at as usize] as usize];
+            at = parent[at as usize];
+        }
+        at
+    };
+    for t in &surface.triangles {
+        let [a, b, c] = t.map(|corner| root(&mut parent, place[corner as usize]));
+        parent[b as usize] = a;
+        let c = root(&mut parent, c);
+        parent[c as usize] = root(&mut parent, a);
+    }
+    let used = surface.triangles.iter().flatten().map(|corner| root(&mut parent, place[*corner as usize]));
+    used.collect::<std::collections::BTreeSet<_>>().len()
+}
+
+/// The surface with one point for all that coincide, without points that no triangle has, and without triangles that have no area.
+#[must_use]
+pub fn welded(surface: &Triangles) -> Triangles {
+    let place = places(&surface.points);
+    let mut number = HashMap::new();
+    let mut points = vec![];
+    let mut triangles = vec![];
+    for t in &surface.triangles {
+        let [a, b, c] = t.map(|corner| surface.points[place[corner as usize] as usize]);
+        if (b - a).cross(c - a) == DVec3::ZERO {
+            continue;
+        }
+        triangles.push(t.map(|corner| {
+            *number.entry(place[corner as usize]).or_insert_with(|| {
+                points.push(surface.points[corner as usize]);
+                points.len() as u32 - 1
+            })
+        }));
+    }
+    Triangles { points, triangles }
 }
 
 /// For each point the index of the first coincident one.

@@ -14,7 +14,7 @@ mod table;
 
 use bodies::{block, rope, solid};
 use glam::DVec3;
-use metachron_models::soft::{Side, SoftBody, SoftShape, SoftSpec};
+use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::time::Instant;
 use table::{Placed, Table, placed};
 
@@ -25,7 +25,7 @@ struct Played {
     seconds: f64,
 }
 
-const LIST: [Played; 9] = [
+const LIST: [Played; 13] = [
     Played { name: "ten boxes", table: || scenes::scene("ten boxes"), seconds: 1.5 },
     Played { name: "box, two ropes, slab", table: || scenes::scene("box on two ropes on a slab"), seconds: 1.5 },
     Played { name: "three cloths, cube", table: || scenes::scene("cube on three cloths"), seconds: 1.5 },
@@ -35,6 +35,10 @@ const LIST: [Played; 9] = [
     Played { name: "320 boxes", table: || pile(8, 5), seconds: 0.7 },
     Played { name: "held block, ball", table: held_block, seconds: 1.5 },
     Played { name: "24 ropes, apart", table: apart, seconds: 0.5 },
+    Played { name: "soft cube of 343, floor", table: || Table::new(vec![organ(6)]), seconds: 0.7 },
+    Played { name: "soft cube of 729, floor", table: || Table::new(vec![organ(8)]), seconds: 0.7 },
+    Played { name: "soft cube of 1331, floor", table: || Table::new(vec![organ(10)]), seconds: 0.7 },
+    Played { name: "caged bar held, ball", table: caged, seconds: 0.7 },
 ];
 
 fn main() {
@@ -109,6 +113,22 @@ fn pile(wide: usize, layers: usize) -> Table {
         list.push(block(middle, DVec3::splat(0.03), 0.5, 0.05 * (12.9898 * (k + 1) as f64).sin()));
     }
     Table::new(list)
+}
+
+/// A cube of 0.1 m of so many cells along each edge, of the stuff of an organ, on the floor.
+fn organ(cells: u32) -> Placed {
+    let spec = solid(DVec3::Z * 0.0502, DVec3::splat(0.1), [cells; 3], 12e3);
+    let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
+    placed(SoftBody::new(SoftSpec { matter, ..spec }).unwrap(), false)
+}
+
+/// What a fine skin encloses, in a cage of 800 vertices, grown to its bed, under a ball.
+fn caged() -> Table {
+    let spec = solid(DVec3::new(0.0, 0.0, 0.03), DVec3::new(0.18, 0.12, 0.06), [18, 12, 6], 1.2e4);
+    let surface = std::sync::Arc::new(spec.shape.skin().unwrap());
+    let shape = SoftShape::Embedded { surface, eps_m: 0.013, range_m: (0.013, 0.013) };
+    let held = placed(SoftBody::new(SoftSpec { shape, held: vec![Side::Bottom], ..spec }).unwrap(), true);
+    Table::new(vec![held, block(DVec3::new(0.01, 0.0, 0.07), DVec3::new(0.02, 0.02, 0.008), 0.03, 0.1)])
 }
 
 /// A block of 280 vertices, grown to its bed, under a ball.

@@ -48,7 +48,8 @@ pub(super) fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
 
 /// Triangles drawn for a soft body: a sheet has two faces and a rim, a rope is drawn as a tube.
 fn soft_triangles(shape: &SoftShape) -> u32 {
-    match *shape {
+    match shape {
+        SoftShape::Embedded { surface, .. } => surface.triangles.len() as u32,
         SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
         SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
         SoftShape::Ball { segments: n, .. } => 12 * n * n,

@@ -7,6 +7,7 @@ use crate::scene::{Member, Spec};
 use glam::DVec3;
 use metachron_contact::Agent;
 use metachron_core::{Body, CurveState, ResolutionRange, Snapshot};
+use metachron_geometry::{Aabb, cage_counts};
 use metachron_models::rod::{Integrator, Tube, TubeSpec};
 use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
@@ -178,6 +179,10 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
         SoftShape::Sheet { segments, .. } => segments.to_vec(),
         SoftShape::Box { segments, .. } => segments.to_vec(),
         SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
+        SoftShape::Embedded { surface, eps_m, .. } => {
+            let Aabb { low, high } = Aabb::of(&surface.points);
+            cage_counts(high - low, *eps_m).map(|count| count as u32).to_vec()
+        }
     }
 }
 
@@ -189,6 +194,11 @@ fn set_cells(shape: &mut SoftShape, most: u32) {
         SoftShape::Sheet { segments, .. } => *segments = segments.map(scaled),
         SoftShape::Box { segments, .. } => *segments = segments.map(scaled),
         SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => *segments = scaled(*segments),
+        SoftShape::Embedded { surface, eps_m, range_m } => {
+            let Aabb { low, high } = Aabb::of(&surface.points);
+            *eps_m = (high - low).max_element() / f64::from(most.max(1));
+            *range_m = (*eps_m, *eps_m);
+        }
     }
 }
 

@@ -31,6 +31,8 @@ pub(super) struct Coupled {
     active: Vec<bool>,
     /// Of each term of all rows its gain times its map.
     pushed: Vec<DMat3>,
+    /// The blocks that rows add to.
+    changes: Vec<bool>,
 }
 
 /// Two terms of one row, counted over all rows, and where their product goes.
@@ -53,7 +55,12 @@ impl Coupled {
         let known = whole.is_none_or(|rows| self.knows(rows));
         if !(known && self.factor.fits(size, pairs)) {
             pairs.extend(whole.iter().flat_map(|rows| couplings(rows)));
-            if self.factor.shape(size, pairs) {
+            self.changes.clear();
+            if let Some(rows) = whole {
+                self.changes.resize(size, false);
+                rows.all_terms().iter().for_each(|term| self.changes[term.block] = true);
+            }
+            if self.factor.shape(size, pairs, &self.changes) {
                 self.forget();
             }
         }

@@ -50,7 +50,7 @@ impl Direct {
         pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
         x.clear();
         x.resize(lone.len(), DVec3::ZERO);
-        own.shape(lone.len(), pairs);
+        own.shape(lone.len(), pairs, &[]);
         own.set(blocks);
         own.factor(threads, |_, _| ()).map_err(|block| lone[block])
     }

@@ -44,6 +44,9 @@ const JOB_MIN: f64 = 2e5;
 /// An order made for an earlier structure is kept while its factor costs up to this many times as much as it did then.
 const KEEP_ORDER: f64 = 1.5;
 
+/// How often the numbers of blocks that change are expected to change after the first factor: a problem takes three or four Newton steps.
+const CHANGES: f64 = 3.0;
+
 /// Where the numbers of a front are.
 #[derive(Debug, Clone, Copy, Default)]
 struct Layout {
@@ -69,7 +72,7 @@ struct Target {
 /// A matrix with its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cholesky {
-    /// The order as it was made, and what its factor cost then.
+    /// The order as it was made, and what its factor and the changes of it cost then.
     order: Vec<usize>,
     fresh_cost: f64,
     fronts: Fronts,
@@ -104,17 +107,24 @@ impl Cholesky {
         self.fronts.rank.len() == size && (known || pairs.iter().all(|&pair| self.place(pair).is_some()))
     }
 
-    /// Makes room for a matrix of `size` blocks with these couplings; returns whether the structure is a new one.
-    pub fn shape(&mut self, size: usize, pairs: &[Pair]) -> bool {
-        if self.fits(size, pairs) {
+    /// Whether the order still serves a matrix of which these blocks change from factor to factor.
+    pub fn serves(&self, changes: &[bool]) -> bool {
+        changes.is_empty() || expected_cost(&self.fronts, changes) <= KEEP_ORDER * self.fresh_cost
+    }
+
+    /// Makes room for a matrix of `size` blocks with these couplings, of which some change from factor to factor (none where the list is
+    /// empty); returns whether the structure is a new one.
+    pub fn shape(&mut self, size: usize, pairs: &[Pair], changes: &[bool]) -> bool {
+        if self.fits(size, pairs) && self.serves(changes) {
             return false;
         }
         let neighbours = neighbours(size, pairs);
         let kept = (self.order.len() == size).then(|| Fronts::new(&neighbours, &self.order));
-        self.fronts = kept.filter(|fronts| fronts.cost <= KEEP_ORDER * self.fresh_cost).unwrap_or_else(|| {
-            self.order = minimum_degree(&neighbours);
-            let fronts = Fronts::new(&neighbours, &self.order);
-            self.fresh_cost = fronts.cost;
+        let serving = |fronts: &Fronts| expected_cost(fronts, changes) <= KEEP_ORDER * self.fresh_cost;
+        self.fronts = kept.filter(serving).unwrap_or_else(|| {
+            let Ordered { order, fronts } = Ordered::cheapest(&neighbours, changes);
+            self.order = order;
+            self.fresh_cost = expected_cost(&fronts, changes);
             fronts
         });
         self.lay_out();
@@ -126,7 +136,7 @@ impl Cholesky {
     /// What a factor of a matrix with these couplings would cost, about in multiplications.
     pub fn cost_of(size: usize, pairs: &[Pair]) -> f64 {
         let neighbours = neighbours(size, pairs);
-        Fronts::new(&neighbours, &minimum_degree(&neighbours)).cost
+        Ordered::new(&neighbours, &[]).fronts.cost
     }
 
     /// Storage for the fronts as they are.
@@ -307,6 +317,36 @@ impl Cholesky {
             front.store_columns(local, permuted);
         }
         fronts.rank.iter().zip(x).for_each(|(&rank, value)| *value = permuted[rank]);
+    }
+}
+
+/// What a factor and the changes to come cost, about in multiplications.
+fn expected_cost(fronts: &Fronts, changes: &[bool]) -> f64 {
+    fronts.cost + CHANGES * fronts.changed(changes)
+}
+
+/// An order of elimination with its fronts.
+struct Ordered {
+    order: Vec<usize>,
+    fronts: Fronts,
+}
+
+impl Ordered {
+    fn new(neighbours: &[Vec<usize>], late: &[bool]) -> Self {
+        let order = minimum_degree(neighbours, late);
+        Self { fronts: Fronts::new(neighbours, &order), order }
+    }
+
+    /// The order that costs least, changes included: with few blocks that change, these last, so that all else is factored once.
+    fn cheapest(neighbours: &[Vec<usize>], changes: &[bool]) -> Self {
+        let plain = Self::new(neighbours, &[]);
+        let changing = changes.iter().filter(|changes| **changes).count();
+        if changing == 0 || 2 * changing > changes.len() {
+            return plain;
+        }
+        let last = Self::new(neighbours, changes);
+        let is_cheaper = expected_cost(&last.fronts, changes) < expected_cost(&plain.fronts, changes);
+        if is_cheaper { last } else { plain }
     }
 }
 

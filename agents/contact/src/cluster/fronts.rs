@@ -62,6 +62,21 @@ impl Fronts {
         (0..order.len()).for_each(|column| tree.take_up(column));
         tree.listed(order)
     }
+
+    /// What a factor costs again after blocks have changed that `changes` says do: their fronts, and all above them.
+    pub fn changed(&self, changes: &[bool]) -> f64 {
+        let mut stale = vec![false; self.fronts.len()];
+        let mut own = vec![false; self.rank.len()];
+        self.rank.iter().zip(changes).for_each(|(&rank, &changes)| own[rank] = changes);
+        let mut cost = 0.0;
+        for (k, front) in self.fronts.iter().enumerate() {
+            if stale[k] || own[front.first..front.first + front.columns].contains(&true) {
+                cost += front.cost;
+                front.parent.into_iter().for_each(|parent| stale[parent] = true);
+            }
+        }
+        cost
+    }
 }
 
 impl Tree {

@@ -1,12 +1,15 @@
 //! The order in which a sparse matrix is eliminated: approximate minimum degree on the quotient graph (GL89), (ADD96).
 //!
 //! In: the neighbours of each node. Out: the nodes in their order. Never here: numbers of the matrix.
+//! Nodes that are to come late come after all others, so that what is eliminated before them stays when they change.
 //! Nodes that cannot be told apart go together; of equal degrees the lowest node goes first, so the order depends on the graph alone.
 
 use std::collections::BTreeSet;
 
 /// The graph while it is eliminated: nodes that are left, and cliques that eliminated ones have left behind.
-struct Quotient {
+struct Quotient<'a> {
+    /// The nodes that come after all others; none where it is empty.
+    late: &'a [bool],
     /// The nodes that each node is joined to outside of cliques; they may be gone.
     nodes: Vec<Vec<usize>>,
     /// The cliques that each node is in, by the node that made them; they may be empty.
@@ -32,13 +35,15 @@ struct Quotient {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Ranked {
+    late: bool,
     degree: usize,
     node: usize,
 }
 
-/// The order of least degree of a graph, given by the neighbours of each node by rising numbers.
-pub(super) fn minimum_degree(neighbours: &[Vec<usize>]) -> Vec<usize> {
-    let mut graph = Quotient::new(neighbours);
+/// The order of least degree of a graph, given by the neighbours of each node by rising numbers, first of the nodes that are not `late`,
+/// then of these; an empty list has none.
+pub(super) fn minimum_degree(neighbours: &[Vec<usize>], late: &[bool]) -> Vec<usize> {
+    let mut graph = Quotient::new(neighbours, late);
     let mut order = Vec::with_capacity(neighbours.len());
     let mut waiting = Vec::new();
     while let Some(Ranked { node, .. }) = graph.open.pop_first() {
@@ -52,18 +57,20 @@ pub(super) fn minimum_degree(neighbours: &[Vec<usize>]) -> Vec<usize> {
     order
 }
 
-impl Quotient {
-    fn new(neighbours: &[Vec<usize>]) -> Self {
+impl<'a> Quotient<'a> {
+    fn new(neighbours: &[Vec<usize>], late: &'a [bool]) -> Self {
         let size = neighbours.len();
         let degrees: Vec<_> = neighbours.iter().map(Vec::len).collect();
+        let ranked = |(node, &degree): (usize, &usize)| Ranked { late: is_late(late, node), degree, node };
         Self {
+            late,
             nodes: neighbours.to_vec(),
             cliques: vec![Vec::new(); size],
             members: vec![Vec::new(); size],
             sizes: vec![0; size],
             weights: vec![1; size],
             followers: vec![Vec::new(); size],
-            open: degrees.iter().enumerate().map(|(node, &degree)| Ranked { degree, node }).collect(),
+            open: degrees.iter().enumerate().map(ranked).collect(),
             degrees,
             left: size,
             marks: vec![0; size],
@@ -100,12 +107,12 @@ impl Quotient {
         self.count_outside(&reached);
         let reached_weight: usize = reached.iter().map(|&other| self.weights[other]).sum();
         for &other in &reached {
-            self.open.remove(&Ranked { degree: self.degrees[other], node: other });
+            self.open.remove(&self.ranked(other));
             self.join(other, node, reached_weight);
         }
         self.merge_alike(&mut reached, node);
         for &other in &reached {
-            self.open.insert(Ranked { degree: self.degrees[other], node: other });
+            self.open.insert(self.ranked(other));
         }
         self.sizes[node] = reached.iter().map(|&other| self.weights[other]).sum();
         self.members[node] = reached;
@@ -150,7 +157,8 @@ impl Quotient {
             if self.weights[first] == 0 {
                 continue;
             }
-            if self.nodes[first].is_empty() && self.cliques[first] == [made_by] {
+            let alone = self.nodes[first].is_empty() && self.cliques[first] == [made_by];
+            if alone && is_late(self.late, first) == is_late(self.late, made_by) {
                 self.left -= self.weights[first];
                 self.follow(first, made_by);
                 continue;
@@ -172,10 +180,14 @@ impl Quotient {
         reached.retain(|&node| self.weights[node] > 0);
     }
 
-    /// Equal for nodes with the same neighbours.
-    fn alike(&self, node: usize) -> [usize; 3] {
+    /// Equal for nodes with the same neighbours of which both or none come late.
+    fn alike(&self, node: usize) -> [usize; 4] {
         let sum = self.nodes[node].iter().chain(&self.cliques[node]).sum();
-        [sum, self.nodes[node].len(), self.cliques[node].len()]
+        [sum, self.nodes[node].len(), self.cliques[node].len(), usize::from(is_late(self.late, node))]
+    }
+
+    fn ranked(&self, node: usize) -> Ranked {
+        Ranked { late: is_late(self.late, node), degree: self.degrees[node], node }
     }
 
     /// Has a node go right after another.
@@ -187,19 +199,23 @@ impl Quotient {
     }
 }
 
+fn is_late(late: &[bool], node: usize) -> bool {
+    late.get(node).is_some_and(|late| *late)
+}
+
 #[cfg(test)]
 mod tests {
     use super::minimum_degree;
 
     #[test]
     fn a_star_is_eliminated_from_its_points() {
-        let order = minimum_degree(&[vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]]);
+        let order = minimum_degree(&[vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]], &[]);
         assert_eq!(order[..3], [1, 2, 3]);
     }
 
     #[test]
     fn a_chain_is_eliminated_from_an_end() {
-        let order = minimum_degree(&[vec![3], vec![2], vec![1, 3], vec![2, 0]]);
+        let order = minimum_degree(&[vec![3], vec![2], vec![1, 3], vec![2, 0]], &[]);
         assert_eq!(order[..2], [0, 1]);
     }
 
@@ -213,7 +229,13 @@ mod tests {
                 (0..side * side).filter(near).collect()
             })
             .collect();
-        let mut order = minimum_degree(&neighbours);
+        let mut order = minimum_degree(&neighbours, &[]);
+        order.sort_unstable();
+        assert!(order.into_iter().eq(0..side * side));
+        // what comes late comes after all others
+        let late: Vec<bool> = (0..side * side).map(|i| i % 5 == 2).collect();
+        let mut order = minimum_degree(&neighbours, &late);
+        assert!(order.iter().map(|&node| late[node]).is_sorted(), "{order:?}");
         order.sort_unstable();
         assert!(order.into_iter().eq(0..side * side));
     }

@@ -26,7 +26,7 @@ impl SparseFactor {
         self.pairs.clear();
         self.pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
         let factor = self.factor.get_mut().unwrap_or_else(PoisonError::into_inner);
-        factor.shape(size, &self.pairs);
+        factor.shape(size, &self.pairs, &[]);
         self.cost = factor.cost();
     }
 

@@ -156,11 +156,10 @@ impl SoftShape {
         }
     }
 
-    /// A box or ball as an embedded solid whose surface is the skin of its lattice; `None` for other shapes.
+    /// The skin of a box or a ball in its own axes, as finely divided as its lattice; `None` for other shapes.
     #[must_use]
-    pub fn embedded(&self, eps_m: f64, range_m: (f64, f64)) -> Option<Self> {
-        let surface = Arc::new(super::fe_mesh::skin_of(self)?);
-        Some(Self::Embedded { surface, eps_m, range_m })
+    pub fn skin(&self) -> Option<Triangles> {
+        super::fe_mesh::skin_of(self)
     }
 
     /// How many vertices its lattice has; for a cage, of a box around it.

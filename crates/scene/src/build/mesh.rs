@@ -1,4 +1,4 @@
-//! Reads files of triangles: OBJ by [`super::obj`], and binary glTF by [`super::glb`].
+//! Reads files of triangles: OBJ by [`super::obj`], STL by [`super::stl`], and binary glTF by [`super::glb`].
 //!
 //! In: any bytes. Out: a surface with valid indices, within bounds and manifold, or what is wrong with the file. Meshes for drawing and
 //! for contact are both read here. Never here: the file system.
@@ -7,7 +7,7 @@
 //! rim, and hides no branch. It is judged object by object (of an OBJ file `o` and `g`, of glTF the mesh of a node): boxes side by side
 //! are no branch. Open rims are sound; a face that is there twice counts twice; one without an area does not count.
 
-use super::{POSITION_MAX_M, glb, obj};
+use super::{POSITION_MAX_M, glb, obj, stl};
 use glam::{DVec3, Vec2};
 
 /// Most triangles of a mesh: past it a body would not step in real time.
@@ -26,11 +26,12 @@ pub(super) struct Mesh {
 /// Points, their texture coordinates (empty if there are none) and triangles.
 pub(super) type Parts = (Vec<DVec3>, Vec<Vec2>, Vec<[u32; 3]>);
 
-/// Reads a file of either format, recognised by its first bytes; `scale` is the factor that its coordinates will be multiplied by.
+/// Reads a file of any of the formats, recognised by its bytes; `scale` is the factor that its coordinates will be multiplied by.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
     let (points, uvs, triangles) = match bytes {
         [] => return Err("it is empty".to_owned()),
         _ if bytes.starts_with(glb::MAGIC) => glb::read(bytes)?,
+        _ if stl::is_stl(bytes) => stl::read(bytes)?,
         _ => obj::read(text(bytes)?)?,
     };
     check(&points, &triangles)?;
@@ -59,7 +60,7 @@ fn text(bytes: &[u8]) -> Result<&[u8], String> {
     match bytes.iter().position(|byte| *byte == 0) {
         None => Ok(bytes),
         Some(at) => Err(format!(
-            "it is neither a .glb file, which begins with `glTF`, nor an OBJ file, which is text: byte {at} is 0"
+            "it is neither a .glb file, which begins with `glTF`, nor an STL file of the length that it says, nor an OBJ file, which is text: byte {at} is 0"
         )),
     }
 }

@@ -19,6 +19,7 @@ mod rigid;
 mod scenery;
 mod soft;
 mod stage;
+mod stl;
 mod synthetic;
 mod texture;
 mod tool;

@@ -177,7 +177,7 @@ fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &
                 place,
                 "file",
                 format_args!("cannot be used: {name}: {why}"),
-                "expected a .glb or OBJ file beside the scene",
+                "expected a .glb, STL or OBJ file beside the scene",
             );
             None
         }

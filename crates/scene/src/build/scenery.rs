@@ -144,7 +144,7 @@ fn mesh_of(
         }
         Err(why) => {
             let what = format!("cannot be used: {}: {why}", key.0);
-            c.wrong(place, "file", what, "expected a .glb or OBJ file beside the scene");
+            c.wrong(place, "file", what, "expected a .glb, STL or OBJ file beside the scene");
             None
         }
     }
@@ -169,7 +169,7 @@ fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, scale: f64, reac
     within.is_ok()
 }
 
-const fn generator(kind: GeneratorKind) -> Generator {
+pub(super) const fn generator(kind: GeneratorKind) -> Generator {
     match kind {
         GeneratorKind::Sphere => Generator::Sphere,
         GeneratorKind::Torus => Generator::Torus,
@@ -182,6 +182,7 @@ const fn generator(kind: GeneratorKind) -> Generator {
         GeneratorKind::Shelf => Generator::Shelf,
         GeneratorKind::Door => Generator::Door,
         GeneratorKind::Books => Generator::Books,
+        GeneratorKind::Liver => Generator::Liver,
     }
 }
 

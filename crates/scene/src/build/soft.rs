@@ -1,20 +1,28 @@
 //! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
+use super::mesh::{self, Mesh};
 use super::object::ModelContext;
 use super::rigid::rotation;
-use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
+use super::scenery::generator;
+use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
+use metachron_geometry::{Aabb, Triangles, branch, generate_surface, open_edge, pieces, welded};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use std::sync::Arc;
 
 const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
 const POISSON: Allowed = allowed(0.0..=0.49, "");
 const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
+/// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
+const SKIN_LATTICE_MAX: u64 = 1_000_000;
+/// A soft solid from a file is hardly longer than this, metres: a file with no scale that is was drawn in millimetres.
+const LARGE_M: f64 = 10.0;
 const SEGMENTS: Allowed = allowed(1.0..=2047.0, "");
 
 /// The keys that all soft bodies share.
@@ -54,10 +62,18 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
     spec(c, context, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
 }
 
+/// A solid and the resolutions that it may take; none where its division never changes.
+pub(super) struct BuiltSolid {
+    pub(super) spec: SoftSpec,
+    pub(super) eps_m: Option<(f64, f64)>,
+}
+
 /// Reads a solid; `None` where its dimensions are missing.
-pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<SoftSpec> {
+pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<BuiltSolid> {
     let place = context.place;
-    let shape = solid_shape(c, place, file)?;
+    check_solid_keys(c, place, file);
+    let eps_m = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
+    let shape = solid_shape(c, file, context, eps_m)?;
     let side = |side: &SolidSide| match side {
         SolidSide::Left => Side::Left,
         SolidSide::Right => Side::Right,
@@ -81,34 +97,161 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
     };
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
     let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    Some(spec(c, context, shape, pose, shared))
+    Some(BuiltSolid { spec: spec(c, context, shape, pose, shared), eps_m })
 }
 
-fn solid_shape(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) -> Option<SoftShape> {
-    let cells = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), file.segments[i]));
-    let is_box = file.shape == SoftShapeKind::Box;
-    let name = if is_box { "box" } else { "ball" };
-    for (key, is_given, belongs) in
-        [("size_m", file.size_m.is_some(), is_box), ("radius_m", file.radius_m.is_some(), !is_box)]
-    {
+/// Reports keys that belong to another shape, and those that are missing.
+fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
+    let [is_box, is_ball, is_mesh] =
+        [SoftShapeKind::Box, SoftShapeKind::Ball, SoftShapeKind::Mesh].map(|shape| file.shape == shape);
+    let name = if is_box {
+        "box"
+    } else if is_ball {
+        "ball"
+    } else {
+        "mesh"
+    };
+    for (key, is_given, belongs) in [
+        ("size_m", file.size_m.is_some(), is_box),
+        ("radius_m", file.radius_m.is_some(), is_ball),
+        ("segments", file.segments.is_some(), !is_mesh),
+        ("file", file.file.is_some(), is_mesh),
+        ("generate", file.generate.is_some(), is_mesh),
+        ("seed", file.seed.is_some(), is_mesh),
+        ("triangles", file.triangles.is_some(), is_mesh),
+        ("scale", file.scale.is_some(), is_mesh),
+    ] {
         if is_given && !belongs {
             c.wrong(place, key, format_args!("does not belong to a {name}"), "expected no such key here");
         }
-        if !is_given && belongs {
+    }
+    for (key, is_missing) in [
+        ("size_m", is_box && file.size_m.is_none()),
+        ("radius_m", is_ball && file.radius_m.is_none()),
+        ("eps_m", is_mesh && file.eps_m.is_none()),
+    ] {
+        if is_missing {
             c.wrong(place, key, "is missing", format!("a {name} needs it: expected `{key}` in this table"));
         }
     }
-    if is_box {
+    match (file.segments, file.eps_m) {
+        (Some(_), Some(_)) => c.wrong(place, "segments", "contradicts `eps_m`", "expected one of them"),
+        (None, None) if !is_mesh => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
+        _ => {}
+    }
+}
+
+/// The shape of a solid; `None` where what it needs is missing, which is reported.
+fn solid_shape(
+    c: &mut Checker<'_, '_>,
+    file: &SolidFile,
+    context: &ModelContext<'_>,
+    eps_m: Option<(f64, f64)>,
+) -> Option<SoftShape> {
+    let place = context.place;
+    if file.shape == SoftShapeKind::Mesh {
+        let (surface, range_m) = (closed_surface(c, file, context)?, eps_m?);
+        return Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m });
+    }
+    // the skin of a box or ball with an ε is as fine as its finest cage
+    let fitted = |size: f64| eps_m.map(|range| (size / range.0).ceil().clamp(1.0, 2047.0) as u32);
+    let given =
+        file.segments.map(|cells| std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i])));
+    let lattice = if file.shape == SoftShapeKind::Box {
         let size = file.size_m?;
         let size = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size[i], &LENGTH));
-        return Some(SoftShape::Box { size_m: DVec3::from_array(size), segments: cells });
+        let segments = given.or_else(|| Some([fitted(size[0])?, fitted(size[1])?, fitted(size[2])?]))?;
+        SoftShape::Box { size_m: DVec3::from_array(size), segments }
+    } else {
+        let radius_m = c.number(place, "radius_m", file.radius_m?, &LENGTH);
+        let cells: [u32; 3] = given.or_else(|| Some([fitted(2.0 * radius_m)?.max(2); 3]))?;
+        if cells.iter().any(|n| *n != cells[0] || *n < 2) {
+            let expected = "expected the same number, at least 2, three times: a ball has no long side";
+            c.wrong(place, "segments", format_args!("is {cells:?}"), expected);
+        }
+        SoftShape::Ball { radius_m, segments: cells[0] }
+    };
+    match eps_m {
+        Some(range) if lattice.vertices() <= SKIN_LATTICE_MAX => {
+            let mut surface = lattice.skin()?;
+            if let SoftShape::Box { size_m, .. } = lattice {
+                // about its middle, as a mesh is about its origin
+                surface.points.iter_mut().for_each(|point| *point -= 0.5 * size_m);
+            }
+            Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range.0, range_m: range })
+        }
+        Some(_) => {
+            c.wrong(place, "eps_m", "is too fine for its size", "expected a larger finest ε");
+            None
+        }
+        None => Some(lattice),
     }
-    let radius_m = c.number(place, "radius_m", file.radius_m?, &LENGTH);
-    if cells.iter().any(|n| *n != cells[0] || *n < 2) {
-        let expected = "expected the same number, at least 2, three times: a ball has no long side";
-        c.wrong(place, "segments", format_args!("is {cells:?}"), expected);
+}
+
+/// The closed surface of a file or a generator, metres; `None` where there is none, which is reported.
+fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<Triangles> {
+    let place = context.place;
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), &allowed(4.0..=1e5, "")) as u32);
+    let (key, read) = match (&file.file, file.generate) {
+        (Some(name), None) => ("file", context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale))),
+        (None, Some(kind)) => {
+            let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), count.unwrap_or(4000));
+            ("generate", Ok(Mesh { points: made.points, uvs: vec![], triangles: made.triangles }))
+        }
+        (Some(_), Some(_)) => {
+            c.wrong(place, "generate", "contradicts `file`", "expected one of them");
+            return None;
+        }
+        (None, None) => {
+            c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table");
+            return None;
+        }
+    };
+    let name = file.file.as_deref().unwrap_or("its surface");
+    let checked = read.and_then(|mesh| solid_inside(&mesh, scale, file.scale.is_none()));
+    checked
+        .map_err(|why| {
+            let expected = "expected one closed surface, triangles outward: STL, .glb or OBJ";
+            c.wrong(place, key, format_args!("cannot be used: {name}: {why}"), expected);
+        })
+        .ok()
+}
+
+/// The surface of a mesh in metres, where it encloses a solid of one piece; what is wrong with it else.
+fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Triangles, String> {
+    let points: Vec<DVec3> = mesh.points.iter().map(|point| *point * scale).collect();
+    let surface = welded(&Triangles { points, triangles: mesh.triangles.clone() });
+    if let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) {
+        let (number, sharing) = (found.triangle + 1, found.sharing);
+        return Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"));
     }
-    Some(SoftShape::Ball { radius_m, segments: cells[0] })
+    if let Some(open) = open_edge(&surface) {
+        let at = |i: u32| surface.points[i as usize].to_array().map(|x| format!("{x:.4}")).join(", ");
+        return Err(format!(
+            "it is not closed: triangle {} has no neighbour over the edge from ({}) to ({}) m",
+            open.triangle + 1,
+            at(open.corners[0]),
+            at(open.corners[1])
+        ));
+    }
+    let found = pieces(&surface);
+    if found > 1 {
+        return Err(format!("it has {found} separate pieces, and a solid is one: make each an object"));
+    }
+    let volume_m3 = surface.volume_m3();
+    if volume_m3 < 0.0 {
+        return Err("its triangles face inwards: turn them round".to_owned());
+    }
+    let Aabb { low, high } = Aabb::of(&surface.points);
+    let size_m = (high - low).max_element();
+    if volume_m3 < 1e-9 * size_m.powi(3) {
+        return Err(format!("it encloses {volume_m3:.1e} m³, which is nothing for its length of {size_m:.3} m"));
+    }
+    if scale_is_missing && size_m > LARGE_M {
+        return Err(format!("it is {size_m:.1} m long: if its unit is the millimetre, set `scale = 0.001`"));
+    }
+    Ok(surface)
 }
 
 /// Reads a rope.
@@ -191,7 +334,7 @@ pub(super) fn nearest(spec: &SoftSpec, at: DVec3) -> Option<Anchor> {
     let half = match spec.shape {
         SoftShape::Sheet { size_m: [x, y], .. } => DVec3::new(0.5 * x, 0.5 * y, 0.0),
         SoftShape::Box { size_m, .. } => 0.5 * size_m,
-        SoftShape::Ball { .. } | SoftShape::Rope { .. } => DVec3::ZERO,
+        SoftShape::Ball { .. } | SoftShape::Embedded { .. } | SoftShape::Rope { .. } => DVec3::ZERO,
     };
     let there = spec.position + spec.rotation * (at + half);
     let Body::Soft(start) = SoftBody::new(spec.clone()).ok()?.start() else { return None };

@@ -17,7 +17,7 @@ pub struct RigidFile {
     pub half_extents_m: Option<Point>,
     /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
     pub half_height_m: Option<f64>,
-    /// A .glb file (+y up) or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
+    /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
     /// Factor that converts the file's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,

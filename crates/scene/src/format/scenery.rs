@@ -9,7 +9,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFile {
-    /// A file of triangles, binary glTF (.glb, +y up) or OBJ (+z up), its path relative to the scene file; not with `generate`. The surface
+    /// A file of triangles, binary glTF (.glb, +y up), STL or OBJ (+z up), its path relative to the scene file; not with `generate`. The surface
     /// may be open, but no edge may be shared by more than two triangles, and no coordinate may be past ± 1e5 m.
     pub file: Option<String>,
     /// A generated mesh, about a metre large; not with `file`.
@@ -115,6 +115,8 @@ pub enum GeneratorKind {
     Door,
     /// Five books side by side, 0.3 wide and high.
     Books,
+    /// A liver, about 2 long: closed.
+    Liver,
 }
 
 /// How a tree is drawn from afar.

@@ -1,6 +1,7 @@
 //! `model = "sheet"`, `"solid"` and `"rope"`: soft bodies of finite elements.
 
-use super::Point;
+use super::value::OneOrRange;
+use super::{GeneratorKind, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -36,18 +37,34 @@ pub struct SheetFile {
     pub friction: Option<f64>,
 }
 
-/// A soft solid: a box or a ball.
+/// A soft solid: a box, a ball, or what a closed surface encloses.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SolidFile {
-    /// Its shape. `box`: `size_m`. `ball`: `radius_m`.
+    /// Its shape. `box`: `size_m`. `ball`: `radius_m`. `mesh`: `file` or `generate`.
     pub shape: SoftShapeKind,
     /// Length of a box along its x, y and z axes, metres, each 1e-6 … 1e4.
     pub size_m: Option<Point>,
     /// Radius of a ball, metres, 1e-6 … 1e4.
     pub radius_m: Option<f64>,
-    /// Cells along x, y and z, for a ball three equal numbers of at least 2; at most 10,000 vertices in all.
-    pub segments: [u32; 3],
+    /// Cells along x, y and z of a box, or of a ball (three equal numbers of at least 2), which never change; at most 10,000 vertices in all.
+    /// Not together with `eps_m`.
+    pub segments: Option<[u32; 3]>,
+    /// Largest length ε of a cell of the cage that is laid around its surface, metres: one number, or `[finest, coarsest]`, of which the
+    /// controllers choose while it runs. At most 10,000 vertices at the finest.
+    pub eps_m: Option<OneOrRange<f64>>,
+    /// A closed surface as a file of triangles, STL (binary or text, +z up), binary glTF (.glb, +y up) or OBJ (+z up), its path relative to
+    /// the scene file. One piece, triangles counter-clockwise seen from outside.
+    pub file: Option<String>,
+    /// A generated closed surface, about a metre large; not with `file`.
+    pub generate: Option<GeneratorKind>,
+    /// Seed of a generated surface. Default 0.
+    pub seed: Option<u32>,
+    /// Triangles of a generated surface, 4 … 100000. Default 4000.
+    #[schemars(range(min = 4, max = 100_000))]
+    pub triangles: Option<u32>,
+    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
+    pub scale: Option<f64>,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
     /// Poisson's ratio, 0 … 0.49. Default 0.4.
@@ -57,13 +74,13 @@ pub struct SolidFile {
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Position of its middle, metres. Default: the origin.
+    /// Position of its middle, of a mesh that of the origin of its axes, metres. Default: the origin.
     pub position_m: Option<Point>,
-    /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
+    /// Rotation about that point by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
     /// Velocity of the whole solid at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
-    /// Faces of a box whose vertices never move. Default none.
+    /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its cage there. Default none.
     pub hold: Option<Vec<SolidSide>>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
@@ -103,6 +120,8 @@ pub enum SoftShapeKind {
     Box,
     /// A ball.
     Ball,
+    /// What a closed surface encloses.
+    Mesh,
 }
 
 /// An edge of a sheet, in its own axes.

@@ -58,7 +58,7 @@ fn the_sparse_factor_solves_what_the_dense_one_solves() {
     for (seed, size) in [1, 2, 5, 12, 40, 90].into_iter().enumerate() {
         let (pairs, mut dense) = random_matrix(size, 3 + seed as u64);
         let mut sparse = Cholesky::default();
-        assert!(sparse.shape(size, &pairs));
+        assert!(sparse.shape(size, &pairs, &[]));
         sparse.set(&blocks(&pairs, &mut dense));
         let mut numbers = Seeded::new(77);
         let mut x: Vec<_> = (0..size).map(|_| numbers.vector()).collect();
@@ -76,16 +76,16 @@ fn the_sparse_factor_solves_what_the_dense_one_solves() {
 fn the_order_is_kept_while_the_structure_holds_the_couplings() {
     let (pairs, _) = random_matrix(30, 9);
     let mut sparse = Cholesky::default();
-    assert!(sparse.shape(30, &pairs));
-    assert!(!sparse.shape(30, &pairs[..40]));
-    assert!(sparse.shape(31, &pairs));
+    assert!(sparse.shape(30, &pairs, &[]));
+    assert!(!sparse.shape(30, &pairs[..40], &[]));
+    assert!(sparse.shape(31, &pairs, &[]));
 }
 
 #[test]
 fn a_structure_that_grows_is_solved_as_well() {
     let (mut pairs, mut dense) = random_matrix(50, 12);
     let mut sparse = Cholesky::default();
-    sparse.shape(50, &pairs);
+    sparse.shape(50, &pairs, &[]);
     // couplings of far blocks, one by one, until a new order is made
     for k in 0..12 {
         let (row, column) = (49 - k, 2 * k);
@@ -94,7 +94,7 @@ fn a_structure_that_grows_is_solved_as_well() {
             *dense.at(3 * row + i, 3 * column + i) += 0.01;
             *dense.at(3 * column + i, 3 * row + i) += 0.01;
         }
-        sparse.shape(50, &pairs);
+        sparse.shape(50, &pairs, &[]);
         sparse.set(&blocks(&pairs, &mut dense));
         sparse.factor(&PlainLoop, |_, _| ()).unwrap();
         let mut x: Vec<_> = (0..50).map(|i| DVec3::new(1.0, f64::from(i), -1.0)).collect();
@@ -125,13 +125,13 @@ fn a_front_has_the_same_bits_by_vectors_of_any_width() {
 fn refactoring_and_solving_allocate_nothing() {
     let (pairs, mut dense) = random_matrix(40, 5);
     let mut sparse = Cholesky::default();
-    sparse.shape(40, &pairs);
+    sparse.shape(40, &pairs, &[]);
     let (first, mut second) = (blocks(&pairs, &mut dense), blocks(&pairs, &mut dense));
     second[7].value += DMat3::IDENTITY;
     let mut x = vec![DVec3::ONE; 40];
     let info = allocation_counter::measure(|| {
         for values in [&first, &second, &first] {
-            assert!(!sparse.shape(40, &[Pair { row: 3, column: 3 }]));
+            assert!(!sparse.shape(40, &[Pair { row: 3, column: 3 }], &[]));
             sparse.set(values);
             sparse.factor(&PlainLoop, |_, _| ()).unwrap();
             sparse.solve(&mut x);
@@ -145,11 +145,11 @@ fn what_is_factored_again_in_part_has_the_bits_of_a_whole_factor() {
     let (pairs, mut dense) = random_matrix(60, 21);
     let mut values = blocks(&pairs, &mut dense);
     let mut kept = Cholesky::default();
-    kept.shape(60, &pairs);
+    kept.shape(60, &pairs, &[]);
     for (k, at) in [0, 17, 59, 3, 3].into_iter().enumerate() {
         values[at].value += DMat3::from_diagonal(DVec3::splat(0.1 * (k + 1) as f64));
         let mut whole = Cholesky::default();
-        whole.shape(60, &pairs);
+        whole.shape(60, &pairs, &[]);
         let [partly, wholly] = [&mut kept, &mut whole].map(|matrix| {
             let mut x: Vec<_> = (0..60).map(|i| DVec3::new(1.0, f64::from(i), -2.0)).collect();
             matrix.set(&values);
@@ -166,7 +166,7 @@ fn what_is_added_to_a_front_is_part_of_the_matrix() {
     let (pairs, mut dense) = random_matrix(20, 8);
     let (mut added, mut given) = (Cholesky::default(), Cholesky::default());
     let mut values = blocks(&pairs, &mut dense);
-    [&mut added, &mut given].into_iter().for_each(|matrix| assert!(matrix.shape(20, &pairs)));
+    [&mut added, &mut given].into_iter().for_each(|matrix| assert!(matrix.shape(20, &pairs, &[])));
     added.set(&values);
     added.factor(&PlainLoop, |_, _| ()).unwrap();
     let more = DMat3::from_cols(DVec3::new(3.0, 1.0, 0.0), DVec3::new(1.0, 2.0, 0.5), DVec3::new(0.0, 0.5, 4.0));
@@ -195,7 +195,7 @@ fn what_is_added_to_a_front_is_part_of_the_matrix() {
 fn an_indefinite_matrix_is_refused_at_its_block() {
     let mut sparse = Cholesky::default();
     let pairs = [0, 1, 2].map(|row| Pair { row, column: row });
-    sparse.shape(3, &pairs);
+    sparse.shape(3, &pairs, &[]);
     let values: Vec<_> = [1.0, -1.0, 1.0]
         .iter()
         .enumerate()
@@ -244,7 +244,7 @@ fn trees_of_fronts_have_the_same_bits_side_by_side() {
     let pairs: Vec<_> = values.iter().map(|block| Pair { row: block.row, column: block.column }).collect();
     let solved = |threads: &dyn ParallelFor, values: &[Block]| {
         let mut matrix = Cholesky::default();
-        matrix.shape(3 * count, &pairs);
+        matrix.shape(3 * count, &pairs, &[]);
         matrix.set(values);
         let made = matrix.factor(threads, |_, _| ());
         let mut x: Vec<_> = (0..3 * count).map(|i| DVec3::new(1.0, i as f64, -2.0)).collect();

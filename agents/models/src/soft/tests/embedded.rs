@@ -11,13 +11,18 @@ fn at(eps_m: f64) -> Resolution {
     Resolution { eps_m, n: 0 }
 }
 
+/// A solid whose surface is the skin of a lattice.
+fn embedded(lattice: &SoftShape, eps_m: f64, range_m: (f64, f64)) -> SoftShape {
+    SoftShape::Embedded { surface: Arc::new(lattice.skin().unwrap()), eps_m, range_m }
+}
+
 /// A bar of fine skin in a cage.
 fn bar(eps_m: f64) -> SoftShape {
-    BAR.embedded(eps_m, (0.0125, 0.1)).unwrap()
+    embedded(&BAR, eps_m, (0.0125, 0.1))
 }
 
 fn ball_shape(eps_m: f64) -> SoftShape {
-    SoftShape::Ball { radius_m: 0.1, segments: 10 }.embedded(eps_m, (0.02, 0.2)).unwrap()
+    embedded(&SoftShape::Ball { radius_m: 0.1, segments: 10 }, eps_m, (0.02, 0.2))
 }
 
 /// The deepest point of a body held at its left after it has come to rest.
