@@ -70,6 +70,7 @@ fn governor(member: &Member, share: f64, controlled: &mut ControlledAgents) -> O
         dt_wanted_s: member.pace.dt.as_secs_f64(),
         dt_max_s: member.pace.dt_range.1.as_secs_f64(),
         eps_m: meshed.then_some(member.simulation.eps_m),
+        work_power: member.spec.work_power(),
         share,
     };
     let control = RateControl::new(limits, meshed.then_some(member.start.eps_m));

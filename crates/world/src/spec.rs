@@ -25,7 +25,17 @@ impl Spec {
     /// True where ε is the spacing of the simulated elements, which a governor may change during the run.
     #[must_use]
     pub const fn adapts_spacing(&self) -> bool {
-        matches!(self, Self::Tube(_) | Self::Synthetic(_))
+        match self {
+            Self::Tube(_) | Self::Synthetic(_) => true,
+            Self::Soft(soft) => matches!(soft.shape, SoftShape::Embedded { .. }),
+            Self::Rigid(_) | Self::Tool(_) => false,
+        }
+    }
+
+    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 3 of a solid's cage.
+    #[must_use]
+    pub const fn work_power(&self) -> f64 {
+        if matches!(self, Self::Soft(_)) { 3.0 } else { 1.0 }
     }
 
     /// True where the body bends.
@@ -102,7 +112,12 @@ impl Member {
                 tube.integrator = integrator;
                 (self.simulation, self.start) = (range, tube.resolution);
             }
-            Spec::Soft(soft) if elements > 0 => set_cells(&mut soft.shape, elements),
+            Spec::Soft(soft) if elements > 0 => {
+                set_cells(&mut soft.shape, elements);
+                if let SoftShape::Embedded { eps_m, range_m, .. } = soft.shape {
+                    (self.simulation.eps_m, self.start.eps_m) = (range_m, eps_m);
+                }
+            }
             _ => {}
         }
     }

@@ -32,6 +32,8 @@ pub struct RateLimits {
     pub dt_max_s: f64,
     /// Finest and coarsest ε of the simulation, metres; equal values fix ε. `None` for a model without ε.
     pub eps_m: Option<(f64, f64)>,
+    /// Work falls as 1/ε to this power, ≥ 1: 1 of what is divided along a line, 3 of what fills a volume.
+    pub work_power: f64,
     /// The fraction of its period that the agent's work may take, 0.01 … 1. Cores over agents, less some reserve, is fair.
     pub share: f64,
 }
@@ -91,7 +93,8 @@ struct Window {
 #[derive(Debug, Clone)]
 pub struct RateControl {
     limits: RateLimits,
-    /// Upper ends of the two ranges of z: ln(coarsest ε / finest ε), and that plus ln(longest dt / wanted dt).
+    /// Upper ends of the two ranges of z, each the logarithm of a ratio of work: p ln(coarsest ε / finest ε) with the power p of work, and that
+    /// plus ln(longest dt / wanted dt).
     eps_end: f64,
     top: f64,
     window: Window,
@@ -100,7 +103,7 @@ pub struct RateControl {
     aim: f64,
     /// z at the last change of the target for the agent's own load.
     own_target: f64,
-    /// ln(finest ε that makes a visible difference / finest ε), from 0.
+    /// The same of the finest ε that makes a visible difference, from 0.
     visible: f64,
     /// z of the last demand sent to the agent.
     sent: f64,
@@ -117,9 +120,11 @@ impl RateControl {
     /// A controller of an agent that presently steps by `dt_wanted_s` and simulates at `eps_m`.
     #[must_use]
     pub fn new(limits: RateLimits, eps_m: Option<f64>) -> Self {
-        let eps_end = limits.eps_m.map_or(0.0, |(fine, coarse)| ratio_ln(coarse, fine));
+        let eps_end = limits.eps_m.map_or(0.0, |(fine, coarse)| limits.work_power * ratio_ln(coarse, fine));
         let top = eps_end + ratio_ln(limits.dt_max_s, limits.dt_wanted_s);
-        let start = eps_m.zip(limits.eps_m).map_or(0.0, |(now, (fine, _))| ratio_ln(now, fine).min(eps_end));
+        let start = eps_m
+            .zip(limits.eps_m)
+            .map_or(0.0, |(now, (fine, _))| (limits.work_power * ratio_ln(now, fine)).min(eps_end));
         let limits =
             RateLimits { share: if limits.share > 0.0 { limits.share.clamp(0.01, 1.0) } else { 1.0 }, ..limits };
         Self {
@@ -163,7 +168,8 @@ impl RateControl {
     /// demanded; afterwards the agent returns to its own target.
     pub fn set_plain(&mut self, eps_m: f64) {
         if let Some((fine, _)) = self.limits.eps_m {
-            self.visible = if eps_m == f64::INFINITY { self.eps_end } else { ratio_ln(eps_m, fine).min(self.eps_end) };
+            let seen = self.limits.work_power * ratio_ln(eps_m, fine);
+            self.visible = if eps_m == f64::INFINITY { self.eps_end } else { seen.min(self.eps_end) };
         }
     }
 
@@ -173,7 +179,7 @@ impl RateControl {
     }
 
     /// Load of one core at the finest ε and the wanted rate, from 0, as the mean of the last windows; `None` before the first measurement.
-    /// Work falls as 1/ε and as 1/dt.
+    /// Work falls as a power of 1/ε and as 1/dt.
     #[must_use]
     pub fn full_load(&self) -> Option<f64> {
         self.full.mean()
@@ -298,7 +304,8 @@ impl RateControl {
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         let coarsened = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
-        let eps_m = self.limits.eps_m.map(|(fine, coarse)| coarsened(fine, coarse, self.target().min(self.eps_end)));
+        let of_eps = self.target().min(self.eps_end) / self.limits.work_power;
+        let eps_m = self.limits.eps_m.map(|(fine, coarse)| coarsened(fine, coarse, of_eps));
         let dt_s = coarsened(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.target() - self.eps_end).max(0.0));
         RateDemand { dt_s, eps_m }
     }

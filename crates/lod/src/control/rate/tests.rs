@@ -5,7 +5,7 @@ use super::*;
 const PERIOD_S: f64 = 1.0 / 240.0;
 
 fn limits() -> RateLimits {
-    RateLimits { dt_wanted_s: PERIOD_S, dt_max_s: 0.016, eps_m: Some((0.005, 0.02)), share: 0.5 }
+    RateLimits { dt_wanted_s: PERIOD_S, dt_max_s: 0.016, eps_m: Some((0.005, 0.02)), work_power: 1.0, share: 0.5 }
 }
 
 /// The dead zone of the load is 0.8 … 1.05; a demand that is not worth it leaves the rest.
@@ -264,4 +264,25 @@ fn an_agent_delayed_now_and_then_by_bursts_of_others_keeps_its_resolution() {
         let measure = TurnMeasure { work_s: 0.4 * PERIOD_S, wanted_period_s: PERIOD_S, real_period_s, dt_s: PERIOD_S };
         assert_eq!(control.after_turn(&measure), None, "turn {turn}");
     }
+}
+
+#[test]
+fn work_that_falls_as_the_cube_of_spacing_finds_its_spacing_at_once() {
+    let limits = RateLimits { work_power: 3.0, dt_max_s: PERIOD_S, ..limits() };
+    let mut control = RateControl::new(limits, Some(0.005));
+    let mut eps_m = 0.005_f64;
+    let mut demands = 0;
+    for _ in 0..2000 {
+        // four times what it may take at the finest
+        let work_s = 4.0 * 0.5 * PERIOD_S * (0.005 / eps_m).powi(3);
+        let turn =
+            TurnMeasure { work_s, wanted_period_s: PERIOD_S, real_period_s: work_s.max(PERIOD_S), dt_s: PERIOD_S };
+        if let Some(demand) = control.after_turn(&turn) {
+            eps_m = demand.eps_m.unwrap();
+            demands += 1;
+        }
+    }
+    let exact = 0.005 * 4.0_f64.cbrt();
+    assert!((eps_m / exact - 1.0).abs() < 0.1, "{eps_m} m, {exact} exact");
+    assert!(demands < 10, "{demands} demands");
 }
