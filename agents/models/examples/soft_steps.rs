@@ -12,12 +12,14 @@ const STEPS: u32 = 40;
 fn main() {
     for cells in [4, 6, 8, 10, 12, 15, 19] {
         let shape = SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] };
-        let matter = SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2 };
+        let matter =
+            SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, damping_s: 0.0 };
         step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, matter, Side::Bottom);
     }
     for cells in [10, 20, 30, 60] {
         let shape = SoftShape::Sheet { size_m: [0.3; 2], thickness_m: 0.004, segments: [cells; 2] };
-        let matter = SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 0.2 };
+        let matter =
+            SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 0.2, damping_s: 0.0 };
         step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, matter, Side::Left);
     }
 }
@@ -32,6 +34,7 @@ fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
         held: vec![held],
         friction: 0.5,
         gravity: DVec3::Z * -9.81,
+        self_contact: false,
         sleep: false,
     };
     let Ok(mut body) = SoftBody::new(spec) else { return println!("{name}: refused") };

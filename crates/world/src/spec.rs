@@ -160,6 +160,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
             poisson: 0.3,
             density_kg_m3: tube.section.mass_per_length_kg_m / area_m2,
             damping_per_s: tube.damping_per_s,
+            damping_s: 0.0,
         },
         position: DVec3::ZERO,
         rotation: glam::DQuat::IDENTITY,
@@ -167,6 +168,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
         held: held.filter(|(_, end)| tube.clamp[*end] || tube.pin[*end]).map(|(side, _)| side).collect(),
         friction: tube.friction,
         gravity: tube.gravity,
+        self_contact: false,
         sleep: tube.sleep,
     };
     SoftBody::new(spec.clone()).is_ok().then_some(spec)

@@ -70,6 +70,7 @@ impl HexahedronKind {
         let middle = jacobian(DVec3::ZERO);
         let mut whole = [[DMat3::ZERO; MODES]; MODES];
         let (mut gradients, mut volumes_m3, mut volume) = ([DVec3::ZERO; 8], [0.0; 8], 0.0);
+        let mut dilatation = Dilatation::none();
         for point in 0..8 {
             let at = corner(point) * GAUSS;
             let j = jacobian(at);
@@ -84,15 +85,17 @@ impl HexahedronKind {
                 for (b, block) in row.iter_mut().enumerate() {
                     let (ga, gb) = (all[a], all[b]);
                     let round = DMat3::from_diagonal(DVec3::splat(mu * ga.dot(gb)));
-                    *block += (outer(ga, gb) * lambda + outer(gb, ga) * mu + round) * weight;
+                    *block += (outer(gb, ga) * mu + round) * weight;
                 }
             }
+            dilatation.meet(at, weight, &all);
             for i in 0..8 {
                 gradients[i] += own[i] * weight;
                 volumes_m3[i] += weight * ((DVec3::ONE + corner(i) * at) * 0.5).element_product();
             }
             volume += weight;
         }
+        dilatation.add(lambda, &mut whole);
         let gradients = gradients.map(|g| g / volume);
         let rest = corners.map(|x| x - corners[0]);
         Self { rest, gradients, stiffness: Box::new(condensed(&whole)), volumes_m3 }
@@ -102,6 +105,54 @@ impl HexahedronKind {
     pub fn is_like(&self, other: &Self) -> bool {
         let size = self.rest[7].length();
         self.rest.iter().zip(&other.rest).all(|(a, b)| a.distance(*b) <= 1e-12 * size)
+    }
+}
+
+/// The dilatation of a cell as far as it is linear in the cell's coordinates: what is bilinear of it in eight corners and their modes no mode
+/// can undo, and near ν = ½ it would lock the cell.
+struct Dilatation {
+    volume: f64,
+    /// Σ ξ w and Σ ξ ξᵀ w over the Gauss points.
+    first: DVec3,
+    second: DMat3,
+    /// Σ g w of each mode, and Σ ξᵢ g w along each axis.
+    mean: [DVec3; MODES],
+    along: [[DVec3; MODES]; 3],
+}
+
+impl Dilatation {
+    const fn none() -> Self {
+        let none = [DVec3::ZERO; MODES];
+        Self { volume: 0.0, first: DVec3::ZERO, second: DMat3::ZERO, mean: none, along: [none; 3] }
+    }
+
+    /// Counts a Gauss point at `at` with the gradients of all modes there.
+    fn meet(&mut self, at: DVec3, weight: f64, gradients: &[DVec3]) {
+        self.volume += weight;
+        self.first += at * weight;
+        self.second += outer(at, at) * weight;
+        for (mode, gradient) in gradients.iter().enumerate() {
+            self.mean[mode] += *gradient * weight;
+            (0..3).for_each(|axis| self.along[axis][mode] += *gradient * (at[axis] * weight));
+        }
+    }
+
+    /// Adds λ ∫ (P div)², P the projection onto linear functions, to the stiffness of all modes.
+    fn add(mut self, lambda: f64, whole: &mut [[DMat3; MODES]; MODES]) {
+        // linear functions without a mean
+        let middle = self.first / self.volume;
+        for (axis, along) in self.along.iter_mut().enumerate() {
+            along.iter_mut().zip(&self.mean).for_each(|(along, mean)| *along -= *mean * middle[axis]);
+        }
+        let inverse = (self.second - outer(middle, middle) * self.volume).inverse();
+        for (a, row) in whole.iter_mut().enumerate() {
+            for (b, block) in row.iter_mut().enumerate() {
+                *block += outer(self.mean[a], self.mean[b]) * (lambda / self.volume);
+                for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+                    *block += outer(self.along[i][a], self.along[j][b]) * (lambda * inverse.col(j)[i]);
+                }
+            }
+        }
     }
 }
 

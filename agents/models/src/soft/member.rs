@@ -11,6 +11,7 @@ use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, StepError};
+use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};
 
 /// No edge may turn or stretch further in a step, radians: a turn by φ stretches it by φ²/2, here 1 %, and makes E φ⁴/8 a volume.
@@ -114,6 +115,11 @@ impl ClusterMember for SoftBody {
             None => nodes.extend(self.positions.iter().zip(rows).map(|(at, row)| *at + moved(*row))),
         }
         Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
+    }
+
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        let rest = || self.skin.as_ref().map_or(&self.mesh.rest[..], |skin| skin.rest());
+        self.spec.self_contact.then(|| RestShape::Surface(rest()))
     }
 
     fn side(&self, place: &Place, _contact: ContactSide) -> Side {

@@ -58,6 +58,11 @@ impl Skin {
         }
     }
 
+    /// The points of the surface at rest, in the body's own axes.
+    pub fn rest(&self) -> &[DVec3] {
+        &self.surface.points
+    }
+
     /// What carries each point of the surface.
     pub fn carried(&self) -> &[Carried] {
         &self.carried

@@ -25,6 +25,8 @@ pub struct SoftSpec {
     pub friction: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
+    /// Whether it touches itself.
+    pub self_contact: bool,
     /// Whether it may report that it is at rest.
     pub sleep: bool,
 }
@@ -34,12 +36,14 @@ pub struct SoftSpec {
 pub struct SoftMatter {
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.49.
+    /// Poisson's ratio, 0 … 0.499.
     pub poisson: f64,
     /// Density, kg/m³, 1 … 1e5.
     pub density_kg_m3: f64,
     /// Mass-proportional damping, 1/s, 0 … 1e4: dv/dt = … − c v.
     pub damping_per_s: f64,
+    /// Stiffness-proportional damping of Rayleigh, s, 0 … 10: stresses lag behind strains by this time.
+    pub damping_s: f64,
 }
 
 /// The shapes of soft bodies in their own axes.
@@ -245,17 +249,18 @@ impl SoftSpec {
 
     /// Whether every number is in its range.
     pub(super) fn check(&self) -> Result<(), SoftError> {
-        let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s } = self.matter;
+        let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s, damping_s } = self.matter;
         self.shape.check()?;
         number("Young's modulus", young_pa, (1.0, 1e11), "between 1 and 1e11 Pa")?;
         number(
             "Poisson's ratio",
             poisson,
-            (0.0, 0.49),
-            "between 0 and 0.49 (towards 0.5 the material becomes incompressible)",
+            (0.0, 0.499),
+            "between 0 and 0.499 (at 0.5 the material is incompressible)",
         )?;
         number("the density", density_kg_m3, (1.0, 1e5), "between 1 and 1e5 kg/m³")?;
         number("the damping", damping_per_s, (0.0, 1e4), "between 0 and 1e4 per second")?;
+        number("the damping of strains", damping_s, (0.0, 10.0), "between 0 and 10 s")?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;

@@ -55,7 +55,7 @@ impl SoftBody {
     /// Assembles the system of a substep of `h` seconds at the present positions.
     pub(super) fn assemble(&mut self, h: f64) {
         let Self { system, mesh, positions, spec, ties, .. } = self;
-        system.begin(h);
+        system.begin(h * (h + spec.matter.damping_s));
         mesh.add(positions, system);
         let inertia = 1.0 + h * spec.matter.damping_per_s;
         for (vertex, &mass) in mesh.mass_kg.iter().enumerate() {

@@ -23,7 +23,7 @@ const FACTOR_VERTICES_MAX: usize = 3000;
 pub(super) const NOT_POSITIVE: &str = "the stiffness matrix is not positive definite";
 pub(super) const UNENDED: &str = "conjugate gradients did not end: it is too stiff for so many vertices";
 
-/// A = (1 + h c) M + h² K, vertices that are held left out.
+/// A = (1 + h c) M + h (h + b) K, vertices that are held left out.
 #[derive(Debug, Default)]
 pub(super) struct System {
     factor: SparseFactor,
@@ -46,7 +46,7 @@ pub(super) struct System {
     added: usize,
     /// Whether the structure is known.
     merged: bool,
-    /// h², s²: the factor of every stiffness; the inertia of each moving vertex, kg.
+    /// The factor of every stiffness, s²; the inertia of each moving vertex, kg.
     square: f64,
     inertia_kg: Vec<f64>,
     /// The right side and the solution, moving vertices alone.
@@ -118,12 +118,12 @@ impl System {
         self.diagonal.iter().zip(&self.inertia_kg).map(of).fold(1.0, f64::max)
     }
 
-    /// Begins a substep of `h` seconds: no force, no stiffness.
-    pub fn begin(&mut self, h: f64) {
+    /// Begins a substep: no force, no stiffness; `square` is the factor of every stiffness, h² and what damping adds to it, s².
+    pub fn begin(&mut self, square: f64) {
         self.blocks.iter_mut().for_each(|block| block.value = DMat3::ZERO);
         self.forces.fill(DVec3::ZERO);
         self.inertia_kg.fill(0.0);
-        (self.square, self.added) = (h * h, 0);
+        (self.square, self.added) = (square, 0);
     }
 
     /// Adds a force on a vertex, N.

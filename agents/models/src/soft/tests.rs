@@ -12,7 +12,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
 
-const MATTER: SoftMatter = SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0 };
+const MATTER: SoftMatter =
+    SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0, damping_s: 0.0 };
 const SHEET: SoftShape = SoftShape::Sheet { size_m: [0.3, 0.2], thickness_m: 0.002, segments: [6, 4] };
 const G: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
@@ -27,6 +28,7 @@ fn spec(shape: SoftShape) -> SoftSpec {
         held: vec![],
         friction: 0.5,
         gravity: DVec3::ZERO,
+        self_contact: false,
         sleep: false,
     }
 }

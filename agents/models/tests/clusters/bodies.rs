@@ -8,7 +8,7 @@ use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 
 pub fn matter(young_pa: f64) -> SoftMatter {
-    SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0 }
+    SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0, damping_s: 0.0 }
 }
 
 fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
@@ -21,6 +21,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
         held: vec![],
         friction: 0.5,
         gravity: GRAVITY,
+        self_contact: false,
         sleep: false,
     }
 }

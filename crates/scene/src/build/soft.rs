@@ -16,7 +16,7 @@ use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
-const POISSON: Allowed = allowed(0.0..=0.49, "");
+const POISSON: Allowed = allowed(0.0..=0.499, "");
 const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 /// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
@@ -31,6 +31,8 @@ struct Shared {
     poisson: Option<f64>,
     density_kg_m3: Option<f64>,
     damping_per_s: Option<f64>,
+    damping_s: Option<f64>,
+    self_contact: bool,
     velocity_m_s: Option<Point>,
     friction: Option<f64>,
     held: Vec<Side>,
@@ -53,6 +55,8 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
         poisson: file.poisson,
         density_kg_m3: file.density_kg_m3,
         damping_per_s: file.damping_per_s,
+        damping_s: file.damping_s,
+        self_contact: file.self_contact.unwrap_or(true),
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held: file.hold.iter().flatten().map(side).collect(),
@@ -91,6 +95,8 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
         poisson: file.poisson,
         density_kg_m3: file.density_kg_m3,
         damping_per_s: file.damping_per_s,
+        damping_s: file.damping_s,
+        self_contact: file.self_contact.unwrap_or(false),
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held,
@@ -268,6 +274,8 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelCont
         poisson: None,
         density_kg_m3: file.density_kg_m3,
         damping_per_s: file.damping_per_s,
+        damping_s: file.damping_s,
+        self_contact: file.self_contact.unwrap_or(true),
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held: file.hold.iter().flatten().map(end).collect(),
@@ -309,6 +317,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(0.4),
         density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
         damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING_RATE).unwrap_or(0.0),
+        damping_s: c.optional(place, "damping_s", shared.damping_s, &allowed(0.0..=10.0, "s")).unwrap_or(0.0),
     };
     SoftSpec {
         shape,
@@ -319,6 +328,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         held: shared.held,
         friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
         gravity: context.gravity,
+        self_contact: shared.self_contact,
         sleep: context.sleep,
     }
 }

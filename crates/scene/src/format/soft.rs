@@ -17,13 +17,15 @@ pub struct SheetFile {
     pub thickness_m: f64,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.49. Default 0.4.
-    #[schemars(range(min = 0.0, max = 0.49))]
+    /// Poisson's ratio, 0 … 0.499. Default 0.4.
+    #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson: Option<f64>,
     /// Density, kg/m³, 1 … 1e5. Default 1050.
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
+    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    pub damping_s: Option<f64>,
     /// Position of its middle, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
@@ -35,6 +37,8 @@ pub struct SheetFile {
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub friction: Option<f64>,
+    /// Whether it touches itself. Default true.
+    pub self_contact: Option<bool>,
 }
 
 /// A soft solid: a box, a ball, or what a closed surface encloses.
@@ -67,13 +71,15 @@ pub struct SolidFile {
     pub scale: Option<f64>,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.49. Default 0.4.
-    #[schemars(range(min = 0.0, max = 0.49))]
+    /// Poisson's ratio, 0 … 0.499. Default 0.4.
+    #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson: Option<f64>,
     /// Density, kg/m³, 1 … 1e5. Default 1050.
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
+    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    pub damping_s: Option<f64>,
     /// Position of its middle, of a mesh that of the origin of its axes, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about that point by angles about the world's x, then y, then z axis, degrees. Default none.
@@ -85,6 +91,8 @@ pub struct SolidFile {
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub friction: Option<f64>,
+    /// Whether it touches itself. Default false.
+    pub self_contact: Option<bool>,
 }
 
 /// A rope: it stretches, and has no stiffness against bending or twisting.
@@ -103,6 +111,8 @@ pub struct RopeFile {
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
+    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    pub damping_s: Option<f64>,
     /// Velocity of the whole rope at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
     /// Ends that never move. Default none.
@@ -110,6 +120,8 @@ pub struct RopeFile {
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub friction: Option<f64>,
+    /// Whether it touches itself. Default true.
+    pub self_contact: Option<bool>,
 }
 
 /// The shape of a soft solid.

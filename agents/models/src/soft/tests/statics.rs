@@ -101,3 +101,41 @@ fn a_rope_hangs_in_a_catenary() {
         }
     }
 }
+
+#[test]
+fn a_nearly_incompressible_cantilever_does_not_lock() {
+    // refined: 64 × 4 × 4 cells sag 23.01 mm, 32 × 8 × 8 cells 22.71 mm; Timoshenko's beam, whose wall leaves the section free to contract, 23.83
+    let (length, side, refined) = (0.4, 0.04, 0.0231);
+    for (segments, most) in [([16, 1, 1], 0.01), ([16, 2, 2], 0.05), ([16, 4, 4], 0.05)] {
+        let shape = SoftShape::Box { size_m: DVec3::new(length, side, side), segments };
+        let matter = damped(SoftMatter { young_pa: 1e7, poisson: 0.499, ..MATTER });
+        let mut body = SoftBody::new(SoftSpec { matter, gravity: G, held: vec![Side::Left], ..spec(shape) }).unwrap();
+        let tip = settled(&mut body, 0.02, 400).positions.last().unwrap().z - side;
+        let error = -tip / refined - 1.0;
+        println!("{segments:?}: {tip} {error}");
+        assert!(error.abs() < most, "{segments:?}: {error}");
+    }
+}
+
+#[test]
+fn a_bar_that_swings_along_itself_fades_as_rayleigh_says() {
+    let (length, young, density) = (0.4, 1e6, 1000.0);
+    for damping_s in [0.0, 5e-4, 2e-3] {
+        let shape = SoftShape::Box { size_m: DVec3::new(length, 0.04, 0.04), segments: [40, 1, 1] };
+        let matter = SoftMatter { young_pa: young, poisson: 0.0, damping_s, ..MATTER };
+        let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], ..spec(shape) }).unwrap();
+        let wave = std::f64::consts::FRAC_PI_2 / length;
+        for (v, x) in body.velocities.iter_mut().zip(&body.mesh.rest) {
+            *v = DVec3::X * (1e-3 * (wave * x.x).sin());
+        }
+        // whole periods: within one, damping works where it moves fastest
+        let (h, steps) = (2e-5, 2530);
+        let before = body.energy_j();
+        run(&mut body, h, steps);
+        let rate = (before / body.energy_j()).ln() / (h * f64::from(steps));
+        // implicit Euler itself fades like a damping of one step
+        let squared = wave * wave * young / density;
+        let wanted = (damping_s + h) * squared;
+        assert!((rate / wanted - 1.0).abs() < 0.05, "{damping_s}: {rate} 1/s, {wanted} wanted");
+    }
+}

@@ -16,7 +16,8 @@ pub(in super::super) struct SolidBeam;
 const HEIGHTS: [(&str, f64); 2] = [("h = L/10", 0.1), ("h = L/20", 0.05)];
 const LENGTH_M: f64 = 0.4;
 /// So stiff that the sag is below 0.2 % of the length: beam theory is one of small angles.
-const MATTER: SoftMatter = SoftMatter { young_pa: 1e9, poisson: 0.0, density_kg_m3: 1000.0, damping_per_s: 20.0 };
+const MATTER: SoftMatter =
+    SoftMatter { young_pa: 1e9, poisson: 0.0, density_kg_m3: 1000.0, damping_per_s: 20.0, damping_s: 0.0 };
 const SECONDS: f64 = 4.0;
 
 impl Benchmark for SolidBeam {
