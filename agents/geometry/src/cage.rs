@@ -12,6 +12,8 @@ const COLUMNS: usize = 6;
 const COLUMN_SHIFT: [f64; 2] = [1.137e-5, -0.731e-5];
 /// A cell with less inside than this share of what the fullest has is no cell of the cage: its nodes would weigh next to nothing.
 const FILL_LEAST: f64 = 0.01;
+/// How far inward a point of the surface is taken to be when its cell is looked for, as a share of a cell.
+const INWARD: f64 = 1e-3;
 /// No cell, no node.
 const NONE: u32 = u32::MAX;
 
@@ -288,10 +290,12 @@ impl Cage {
         (cell, (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m)
     }
 
-    /// How a point at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell (eq. 18).
+    /// How a point of the surface at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell
+    /// (eq. 18). The cell is the one on the side of the unit vector `inward`: a surface may lie between two cells.
     #[must_use]
-    pub fn carry(&self, at_m: DVec3) -> Carried {
-        let (cell, share) = self.locate(at_m);
+    pub fn carry(&self, at_m: DVec3, inward: DVec3) -> Carried {
+        let cell = &self.cells[self.cell_at(at_m + inward * (INWARD * self.cell_m.min_element()))];
+        let share = (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m;
         let mut axes = [0, 1, 2];
         axes.sort_by(|a, b| share[*b].total_cmp(&share[*a]));
         let [first, second, third] = axes.map(|axis| share[axis]);
@@ -409,14 +413,14 @@ mod tests {
         let bent = |x: DVec3| DVec3::new(1.0 + 2.0 * x.y, x.z - 0.3 * x.x, 0.5 * x.x + x.z);
         let moved: Vec<DVec3> = cage.nodes_m().iter().map(|node| bent(*node)).collect();
         for point in &surface.points {
-            let carried = cage.carry(*point);
+            let carried = cage.carry(*point, -point.normalize());
             assert!((carried.weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
             assert!(carried.mean(&moved).distance(bent(*point)) < 1e-12);
         }
         let wild: Vec<DVec3> = (0..cage.nodes_m().len()).map(|i| DVec3::splat((i * 7919 % 101) as f64)).collect();
         let inner = DVec3::new(0.01, -0.02, 0.005);
         for way in [DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 1.0)] {
-            let walk = (0..4000).map(|i| cage.carry(inner + way * (f64::from(i) * 1e-5)).mean(&wild).x);
+            let walk = (0..4000).map(|i| cage.carry(inner + way * (f64::from(i) * 1e-5), DVec3::ZERO).mean(&wild).x);
             let walk: Vec<f64> = walk.collect();
             assert!(walk.windows(2).all(|pair| (pair[0] - pair[1]).abs() < 0.5), "a jump along {way}");
         }

@@ -11,6 +11,8 @@ use std::sync::Arc;
 pub(super) struct Skin {
     surface: Arc<Triangles>,
     pub cage: Cage,
+    /// The mean direction into the body at each point at rest; of length 1, or none.
+    inward: Vec<DVec3>,
     carried: Vec<Carried>,
     /// For each node the point of the surface that it carries most of.
     nearest: Vec<u32>,
@@ -25,7 +27,13 @@ impl Skin {
     pub fn new(surface: Arc<Triangles>, cage: Cage) -> Self {
         let positions = surface.points.clone();
         let velocities = vec![DVec3::ZERO; positions.len()];
-        let mut skin = Self { surface, cage, carried: vec![], nearest: vec![], positions, velocities };
+        let mut inward = vec![DVec3::ZERO; positions.len()];
+        for corners in &surface.triangles {
+            let into = into_body(corners.map(|corner| positions[corner as usize]));
+            corners.iter().for_each(|corner| inward[*corner as usize] += into);
+        }
+        inward.iter_mut().for_each(|into| *into = into.normalize_or_zero());
+        let mut skin = Self { surface, cage, inward, carried: vec![], nearest: vec![], positions, velocities };
         skin.bind();
         skin
     }
@@ -38,7 +46,8 @@ impl Skin {
 
     fn bind(&mut self) {
         self.carried.clear();
-        self.carried.extend(self.surface.points.iter().map(|point| self.cage.carry(*point)));
+        let points = self.surface.points.iter().zip(&self.inward);
+        self.carried.extend(points.map(|(point, inward)| self.cage.carry(*point, *inward)));
         let mut most = vec![(0, 0.0); self.cage.nodes_m().len()];
         for (point, carried) in (0..).zip(&self.carried) {
             for (node, weight) in carried.terms() {
@@ -70,12 +79,21 @@ impl Skin {
 
     /// What carries the point of the surface with these shares of three of its points.
     pub fn carried_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Carried {
-        let points = vertices.into_iter().zip(shares);
-        self.cage.carry(points.map(|(vertex, share)| self.surface.points[vertex as usize] * share).sum())
+        let points = vertices.map(|vertex| self.surface.points[vertex as usize]);
+        let at = points.into_iter().zip(shares).map(|(point, share)| point * share).sum();
+        let of_vertices = || vertices.into_iter().zip(shares).map(|(v, share)| self.inward[v as usize] * share).sum();
+        // a place on an edge has two vertices alone
+        let inward = into_body(points).try_normalize().unwrap_or_else(of_vertices);
+        self.cage.carry(at, inward)
     }
 
     /// The point of the surface that stands for a node.
     pub fn point_of(&self, node: usize) -> u32 {
         self.nearest[node]
     }
+}
+
+/// The direction into the body at a triangle, by twice its area.
+fn into_body([a, b, c]: [DVec3; 3]) -> DVec3 {
+    (c - a).cross(b - a)
 }

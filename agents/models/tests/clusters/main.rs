@@ -10,6 +10,7 @@ mod joints;
 mod large;
 mod links;
 mod own_model;
+mod own_skin;
 mod passing;
 mod rebounds;
 mod scenes;
