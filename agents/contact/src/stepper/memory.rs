@@ -21,7 +21,7 @@ pub enum Partner {
     Agent(AgentId),
     /// The far end of a spring of the user or of a grasp, by its number among those on its body.
     Tie(u32),
-    /// The far end of a link, by its number among those of its body.
+    /// The far end of a link, by its number in the scene.
     Link(u32),
     /// The far end of a joint, by its number in the scene.
     Joint(u32),
@@ -71,15 +71,19 @@ impl Clone for PairMemory {
 #[derive(Debug, Default, PartialEq)]
 pub struct ContactMemory {
     pairs: Vec<PairMemory>,
+    /// Links and joints of the body that have torn, sorted. They stay torn.
+    torn: Vec<Partner>,
 }
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        Self { pairs: self.pairs.clone() }
+        Self { pairs: self.pairs.clone(), torn: self.torn.clone() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        self.pairs.clone_from(&from.pairs);
+        let Self { pairs, torn } = self;
+        pairs.clone_from(&from.pairs);
+        torn.clone_from(&from.torn);
     }
 }
 
@@ -133,7 +137,21 @@ impl ContactMemory {
         })
     }
 
-    /// Forgets all pairs, where the body was divided anew.
+    /// Notes that a link or joint has torn: nothing of it is remembered but that.
+    pub(super) fn tear(&mut self, partner: Partner) {
+        self.pairs.retain(|pair| pair.partner != partner);
+        if let Err(at) = self.torn.binary_search(&partner) {
+            self.torn.insert(at, partner);
+        }
+    }
+
+    /// Whether a link or joint of the body has torn.
+    #[must_use]
+    pub fn has_torn(&self, partner: Partner) -> bool {
+        self.torn.binary_search(&partner).is_ok()
+    }
+
+    /// Forgets all pairs, where the body was divided anew; what has torn stays so.
     pub fn forget(&mut self) {
         self.pairs.clear();
     }
@@ -157,6 +175,20 @@ mod tests {
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
+    }
+
+    #[test]
+    fn what_has_torn_is_remembered_as_nothing_else_and_stays_torn() {
+        let mut memory = ContactMemory::default();
+        let (joint, other) = (Partner::Joint(4), Partner::Joint(5));
+        memory.pair(joint).next.push(Remembered { force_n: DVec3::Z, ..Remembered::default() });
+        memory.turn(SimTime::ZERO);
+        memory.tear(joint);
+        memory.tear(joint);
+        memory.forget();
+        let copy = memory.clone();
+        assert!(copy.has_torn(joint) && !copy.has_torn(other) && copy.pairs.is_empty());
+        assert_eq!((copy.recall(joint, TouchKey::default()).force_n, copy.torn.len()), (DVec3::ZERO, 1));
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
+//! tear      links and joints that gave more than they can bear are gone from the next macro step on
 
 mod arms;
 mod blows;
@@ -31,6 +32,7 @@ mod scene;
 mod search;
 mod solve;
 mod springs;
+mod tearing;
 mod ties;
 mod weighing;
 
@@ -55,6 +57,8 @@ use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
 use search::Search;
+use tearing::Tearing;
+pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
@@ -159,6 +163,7 @@ pub struct ClusterStepper {
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
+    tearing: Tearing,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     rebounds: Rebounds,
@@ -196,6 +201,7 @@ impl ClusterStepper {
             progress: Vec::new(),
             members: Vec::new(),
             totals: Vec::new(),
+            tearing: Tearing::default(),
             kept: Vec::new(),
             rebounds: Rebounds::default(),
             heap: Heap::default(),
@@ -256,6 +262,7 @@ impl ClusterStepper {
                 }
             }
         }
+        self.tearing.end(all, self.macro_s);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }
@@ -297,6 +304,7 @@ impl ClusterStepper {
             one.grips.clear();
         }
         self.totals.clear();
+        self.tearing.begin();
         self.outside.begin();
         report.fine_steps = parts;
         report.depth_m = 0.0;
@@ -421,6 +429,11 @@ impl ClusterStepper {
         &self.totals[start..self.totals.partition_point(|total| total.member <= member)]
     }
 
+    /// What tore in the last macro step, by participants: no later step knows it.
+    pub fn torn(&self) -> &[Torn] {
+        self.tearing.torn()
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
@@ -476,7 +489,7 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, ties, outside, .. } = self;
+        let Self { solver, search, ties, outside, tearing, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -498,6 +511,7 @@ impl ClusterStepper {
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
             outside.note_line(owner, *impulse);
+            tearing.note(owner, *impulse);
             if let Partner::Link(_) = owner.partner {
                 total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
             }
