@@ -4,7 +4,6 @@
 
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
-use std::cmp::Ordering;
 
 /// A joint between two rigid bodies, or between one and the world. Jointed bodies are always members of one cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -136,8 +135,7 @@ impl Joint {
         if !(self.rest.is_finite() && self.rest.length_squared() > 0.0) {
             return Err(JointError::BadVector { what: "rest rotation" });
         }
-        // NaN is none
-        if !matches!(self.tears_above_n.partial_cmp(&0.0), Some(Ordering::Greater)) {
+        if self.tears_above_n.is_nan() || self.tears_above_n <= 0.0 {
             let (what, value, wanted) = ("tearing force", self.tears_above_n, "above zero");
             return Err(JointError::BadNumber { what, value, wanted });
         }

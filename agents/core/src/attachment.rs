@@ -12,14 +12,17 @@ pub enum AttachmentId {
     Coupling(u32),
     /// A joint.
     Joint(u32),
+    /// A part of an agent that is attached to its place at the start; by its number among those of the agent.
+    Part(u32),
 }
 
-/// Written as places of scenes are: `coupling.0`, `joint.3`.
+/// Written as places of scenes are: `coupling.0`, `joint.3`, `attach.1` of an object.
 impl fmt::Display for AttachmentId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Coupling(number) => write!(f, "coupling.{number}"),
             Self::Joint(number) => write!(f, "joint.{number}"),
+            Self::Part(number) => write!(f, "attach.{number}"),
         }
     }
 }

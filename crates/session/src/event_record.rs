@@ -7,7 +7,7 @@ use metachron_core::{AgentId, Snapshot, TornAttachment};
 /// An attachment that tore in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// The agent that tells of it: of a joint the first body, of a coupling the one of lower number.
+    /// The agent that tells of it: of a joint the first body, of a coupling the one of lower number, of a tube's own attachment the tube.
     pub agent: AgentId,
     /// What tore, when, and by which force.
     pub torn: TornAttachment,
@@ -17,7 +17,7 @@ pub struct Event {
 pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Event> {
     let told = |(agent, state): (AgentId, &'a Snapshot)| state.torn.iter().map(move |&torn| Event { agent, torn });
     let mut events: Vec<Event> = (0..).map(AgentId).zip(states).flat_map(told).collect();
-    events.sort_by_key(|event| (event.torn.at, event.torn.attachment));
+    events.sort_by_key(|event| (event.torn.at, event.torn.attachment, event.agent));
     events
 }
 

@@ -29,6 +29,8 @@ pub enum Partner {
     Drive,
     /// The end of a transmission line, by its number among those of the macro step.
     Line(u32),
+    /// The far end of an attachment that is the body's own, by its number among those of the body.
+    Attachment(u32),
 }
 
 /// What a contact or a joint hands to the next step.
@@ -71,7 +73,7 @@ impl Clone for PairMemory {
 #[derive(Debug, Default, PartialEq)]
 pub struct ContactMemory {
     pairs: Vec<PairMemory>,
-    /// Links and joints of the body that have torn, sorted. They stay torn.
+    /// Links, joints and own attachments of the body that have torn, sorted. They stay torn.
     torn: Vec<Partner>,
 }
 
@@ -137,7 +139,7 @@ impl ContactMemory {
         })
     }
 
-    /// Notes that a link or joint has torn: nothing of it is remembered but that.
+    /// Notes that an attachment has torn: nothing of it is remembered but that.
     pub(super) fn tear(&mut self, partner: Partner) {
         self.pairs.retain(|pair| pair.partner != partner);
         if let Err(at) = self.torn.binary_search(&partner) {
@@ -145,10 +147,15 @@ impl ContactMemory {
         }
     }
 
-    /// Whether a link or joint of the body has torn.
+    /// Whether an attachment of the body has torn.
     #[must_use]
     pub fn has_torn(&self, partner: Partner) -> bool {
         self.torn.binary_search(&partner).is_ok()
+    }
+
+    /// The attachments of the body that have torn.
+    pub(super) fn torn(&self) -> &[Partner] {
+        &self.torn
     }
 
     /// Forgets all pairs, where the body was divided anew; what has torn stays so.

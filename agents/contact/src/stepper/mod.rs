@@ -11,7 +11,7 @@
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
-//! tear      links and joints that gave more than they can bear are gone from the next macro step on
+//! tear      attachments that gave more than they can bear are gone from the next macro step on
 
 mod arms;
 mod blows;
@@ -46,7 +46,7 @@ use heap::Heap;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
+pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
@@ -249,6 +249,7 @@ impl ClusterStepper {
         let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
         self.joints_missed_m = f64::INFINITY;
+        all.iter_mut().for_each(Participant::let_go);
         self.foresee(all, self.macro_s, threads)?;
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
@@ -544,7 +545,13 @@ impl ClusterStepper {
                 state.part = 0;
             }
         });
-        self.first_failure()
+        self.first_failure()?;
+        for (place, (one, state)) in
+            all.iter().zip(&self.progress).enumerate().filter(|(_, (_, state))| state.part == 0)
+        {
+            self.tearing.note_own(place, one.member, h_s * f64::from(state.share));
+        }
+        Ok(())
     }
 }
 

@@ -1,21 +1,22 @@
-//! Attachments that tear: a link or joint that gave more than it can bear over a macro step is gone from the next one on.
+//! Attachments that tear: what gave more than it can bear over a macro step is gone from the next one on.
 //!
-//! In: rows with the impulses that they gave. Out: what tore; its members remember nothing of it but that. Never here: what a row is made
-//! of, who is told. Theory: docs/theory/clusters.md, eq. 28.
+//! In: rows with the impulses that they gave, what members say of their own attachments. Out: what tore; its members remember nothing of it
+//! but that. Never here: what a row is made of, who is told. Theory: docs/theory/clusters.md, eq. 28.
 
-use super::Participant;
 use super::memory::Partner;
 use super::ties::RowOwner;
+use super::{ClusterMember, Participant};
 use glam::DVec3;
 
-/// A link or joint that tore at the end of a macro step.
+/// An attachment that tore at the end of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Torn {
-    /// The participant that remembered it, by its place in the list: of a joint the first body, of a link the lower number.
+    /// The participant that remembered it, by its place in the list: of a joint the first body, of a link the lower number, else whose own
+    /// it is.
     pub member: usize,
     /// The participant at its other end; `None` is the world.
     pub other: Option<usize>,
-    /// The link or joint.
+    /// A link, a joint, or an attachment that is the participant's own.
     pub partner: Partner,
     /// The force that it gave: the mean over the macro step, N.
     pub force_n: f64,
@@ -32,7 +33,10 @@ pub(super) struct Tearing {
 /// What an attachment that may tear has given since the macro step began.
 #[derive(Debug, Clone, Copy)]
 struct Load {
-    owner: RowOwner,
+    member: usize,
+    other: Option<usize>,
+    partner: Partner,
+    tears_above_n: f64,
     impulse_n_s: DVec3,
 }
 
@@ -45,23 +49,34 @@ impl Tearing {
 
     /// Adds what a row gave.
     pub fn note(&mut self, owner: &RowOwner, impulse_n_s: DVec3) {
-        if owner.tears_above_n == f64::INFINITY {
-            return;
-        }
-        let order = |load: &Load| (load.owner.member, load.owner.partner);
-        match self.loads.binary_search_by_key(&(owner.member, owner.partner), order) {
-            Ok(at) => self.loads[at].impulse_n_s += impulse_n_s,
-            Err(at) => self.loads.insert(at, Load { owner: *owner, impulse_n_s }),
+        let RowOwner { member, other, partner, tears_above_n, .. } = *owner;
+        self.add(Load { member, other, partner, tears_above_n, impulse_n_s });
+    }
+
+    /// Adds what the own attachments of a member gave over its step of `h_s` seconds, which has ended.
+    pub fn note_own(&mut self, member: usize, body: &dyn ClusterMember, h_s: f64) {
+        for own in body.attachments() {
+            let (partner, impulse_n_s) = (Partner::Attachment(own.number), own.force_n * h_s);
+            self.add(Load { member, other: None, partner, tears_above_n: own.tears_above_n, impulse_n_s });
         }
     }
 
-    /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members are told.
+    fn add(&mut self, load: Load) {
+        if load.tears_above_n == f64::INFINITY {
+            return;
+        }
+        match self.loads.binary_search_by_key(&(load.member, load.partner), |load| (load.member, load.partner)) {
+            Ok(at) => self.loads[at].impulse_n_s += load.impulse_n_s,
+            Err(at) => self.loads.insert(at, load),
+        }
+    }
+
+    /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that.
     pub fn end(&mut self, all: &mut [Participant<'_>], macro_s: f64) {
-        for Load { owner, impulse_n_s } in &self.loads {
+        for Load { member, other, partner, tears_above_n, impulse_n_s } in self.loads.iter().copied() {
             let force_n = impulse_n_s.length() / macro_s;
-            if force_n > owner.tears_above_n {
-                let RowOwner { member, other, partner, .. } = *owner;
-                owner.both().for_each(|one| all[one].memory.tear(partner));
+            if force_n > tears_above_n {
+                std::iter::once(member).chain(other).for_each(|one| all[one].memory.tear(partner));
                 self.torn.push(Torn { member, other, partner, force_n });
             }
         }
@@ -69,5 +84,16 @@ impl Tearing {
 
     pub fn torn(&self) -> &[Torn] {
         &self.torn
+    }
+}
+
+impl Participant<'_> {
+    /// Lets go of its own attachments that have torn.
+    pub(super) fn let_go(&mut self) {
+        for torn in self.memory.torn() {
+            if let Partner::Attachment(number) = torn {
+                self.member.let_go(*number);
+            }
+        }
     }
 }

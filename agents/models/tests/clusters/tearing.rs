@@ -6,9 +6,10 @@ use glam::DVec3;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::stepper::{Partner, StepDoubling, Torn};
 use metachron_contact::{AnchorSpring, Link};
-use metachron_core::{AgentId, Anchor};
+use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::rod::{Attachment, Material, Section, Tube, TubeSpec};
 
 const G: f64 = -GRAVITY.z;
 const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
@@ -223,4 +224,58 @@ fn a_tube_hung_by_two_links_tears_the_one_that_is_weaker_then_the_other() {
     let order: Vec<_> = torn.iter().map(|torn| (torn.member, torn.other, torn.partner)).collect();
     assert_eq!(order, [(0, Some(2), Partner::Link(0)), (1, Some(2), Partner::Link(1))]);
     assert!(table.middle(2).1.z < -5.0, "it falls");
+}
+
+/// A tube of 0.2 m that hangs along all of its length and begins at rest where that is slack; the share of its weight at which it tears off.
+fn mesentery(share: f64) -> Table {
+    let material = Material { young_pa: 1e6, poisson: 0.3, density_kg_m3: 1000.0, shear_factor: 0.9 };
+    let section = Section::hollow(0.01, 0.01, material);
+    let per_m_n = section.mass_per_length_kg_m * G;
+    // it sags by 1 mm, and comes there without passing it
+    let stiffness_n_m2 = per_m_n / 1e-3;
+    let damping_n_s_m2 = 3.0 * (stiffness_n_m2 * section.mass_per_length_kg_m).sqrt();
+    let tears_above_n = share * per_m_n * 0.2;
+    let attachment = Attachment { from: 0.0, to: 1.0, stiffness_n_m2, slack_m: 0.0, damping_n_s_m2, tears_above_n };
+    let spec = TubeSpec::free(vec![DVec3::ZERO, DVec3::X * 0.2], section, 10);
+    let range = ResolutionRange { eps_m: (0.01, 0.05), n: (0, 0) };
+    let spec = TubeSpec { gravity: GRAVITY, attachments: vec![attachment], range, ..spec };
+    Table::among(vec![placed(Tube::new(spec).unwrap(), false)], &[])
+}
+
+#[test]
+fn a_tube_hangs_by_its_attachment_below_the_tearing_force_and_falls_above_it() {
+    let mut table = mesentery(1.1);
+    while table.time.as_secs_f64() < 2.0 {
+        table.step();
+        assert_eq!(table.torn(), []);
+    }
+    assert!((table.middle(0).0.z + 1e-3).abs() < 1e-6, "{}", table.middle(0).0);
+
+    let mut table = mesentery(0.9);
+    table.doubling = Some(StepDoubling::default());
+    let weight_n = table.bodies[0].agent.mass_kg() * G;
+    let (torn, given_n) = loop {
+        let before = table.bodies[0].agent.momentum().0;
+        let (_, h_s) = table.step();
+        if let [torn] = *table.torn() {
+            break (torn, (table.bodies[0].agent.momentum().0 - before).z / h_s + weight_n);
+        }
+        assert!(table.time.as_secs_f64() < 1.0, "it holds");
+    };
+    assert_eq!((torn.member, torn.other, torn.partner), (0, None, Partner::Attachment(0)));
+    // its weight, and what slows it down
+    assert!((torn.force_n - given_n).abs() < 1e-9 * weight_n, "{} N is not {given_n} N", torn.force_n);
+    assert!(torn.force_n > 0.9 * weight_n && torn.force_n < 1.05 * weight_n, "{} of {weight_n} N", torn.force_n);
+    // it falls from that moment on, and goes on falling once it is divided anew
+    let (begun_s, momentum) = (table.time.as_secs_f64(), table.bodies[0].agent.momentum().0);
+    for step in 0..60 {
+        if step == 30 {
+            table.bodies[0].agent.set_resolution(Resolution { eps_m: 0.04, n: 0 });
+        }
+        table.step();
+        assert_eq!(table.torn(), [], "once only");
+        let wanted = momentum + DVec3::Z * (-weight_n * (table.time.as_secs_f64() - begun_s));
+        let found = table.bodies[0].agent.momentum().0;
+        assert!(found.distance(wanted) < 1e-9 * weight_n, "step {step}: {found} is not {wanted}");
+    }
 }

@@ -46,6 +46,7 @@ impl AgentRunner {
                 let attachment = match torn.partner {
                     Partner::Link(number) => AttachmentId::Coupling(number),
                     Partner::Joint(number) => AttachmentId::Joint(number),
+                    Partner::Attachment(number) => AttachmentId::Part(number),
                     _ => continue,
                 };
                 let with = torn.other.map(|other| ids[other]);

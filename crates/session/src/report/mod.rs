@@ -199,7 +199,7 @@ pub struct EventReport {
     pub at_s: f64,
     /// What happened: `tore`, an attachment by its `tears_above_n`.
     pub kind: &'static str,
-    /// The attachment, as its place in the scene: `joint.0`, `coupling.2`.
+    /// The attachment, as its place in the scene: `joint.0`, `coupling.2`, `attach.1` of the tube `a`.
     pub attachment: String,
     /// The first object's name.
     pub a: String,
