@@ -166,3 +166,33 @@ fn what_a_joint_held_together_falls_and_parts_once_it_has_torn() {
     assert!(late_m.abs() < 1.2e-3, "{late_m} m");
     assert_eq!(play("8.8").1, hash, "the same bits");
 }
+
+#[test]
+fn a_tool_that_pulls_ever_harder_tears_its_attachment_within_a_step_of_the_threshold() {
+    // a beam that is fixed to the world, and a tool on a spring of 100 N/m that goes up by 0.2 m in a second, half of it in half a second,
+    // where it is fastest: 30 N a second
+    let text = r#"format = 1
+object = [
+    { name = "beam", model = "rigid", shape = "ball", radius_m = 0.1, mass_kg = 1 },
+    { name = "tool", model = "tool", rate_hz = 240, keyframe = [{ at_s = 0, tip_m = [0, 0, 1] }, { at_s = 1, tip_m = [0, 0, 1.2] }] },
+]
+joint = [{ kind = "fixed", a = "beam", b = "world" }]
+coupling = [{ kind = "attach", a = "beam", b = "tool", at_a = [0, 0, 0], at_b = [0, 0, 0], stiffness_n_m = 100, rest_m = 1, tears_above_n = 10 }]
+"#;
+    let scene = Source::memory("pull", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
+    for executor in [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool] {
+        let world = World::start(&scene, executor).unwrap();
+        world.advance(SimSpan::from_millis(1000));
+        let [beam, tool] = [0, 1].map(|at| world.agents()[at].latest());
+        let [event] = beam.torn[..] else { panic!("{executor:?}: {:?}", beam.torn) };
+        assert_eq!((event.attachment, event.with), (AttachmentId::Coupling(0), Some(AgentId(1))), "{executor:?}");
+        // a cluster that is late makes steps of up to 1/60 s
+        let step_s = beam.cluster.unwrap().step_s.max(1.0 / 60.0);
+        assert!((10.0..=10.0 + 30.0 * step_s).contains(&event.force_n), "{executor:?}: {} N", event.force_n);
+        // the tip is a little behind its path
+        let at_s = event.at.as_secs_f64();
+        assert!((0.5..0.5 + 2.0 * step_s).contains(&at_s), "{executor:?}: {at_s} s");
+        assert!(tool.torn.is_empty() && tool.grips.is_empty() && beam.grips.is_empty(), "{executor:?}");
+        assert_eq!(world.agents()[1].led_by(), None, "{executor:?}: they parted");
+    }
+}
