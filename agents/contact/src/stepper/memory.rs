@@ -75,17 +75,29 @@ pub struct ContactMemory {
     pairs: Vec<PairMemory>,
     /// Links, joints and own attachments of the body that have torn, sorted. They stay torn.
     torn: Vec<Partner>,
+    /// What attachments that may tear have given in macro steps that were cut short.
+    unfinished: Vec<UnfinishedLoad>,
+}
+
+/// What an attachment has given since its force was last looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UnfinishedLoad {
+    pub partner: Partner,
+    pub impulse_n_s: DVec3,
+    /// In how long a time, seconds.
+    pub span_s: f64,
 }
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        Self { pairs: self.pairs.clone(), torn: self.torn.clone() }
+        Self { pairs: self.pairs.clone(), torn: self.torn.clone(), unfinished: self.unfinished.clone() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { pairs, torn } = self;
+        let Self { pairs, torn, unfinished } = self;
         pairs.clone_from(&from.pairs);
         torn.clone_from(&from.torn);
+        unfinished.clone_from(&from.unfinished);
     }
 }
 
@@ -145,6 +157,20 @@ impl ContactMemory {
         if let Err(at) = self.torn.binary_search(&partner) {
             self.torn.insert(at, partner);
         }
+    }
+
+    /// Adds what an attachment gave in a macro step. Returns all that it has given since this last returned something, once that is over a
+    /// time of `whole_s` seconds.
+    pub(super) fn bear(&mut self, load: UnfinishedLoad, whole_s: f64) -> Option<UnfinishedLoad> {
+        let at = self.unfinished.iter().position(|before| before.partner == load.partner);
+        let before = at.map(|at| self.unfinished.swap_remove(at));
+        let (impulse_n_s, span_s) = before.map_or((DVec3::ZERO, 0.0), |before| (before.impulse_n_s, before.span_s));
+        let load = UnfinishedLoad { impulse_n_s: load.impulse_n_s + impulse_n_s, span_s: load.span_s + span_s, ..load };
+        if load.span_s >= whole_s {
+            return Some(load);
+        }
+        self.unfinished.push(load);
+        None
     }
 
     /// Whether an attachment of the body has torn.

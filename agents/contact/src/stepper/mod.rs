@@ -546,10 +546,11 @@ impl ClusterStepper {
             }
         });
         self.first_failure()?;
-        for (place, (one, state)) in
-            all.iter().zip(&self.progress).enumerate().filter(|(_, (_, state))| state.part == 0)
-        {
-            self.tearing.note_own(place, one.member, h_s * f64::from(state.share));
+        let Self { progress, tearing, .. } = self;
+        for (place, (one, state)) in all.iter().zip(progress).enumerate() {
+            if state.part == 0 {
+                tearing.note_own(place, one.member, h_s * f64::from(state.share));
+            }
         }
         Ok(())
     }

@@ -3,10 +3,13 @@
 //! In: rows with the impulses that they gave, what members say of their own attachments. Out: what tore; its members remember nothing of it
 //! but that. Never here: what a row is made of, who is told. Theory: docs/theory/clusters.md, eq. 28.
 
-use super::memory::Partner;
+use super::memory::{Partner, UnfinishedLoad};
 use super::ties::RowOwner;
 use super::{ClusterMember, Participant};
 use glam::DVec3;
+
+/// A macro step of at least this share of a whole one is no cut one: times are whole nanoseconds, clocks are not exact.
+const WHOLE: f64 = 0.9;
 
 /// An attachment that tore at the end of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +21,7 @@ pub struct Torn {
     pub other: Option<usize>,
     /// A link, a joint, or an attachment that is the participant's own.
     pub partner: Partner,
-    /// The force that it gave: the mean over the macro step, N.
+    /// The force that it gave: the mean over the macro step, and over those cut short before it, N.
     pub force_n: f64,
 }
 
@@ -71,10 +74,19 @@ impl Tearing {
         }
     }
 
-    /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that.
+    /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that. What was given in
+    /// a step that was cut short counts together with the next: a joint that takes back what it is off gives that as a blow.
     pub fn end(&mut self, all: &mut [Participant<'_>], macro_s: f64) {
+        if self.loads.is_empty() {
+            return;
+        }
+        let whole_s = WHOLE * whole_step_s(all);
         for Load { member, other, partner, tears_above_n, impulse_n_s } in self.loads.iter().copied() {
-            let force_n = impulse_n_s.length() / macro_s;
+            let load = UnfinishedLoad { partner, impulse_n_s, span_s: macro_s };
+            let Some(UnfinishedLoad { impulse_n_s, span_s, .. }) = all[member].memory.bear(load, whole_s) else {
+                continue;
+            };
+            let force_n = impulse_n_s.length() / span_s;
             if force_n > tears_above_n {
                 std::iter::once(member).chain(other).for_each(|one| all[one].memory.tear(partner));
                 self.torn.push(Torn { member, other, partner, force_n });
@@ -85,6 +97,12 @@ impl Tearing {
     pub fn torn(&self) -> &[Torn] {
         &self.torn
     }
+}
+
+/// The macro step that these participants make where nothing cuts it short, seconds (eq. 23).
+fn whole_step_s(all: &[Participant<'_>]) -> f64 {
+    let here = all.iter().filter(|one| !one.member.is_remote());
+    here.map(|one| f64::from(one.parts) * one.alone_s).fold(f64::INFINITY, f64::min)
 }
 
 impl Participant<'_> {
