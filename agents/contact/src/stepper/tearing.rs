@@ -8,8 +8,9 @@ use super::ties::RowOwner;
 use super::{ClusterMember, Participant};
 use glam::DVec3;
 
-/// A macro step of at least this share of a whole one is no cut one: times are whole nanoseconds, clocks are not exact.
-const WHOLE: f64 = 0.9;
+/// A macro step of at least this share of the shortest time that a member's own steps fill in it is no cut one. By (23) it is half of that
+/// or more: the shortest n h is no less than h_longest/√2, the own steps of the fastest fill no more than √2 h_longest.
+const WHOLE: f64 = 0.5;
 
 /// An attachment that tore at the end of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,7 +81,7 @@ impl Tearing {
         if self.loads.is_empty() {
             return;
         }
-        let whole_s = WHOLE * whole_step_s(all);
+        let whole_s = WHOLE * filled_s(all);
         for Load { member, other, partner, tears_above_n, impulse_n_s } in self.loads.iter().copied() {
             let load = UnfinishedLoad { partner, impulse_n_s, span_s: macro_s };
             let Some(UnfinishedLoad { impulse_n_s, span_s, .. }) = all[member].memory.bear(load, whole_s) else {
@@ -99,8 +100,8 @@ impl Tearing {
     }
 }
 
-/// The macro step that these participants make where nothing cuts it short, seconds (eq. 23).
-fn whole_step_s(all: &[Participant<'_>]) -> f64 {
+/// The shortest time that a member's own steps within a macro step fill where nothing cuts it short, seconds.
+fn filled_s(all: &[Participant<'_>]) -> f64 {
     let here = all.iter().filter(|one| !one.member.is_remote());
     here.map(|one| f64::from(one.parts) * one.alone_s).fold(f64::INFINITY, f64::min)
 }
