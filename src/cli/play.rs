@@ -3,19 +3,19 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
-use metachron_core::{AgentId, ClusterState};
+use metachron_core::{AgentId, ClusterState, TornAttachment};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
 use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
 use metachron_runtime::{AgentState, Spread};
 use metachron_session::report::{
-    AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, MovedReport, OverlapReport, ProbeReport,
-    Quantiles, ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
+    AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, MovedReport, OverlapReport,
+    ProbeReport, Quantiles, ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
 };
 use metachron_session::{
-    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Outcome, PairError, ProbeOutcome, ReferenceComparison,
-    Session, compare_with_reference, play_headless,
+    AgentOutcome, Coupling, Drawing, End, Event, FrameRecord, Headless, Outcome, PairError, ProbeOutcome,
+    ReferenceComparison, Session, compare_with_reference, play_headless,
 };
 #[cfg(feature = "viewer")]
 use metachron_viewer::ui::WindowError;
@@ -192,6 +192,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         summary,
         agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
+        events: outcome.events.iter().map(|one| event(scene, one)).collect(),
         clusters: clusters(scene, &outcome.clusters),
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
@@ -292,6 +293,19 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
         force_n: coupling.force_n,
         force_max_n: coupling.force_max_n,
         parasitic_kg: coupling.parasitic_kg,
+    }
+}
+
+fn event(scene: &Scene, event: &Event) -> EventReport {
+    let name = |id: AgentId| scene.name_of(id).to_owned();
+    let TornAttachment { attachment, with, at, force_n } = event.torn;
+    EventReport {
+        at_s: at.as_secs_f64(),
+        kind: "tore",
+        attachment: attachment.to_string(),
+        a: name(event.agent),
+        b: with.map_or_else(|| "world".to_owned(), name),
+        force_n,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Scenes in which agents act on each other, played from the command line: joints, clusters, couplings, overlaps, the oracle.
 
 use crate::play::{Folder, agent, lockstep, metachron, number, point, program};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// Two balls of 1 kg and radius 0.1 m on the x axis, without gravity; the left one moves right at 1 m/s.
 fn balls(gap_m: f64, ties: &str) -> Folder {
@@ -51,6 +51,36 @@ fn a_chain_keeps_its_length_and_gains_no_energy_while_it_swings() {
         assert!(energy(&report) < start_j * 1.01, "{} J of {start_j} J after {seconds} s", energy(&report));
         assert_eq!(agent(&report, "weight")["led_by"], "link-0");
     }
+}
+
+#[test]
+fn what_tears_is_an_event_of_the_report_and_without_one_there_is_none() {
+    // a ball of 1 kg on a rope, and a hose of 62 g that hangs along its length
+    let play = |share: f64| {
+        let text = format!(
+            "[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1\n\
+             [[object]]\nname = \"hose\"\nmodel = \"tube\"\npath_m = [[1, 0, 0], [1.2, 0, 0]]\nradius_m = 0.01\nyoung_pa = 1e6\n\
+             mass_per_length_kg_m = 0.31\nattach = [{{ from = 0, to = 1, stiffness_n_m2 = 3000, damping_n_s_m2 = 90, tears_above_n = {} }}]\n\
+             [[joint]]\nkind = \"rope\"\na = \"ball\"\nb = \"world\"\nat_b_m = [0, 0, 1]\ntears_above_n = {}\n",
+            share * 0.062 * 9.81,
+            share * 9.81
+        );
+        Folder::with(&text).lockstep(&["--seconds", "0.5"])
+    };
+    let torn = play(0.9);
+    let events = torn["events"].as_array().unwrap();
+    let named: Vec<_> = events.iter().map(|event| (&event["attachment"], &event["a"], &event["b"])).collect();
+    assert_eq!(
+        named,
+        [(&json!("joint.0"), &json!("ball"), &json!("world")), (&json!("attach.0"), &json!("hose"), &json!("world"))]
+    );
+    for (event, weight_n) in events.iter().zip([9.81, 0.062 * 9.81]) {
+        assert!(event["kind"] == "tore" && number(event, "/at_s") < 0.1, "{event}");
+        // what slows the hose down adds to its weight
+        let weights = number(event, "/force_n") / weight_n;
+        assert!(weights > 0.9 && weights < 1.05, "{event}");
+    }
+    assert!(play(1.2).get("events").is_none());
 }
 
 #[test]

@@ -20,8 +20,11 @@ pub struct Joint {
     pub anchor_b_m: DVec3,
     /// Rotation of b's shape relative to a's where the joint is at its zero: `a⁻¹ b` of both rotations at the start.
     pub rest: DQuat,
-    /// Whether the two bodies also collide with each other.
+    /// Whether the two bodies also collide with each other; also once it has torn.
     pub collide: bool,
+    /// The force above which it tears, N, > 0: the mean over a macro step of its cluster; what it gives against turns does not count.
+    /// Infinite where it never does.
+    pub tears_above_n: f64,
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes are in a's shape, of any length above zero.
@@ -106,10 +109,11 @@ pub enum JointError {
 pub const JOINT_GAP_MAX_M: f64 = 1e-3;
 
 impl Joint {
-    /// A joint of `kind` without collision between its bodies, anchored in both shapes' origins.
+    /// A joint of `kind` without collision between its bodies, anchored in both shapes' origins, that never tears.
     #[must_use]
     pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
-        Self { a, b, kind, anchor_a_m: DVec3::ZERO, anchor_b_m: DVec3::ZERO, rest: DQuat::IDENTITY, collide: false }
+        let (anchor_a_m, anchor_b_m, rest) = (DVec3::ZERO, DVec3::ZERO, DQuat::IDENTITY);
+        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide: false, tears_above_n: f64::INFINITY }
     }
 
     /// The same joint with its zero at the initial rotations of the two shapes: rotations to the world's axes.
@@ -130,6 +134,10 @@ impl Joint {
         place("anchor on b", self.anchor_b_m)?;
         if !(self.rest.is_finite() && self.rest.length_squared() > 0.0) {
             return Err(JointError::BadVector { what: "rest rotation" });
+        }
+        if self.tears_above_n.is_nan() || self.tears_above_n <= 0.0 {
+            let (what, value, wanted) = ("tearing force", self.tears_above_n, "above zero");
+            return Err(JointError::BadNumber { what, value, wanted });
         }
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
@@ -218,6 +226,10 @@ mod tests {
         assert_eq!(rope(1.0).check(), Ok(()));
         for length_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(rope(length_m).check(), Err(JointError::BadNumber { .. })), "{length_m}");
+        }
+        for tears_above_n in [0.0, -1.0, f64::NAN] {
+            let joint = Joint { tears_above_n, ..rope(1.0) };
+            assert!(matches!(joint.check(), Err(JointError::BadNumber { .. })), "{tears_above_n}");
         }
         let to_itself = Joint { b: Some(AgentId(0)), ..rope(1.0) };
         assert_eq!(to_itself.check(), Err(JointError::SameBody));

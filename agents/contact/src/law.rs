@@ -46,4 +46,9 @@ pub struct Link {
     pub rest_m: f64,
     /// [`Law::Cluster`], [`Law::Ledger`] or [`Law::Tlm`].
     pub law: Law,
+    /// Its number in the scene, by which both ends know it.
+    pub number: u32,
+    /// The force above which it tears, N, > 0: the mean over a macro step of its cluster. Infinite where it never does; an asynchronous
+    /// link never does.
+    pub tears_above_n: f64,
 }

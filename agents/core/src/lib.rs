@@ -19,6 +19,7 @@
 //! assert_ne!(before.fold_hash(HASH_START), later.fold_hash(HASH_START));
 //! ```
 
+mod attachment;
 pub mod body;
 mod cluster_state;
 mod disjoint_sets;
@@ -38,6 +39,7 @@ pub mod step_doubling;
 pub mod time;
 pub mod wave;
 
+pub use attachment::{AttachmentId, TornAttachment};
 pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
 };

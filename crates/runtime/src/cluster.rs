@@ -4,6 +4,7 @@
 //! Never here: how members come and go ([`seats`]), what else belongs to a turn ([`turn`]), the problem itself
 //! ([`metachron_contact::stepper`]).
 
+mod attachments;
 mod common_time;
 mod membership;
 mod seats;
@@ -11,6 +12,8 @@ mod seats;
 mod tests;
 mod turn;
 
+pub(super) use attachments::JointedTo;
+use attachments::{held_by_joints, held_by_links};
 pub(super) use membership::{Epoch, Membership};
 pub(super) use seats::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
 pub(super) use turn::Leap;
@@ -24,11 +27,11 @@ use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
     StepDoubling,
 };
-use metachron_contact::{Law, Link, Neighbour, StepContext};
+use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
     AgentId, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot,
-    StepReport, recycled,
+    StepReport, TornAttachment, recycled,
 };
 use std::sync::Arc;
 
@@ -38,13 +41,15 @@ const STRETCHED_MAX_S: f64 = 1.0 / 60.0;
 /// What an agent brings into the cluster that it is stepped in.
 pub(super) struct ClusterSeat {
     scene: Arc<ClusterScene>,
-    /// Agents that joints hold it to.
-    jointed: Vec<AgentId>,
+    /// Joints that hold it to other agents, the torn ones too.
+    jointed: Vec<JointedTo>,
     /// Only of one that makes turns.
     stepper: Option<Box<ClusterStepper>>,
     memory: ContactMemory,
     grips: Vec<Grip>,
     pairs: Vec<PairState>,
+    /// Attachments that have torn, of those that it tells of.
+    torn: Vec<TornAttachment>,
     /// Agents that belong into the same cluster, as it sees them.
     bonds: Vec<AgentId>,
     /// Of these the ones that rest: they are woken.
@@ -109,9 +114,9 @@ impl std::fmt::Debug for ClusterSeat {
 }
 
 impl ClusterSeat {
-    /// A seat in the clusters of `scene`, whose joints hold it to the agents `jointed`; `asynchronous` of an agent that has pairs with clocks
+    /// A seat in the clusters of `scene`, of which `jointed` are its joints; `asynchronous` of an agent that has pairs with clocks
     /// of their own.
-    pub fn new(scene: Arc<ClusterScene>, jointed: Vec<AgentId>, asynchronous: bool) -> Self {
+    pub fn new(scene: Arc<ClusterScene>, jointed: Vec<JointedTo>, asynchronous: bool) -> Self {
         Self {
             asynchronous: asynchronous.then(Box::default),
             remotes: None,
@@ -122,6 +127,7 @@ impl ClusterSeat {
             memory: ContactMemory::default(),
             grips: Vec::new(),
             pairs: Vec::new(),
+            torn: Vec::new(),
             bonds: Vec::new(),
             sleepers: Vec::new(),
             work: 0.0,
@@ -144,6 +150,7 @@ impl ClusterSeat {
     pub fn complete(&self, into: &mut Snapshot) {
         into.grips.clone_from(&self.grips);
         into.pairs.clone_from(&self.pairs);
+        into.torn.clone_from(&self.torn);
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
         into.cluster = self.state;
@@ -175,9 +182,9 @@ impl ClusterSeat {
         let is_apart = |id: AgentId| mine.is_some_and(|mine| mine.law(id).is_asynchronous());
         self.bonds.clear();
         self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
-        self.bonds.extend(self.jointed.iter().copied().chain(grasped));
-        let linked = links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
-        self.bonds.extend(linked.chain(observer.neighbours().iter().filter_map(|n| holds(n, observer.me()))));
+        self.bonds.extend(held_by_joints(&self.jointed, &self.memory).chain(grasped));
+        self.bonds.extend(held_by_links(links, &self.memory));
+        self.bonds.extend(observer.neighbours().iter().filter_map(|n| holds(n, observer.me())));
         self.bonds.sort_unstable();
         self.bonds.dedup();
         self.sleepers.clear();
@@ -280,7 +287,8 @@ impl AgentRunner {
                 if let Some(doubling) = &mut doubling {
                     doubling.compare(&list);
                 }
-                let calm = list.iter().all(|one| one.member.is_calm());
+                // what held until now may have kept them still
+                let calm = stepper.torn().is_empty() && list.iter().all(|one| one.member.is_calm());
                 Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
             })
         });
@@ -296,6 +304,7 @@ impl AgentRunner {
             self.note_errors(doubling, dt);
         }
         self.note_pairs(&stepper, dt);
+        self.note_torn(stepper.torn(), dt);
         self.note_solves(&report, plan, dt);
         self.note_groups(time + dt);
         if let Some(seat) = &mut self.cluster {
@@ -449,7 +458,10 @@ impl AgentRunner {
                 let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
                 let pair = match total.partner {
                     Partner::Agent(with) => Some((with, PairKind::Cluster)),
-                    Partner::Link(number) => actor.links.get(number as usize).map(|l| (l.other, PairKind::Attachment)),
+                    Partner::Link(number) => {
+                        let link = actor.links.iter().find(|link| link.number == number);
+                        link.map(|link| (link.other, PairKind::Attachment))
+                    }
                     _ => None,
                 };
                 if let Some((with, kind)) = pair.filter(|(with, _)| !apart(*with)) {
@@ -473,7 +485,7 @@ impl AgentRunner {
         let mut places = 0..;
         self.each_member(|actor| {
             let (Some(place), Some(seat)) = (places.next(), &actor.cluster) else { return };
-            let tied = actor.links.iter().filter(|link| link.law == Law::Cluster).map(|link| link.other);
+            let tied = held_by_links(&actor.links, &seat.memory);
             for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
                 if let Ok(other) = ids.binary_search(&other) {
                     groups.join(place, other);

@@ -6,7 +6,7 @@
 use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::broad_phase::BroadPhase;
-use super::cluster::{ClusterSeat, Handover, Led, assign_leaders};
+use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
@@ -230,14 +230,14 @@ fn peers(
     (Peers { all, broad_phase, helpers }, writers)
 }
 
-/// For each agent those that joints hold it to.
-fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<AgentId>> {
+/// For each agent the joints that hold it to others.
+fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
     let mut jointed = vec![Vec::new(); spawns.len()];
     for (spawn, a) in spawns.iter().zip((0..).map(AgentId)) {
-        let others = spawn.scene.joints_of(a).filter_map(|(_, joint)| joint.b);
-        for b in others.filter(|b| (b.0 as usize) < spawns.len()) {
-            jointed[a.0 as usize].push(b);
-            jointed[b.0 as usize].push(a);
+        let joints = spawn.scene.joints_of(a).filter_map(|(number, joint)| Some(JointedTo { number, other: joint.b? }));
+        for joint in joints.filter(|joint| (joint.other.0 as usize) < spawns.len()) {
+            jointed[a.0 as usize].push(joint);
+            jointed[joint.other.0 as usize].push(JointedTo { other: a, ..joint });
         }
     }
     jointed
@@ -288,8 +288,8 @@ fn shared(
 /// What an agent is assembled from.
 struct Seated {
     spawn: AgentSpawn,
-    /// Agents that joints hold it to.
-    jointed: Vec<AgentId>,
+    /// The joints that hold it to others.
+    jointed: Vec<JointedTo>,
     writer: SlotWriter<Snapshot>,
 }
 

@@ -25,6 +25,7 @@ mod cpu_budget;
 mod drawn_form;
 mod error;
 mod error_control;
+mod event_record;
 mod experiment;
 pub mod fit;
 #[cfg(feature = "picture")]
@@ -45,6 +46,7 @@ pub use assemble::law;
 pub use coupling_record::Coupling;
 pub use error::SessionError;
 pub use error_control::ToleranceStatus;
+pub use event_record::Event;
 pub use experiment::{Design, Experiment, ExperimentResult, experiment};
 #[cfg(feature = "picture")]
 pub use fly_through::FlyThrough;

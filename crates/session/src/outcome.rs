@@ -4,6 +4,7 @@
 
 use super::coupling_record::Coupling;
 use super::error_control::ToleranceStatus;
+use super::event_record::Event;
 use super::trace::Trace;
 use glam::DVec3;
 use metachron_core::{ClusterState, Resolution};
@@ -114,6 +115,8 @@ pub struct Outcome {
     pub agents: Vec<AgentOutcome>,
     /// All couplings.
     pub couplings: Vec<Coupling>,
+    /// What happened once, in the order of time.
+    pub events: Vec<Event>,
     /// Each agent's part in the contact cluster that it was stepped in last.
     pub clusters: Vec<Option<ClusterState>>,
     /// States of the agents over time, if requested ([`crate::Session::keep_trace`]).

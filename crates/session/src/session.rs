@@ -15,6 +15,7 @@ use super::cpu_budget::CpuBudget;
 use super::error::SessionError;
 use super::error_control;
 use super::error_control::ErrorStatus;
+use super::event_record::events;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::trace::Trace;
 use super::visible_resolution::VisibleResolution;
@@ -387,6 +388,7 @@ impl Session {
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
         let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
+        let last: Vec<_> = handles.iter().map(AgentHandle::latest).collect();
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
         Outcome {
             scene,
@@ -410,7 +412,8 @@ impl Session {
                 .map(|(at, stats)| AgentOutcome { picture: drawn(at), tolerance: tolerance(at), stats })
                 .collect(),
             couplings: self.couplings.all().to_vec(),
-            clusters: handles.iter().map(|agent| agent.latest().cluster).collect(),
+            events: events(last.iter().map(|state| &**state)),
+            clusters: last.iter().map(|state| state.cluster).collect(),
             trace: self.trace,
             clamp,
             unpriced: self.unpriced,

@@ -36,6 +36,8 @@ pub enum CouplingKind {
         damping_n_s_m: f64,
         /// Rest length, metres, ≥ 0.
         rest_m: f64,
+        /// The force above which it tears, N, > 0: the mean over a common step of the two. Infinite where it never does.
+        tears_above_n: f64,
     },
 }
 

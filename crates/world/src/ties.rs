@@ -23,7 +23,8 @@ impl Ties {
             laws.entry(pair.a).or_default().push((pair.b, pair.law));
         }
         let mut attached: BTreeMap<AgentId, Vec<_>> = BTreeMap::new();
-        for (id, link) in scene.couplings.iter().filter_map(link) {
+        let links = (0..).zip(&scene.couplings).filter_map(|(number, coupling)| link(coupling, number));
+        for (id, link) in links {
             attached.entry(id).or_default().push(link);
         }
         Self { laws, attached }
@@ -70,8 +71,12 @@ fn contact_laws(scene: &Scene) -> Vec<PairLaw> {
     own.map(|((a, b), law)| PairLaw { a, b, law }).collect()
 }
 
-fn link(coupling: &Coupling) -> Option<(AgentId, Link)> {
-    let CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m } = coupling.kind else { return None };
-    let law = coupling.law;
-    Some((coupling.a, Link { other: coupling.b, here: at_a, there: at_b, stiffness_n_m, damping_n_s_m, rest_m, law }))
+/// The link that a coupling makes of its first agent, by the coupling's number in the scene.
+fn link(coupling: &Coupling, number: u32) -> Option<(AgentId, Link)> {
+    let Coupling { a, b: other, kind, law } = *coupling;
+    let CouplingKind::Attach { at_a: here, at_b: there, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n } = kind
+    else {
+        return None;
+    };
+    Some((a, Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n }))
 }

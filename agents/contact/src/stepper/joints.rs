@@ -81,6 +81,13 @@ struct Off {
     travel: f64,
 }
 
+/// What a joint holds together, its points or its turns, and the name of what does.
+#[derive(Clone, Copy)]
+struct Together {
+    sides: [Side; 2],
+    name: Name,
+}
+
 /// A joint and the participants that it holds.
 struct Jointed<'a> {
     number: u32,
@@ -98,6 +105,9 @@ impl Joints {
         self.parts.clear();
         for (a, one) in all.iter().enumerate() {
             for (number, joint) in scene.joints_of(one.id) {
+                if one.memory.has_torn(Partner::Joint(number)) {
+                    continue;
+                }
                 let b = joint.b.map(|id| place_of(all, id));
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
@@ -122,13 +132,16 @@ impl Joints {
             return;
         };
         let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
-        let name = Name { member: first, partner: Partner::Joint(number), hold: None };
+        let (partner, tears_above_n) = (Partner::Joint(number), joint.tears_above_n);
+        let name = Name { member: first, partner, hold: None, tears_above_n };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
             ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
         }
-        let points = [ends[0].side(), ends[1].side()];
+        let points = Together { sides: [ends[0].side(), ends[1].side()], name };
+        // what holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
+        let turns = Together { sides: turns, name: Name { tears_above_n: f64::INFINITY, ..name } };
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
@@ -136,9 +149,9 @@ impl Joints {
         let held = self.held.len() - 1;
         let axis = joint.axis(&a, anchors[1] - anchors[0]);
         let mut key = 0;
-        let mut push = |way: Way, sides: [Side; 2], hold: Hold| {
+        let mut push = |way: Way, of: Together, hold: Hold| {
             let row = ties.rows.len();
-            ties.push(step, JointRow::new(sides, hold), name.row(key, second));
+            ties.push(step, JointRow::new(of.sides, hold), of.name.row(key, second));
             if ties.rows.len() > row {
                 self.parts.push(Part { held, row, way });
             }

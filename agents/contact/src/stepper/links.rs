@@ -18,17 +18,17 @@ impl Ties {
     pub fn gather_links(&mut self, step: &FineStep<'_, '_>) {
         let all = step.all;
         for (member, one) in all.iter().enumerate() {
-            for (number, link) in (0..).zip(one.context.links) {
+            for link in one.context.links {
                 let other = place_of(all, link.other);
                 let is_mine = other.is_none_or(|other| member < other);
-                if is_mine && computes_link(all, one, link) {
-                    self.link(step, [Some(member), other], link, number);
+                if is_mine && computes_link(all, one, link) && !one.memory.has_torn(Partner::Link(link.number)) {
+                    self.link(step, [Some(member), other], link);
                 }
             }
         }
     }
 
-    fn link(&mut self, step: &FineStep<'_, '_>, ends: [Option<usize>; 2], link: &Link, number: u32) {
+    fn link(&mut self, step: &FineStep<'_, '_>, ends: [Option<usize>; 2], link: &Link) {
         let [Some(member), other] = ends else { return };
         let all = step.all;
         let there = match other {
@@ -37,8 +37,11 @@ impl Ties {
         };
         let (Some(here), Some(there)) = (all[member].member.anchor(link.here), there) else { return };
         let Link { stiffness_n_m, damping_n_s_m, rest_m, .. } = *link;
-        let hold = Holders { side_0: all[member].id, side_1: Some(link.other) };
-        let name = Name { member, partner: Partner::Link(number), hold: Some(hold) };
+        let hold = Some(Holders { side_0: all[member].id, side_1: Some(link.other) });
+        // it tears where both ends are in this problem: what one of them does not see would go on holding it
+        let both = other.is_some_and(|other| !all[other].member.is_remote());
+        let tears_above_n = if both { link.tears_above_n } else { f64::INFINITY };
+        let name = Name { member, partner: Partner::Link(link.number), hold, tears_above_n };
         let ends = [End { member: Some(member), point: here }, End { member: other, point: there }];
         self.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
     }

@@ -151,6 +151,17 @@ pub trait ClusterMember: Send {
     /// [`StepError::Diverged`] where the state would not be finite; it is then what it was before.
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError>;
 
+    /// Its own attachments to the world that may tear, with what they gave over the step that ended last. Springs to other members are
+    /// rows of the problem.
+    fn attachments(&self) -> &[OwnAttachment] {
+        &[]
+    }
+
+    /// Lets go of its own attachment `number`, for good; nothing where it has done so before.
+    fn let_go(&mut self, number: u32) {
+        let _ = number;
+    }
+
     /// Whether it has been still long enough to rest, as far as it can tell by itself.
     fn is_calm(&self) -> bool;
 
@@ -198,6 +209,17 @@ pub struct Pose {
     pub turns: Side,
     /// Its spin beyond that, rad/s: of a body that is led.
     pub led_rad_s: DVec3,
+}
+
+/// What an attachment that is a body's own gave over a step, and can bear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnAttachment {
+    /// Its number among those of the body.
+    pub number: u32,
+    /// The force on the body, world axes, N: the sum over all of the attachment, and the mean over the step.
+    pub force_n: DVec3,
+    /// The force above which it tears, N, > 0.
+    pub tears_above_n: f64,
 }
 
 /// A spring between a point of a body and a place that is led, which gives no more than it can.

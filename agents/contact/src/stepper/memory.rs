@@ -21,7 +21,7 @@ pub enum Partner {
     Agent(AgentId),
     /// The far end of a spring of the user or of a grasp, by its number among those on its body.
     Tie(u32),
-    /// The far end of a link, by its number among those of its body.
+    /// The far end of a link, by its number in the scene.
     Link(u32),
     /// The far end of a joint, by its number in the scene.
     Joint(u32),
@@ -29,6 +29,8 @@ pub enum Partner {
     Drive,
     /// The end of a transmission line, by its number among those of the macro step.
     Line(u32),
+    /// The far end of an attachment that is the body's own, by its number among those of the body.
+    Attachment(u32),
 }
 
 /// What a contact or a joint hands to the next step.
@@ -71,15 +73,31 @@ impl Clone for PairMemory {
 #[derive(Debug, Default, PartialEq)]
 pub struct ContactMemory {
     pairs: Vec<PairMemory>,
+    /// Links, joints and own attachments of the body that have torn, sorted. They stay torn.
+    torn: Vec<Partner>,
+    /// What attachments that may tear have given in macro steps that were cut short.
+    unfinished: Vec<UnfinishedLoad>,
+}
+
+/// What an attachment has given since its force was last looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct UnfinishedLoad {
+    pub partner: Partner,
+    pub impulse_n_s: DVec3,
+    /// In how long a time, seconds.
+    pub span_s: f64,
 }
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        Self { pairs: self.pairs.clone() }
+        Self { pairs: self.pairs.clone(), torn: self.torn.clone(), unfinished: self.unfinished.clone() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        self.pairs.clone_from(&from.pairs);
+        let Self { pairs, torn, unfinished } = self;
+        pairs.clone_from(&from.pairs);
+        torn.clone_from(&from.torn);
+        unfinished.clone_from(&from.unfinished);
     }
 }
 
@@ -133,7 +151,40 @@ impl ContactMemory {
         })
     }
 
-    /// Forgets all pairs, where the body was divided anew.
+    /// Notes that an attachment has torn: nothing of it is remembered but that.
+    pub(super) fn tear(&mut self, partner: Partner) {
+        self.pairs.retain(|pair| pair.partner != partner);
+        if let Err(at) = self.torn.binary_search(&partner) {
+            self.torn.insert(at, partner);
+        }
+    }
+
+    /// Adds what an attachment gave in a macro step. Returns all that it has given since this last returned something, once that is over a
+    /// time of `whole_s` seconds.
+    pub(super) fn bear(&mut self, load: UnfinishedLoad, whole_s: f64) -> Option<UnfinishedLoad> {
+        let at = self.unfinished.iter().position(|before| before.partner == load.partner);
+        let before = at.map(|at| self.unfinished.swap_remove(at));
+        let (impulse_n_s, span_s) = before.map_or((DVec3::ZERO, 0.0), |before| (before.impulse_n_s, before.span_s));
+        let load = UnfinishedLoad { impulse_n_s: load.impulse_n_s + impulse_n_s, span_s: load.span_s + span_s, ..load };
+        if load.span_s >= whole_s {
+            return Some(load);
+        }
+        self.unfinished.push(load);
+        None
+    }
+
+    /// Whether an attachment of the body has torn.
+    #[must_use]
+    pub fn has_torn(&self, partner: Partner) -> bool {
+        self.torn.binary_search(&partner).is_ok()
+    }
+
+    /// The attachments of the body that have torn.
+    pub(super) fn torn(&self) -> &[Partner] {
+        &self.torn
+    }
+
+    /// Forgets all pairs, where the body was divided anew; what has torn stays so.
     pub fn forget(&mut self) {
         self.pairs.clear();
     }
@@ -157,6 +208,20 @@ mod tests {
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
+    }
+
+    #[test]
+    fn what_has_torn_is_remembered_as_nothing_else_and_stays_torn() {
+        let mut memory = ContactMemory::default();
+        let (joint, other) = (Partner::Joint(4), Partner::Joint(5));
+        memory.pair(joint).next.push(Remembered { force_n: DVec3::Z, ..Remembered::default() });
+        memory.turn(SimTime::ZERO);
+        memory.tear(joint);
+        memory.tear(joint);
+        memory.forget();
+        let copy = memory.clone();
+        assert!(copy.has_torn(joint) && !copy.has_torn(other) && copy.pairs.is_empty());
+        assert_eq!((copy.recall(joint, TouchKey::default()).force_n, copy.torn.len()), (DVec3::ZERO, 1));
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
+//! tear      attachments that gave more than they can bear are gone from the next macro step on
 
 mod arms;
 mod blows;
@@ -31,6 +32,7 @@ mod scene;
 mod search;
 mod solve;
 mod springs;
+mod tearing;
 mod ties;
 mod weighing;
 
@@ -44,7 +46,7 @@ use heap::Heap;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, Pose, Role};
+pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
@@ -55,6 +57,8 @@ use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
 use search::Search;
+use tearing::Tearing;
+pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
@@ -159,6 +163,7 @@ pub struct ClusterStepper {
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
+    tearing: Tearing,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     rebounds: Rebounds,
@@ -196,6 +201,7 @@ impl ClusterStepper {
             progress: Vec::new(),
             members: Vec::new(),
             totals: Vec::new(),
+            tearing: Tearing::default(),
             kept: Vec::new(),
             rebounds: Rebounds::default(),
             heap: Heap::default(),
@@ -243,6 +249,7 @@ impl ClusterStepper {
         let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
         self.joints_missed_m = f64::INFINITY;
+        all.iter_mut().for_each(Participant::let_go);
         self.foresee(all, self.macro_s, threads)?;
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
@@ -256,6 +263,7 @@ impl ClusterStepper {
                 }
             }
         }
+        self.tearing.end(all, self.macro_s);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }
@@ -297,6 +305,7 @@ impl ClusterStepper {
             one.grips.clear();
         }
         self.totals.clear();
+        self.tearing.begin();
         self.outside.begin();
         report.fine_steps = parts;
         report.depth_m = 0.0;
@@ -421,6 +430,11 @@ impl ClusterStepper {
         &self.totals[start..self.totals.partition_point(|total| total.member <= member)]
     }
 
+    /// What tore in the last macro step, by participants: no later step knows it.
+    pub fn torn(&self) -> &[Torn] {
+        self.tearing.torn()
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
@@ -476,7 +490,7 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, ties, outside, .. } = self;
+        let Self { solver, search, ties, outside, tearing, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -498,6 +512,7 @@ impl ClusterStepper {
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
             outside.note_line(owner, *impulse);
+            tearing.note(owner, *impulse);
             if let Partner::Link(_) = owner.partner {
                 total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
             }
@@ -530,7 +545,14 @@ impl ClusterStepper {
                 state.part = 0;
             }
         });
-        self.first_failure()
+        self.first_failure()?;
+        let Self { progress, tearing, .. } = self;
+        for (place, (one, state)) in all.iter().zip(progress).enumerate() {
+            if state.part == 0 {
+                tearing.note_own(place, one.member, h_s * f64::from(state.share));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -137,8 +137,8 @@ impl Ties {
                 compliance_per_kg: Some((step.h_s * line.resistance_n_s_m).recip()),
                 ..JointRow::new(sides, line.hold)
             };
-            let owner =
-                RowOwner { member: line.member, other: None, partner: Partner::Line(number), key: 0, hold: None };
+            let (member, partner, tears_above_n) = (line.member, Partner::Line(number), f64::INFINITY);
+            let owner = RowOwner { member, other: None, partner, key: 0, hold: None, tears_above_n };
             self.push(step, row, owner);
         }
     }

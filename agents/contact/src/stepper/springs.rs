@@ -40,12 +40,14 @@ pub(super) struct Name {
     pub member: usize,
     pub partner: Partner,
     pub hold: Option<Holders>,
+    /// The force above which it tears, N; infinite where it never does.
+    pub tears_above_n: f64,
 }
 
 impl Name {
     pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
-        let Self { member, partner, hold } = self;
-        RowOwner { member, other, partner, key, hold }
+        let Self { member, partner, hold, tears_above_n } = self;
+        RowOwner { member, other, partner, key, hold, tears_above_n }
     }
 }
 
@@ -81,7 +83,7 @@ impl Ties {
             MaterialPoint::led(position, spring.target_velocity)
         });
         let hold = Holders { side_0: all[member].id, side_1: spring.by };
-        let name = Name { member, partner: Partner::Tie(number), hold: Some(hold) };
+        let name = Name { member, partner: Partner::Tie(number), hold: Some(hold), tears_above_n: f64::INFINITY };
         let AnchorSpring { stiffness_n_m, damping_n_s_m, .. } = *spring;
         let pull = Pull { stiffness_n_m, damping_n_s_m, rest_m: 0.0 };
         let ends = [End { member: Some(member), point }, End { member: by.filter(|_| tip.is_some()), point: far }];
@@ -134,7 +136,7 @@ impl Ties {
         let sides = [drive.point.side.of_member(member), Side::FIXED];
         let row = JointRow::new(sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
         let target_m_s = row.target_m_s + drive.target_m_s - drive.point.led_m_s;
-        let name = Name { member, partner: Partner::Drive, hold: None };
+        let name = Name { member, partner: Partner::Drive, hold: None, tears_above_n: f64::INFINITY };
         self.push(step, JointRow { target_m_s, ..row }, name.row(ALONG, None));
     }
 

@@ -33,6 +33,8 @@ pub(super) struct RowOwner {
     pub key: u32,
     /// Who pulls at whom, where it is a force by which somebody holds a body.
     pub hold: Option<Holders>,
+    /// The force above which its tie tears, N: infinite of one that never does, and of rows that hold turns.
+    pub tears_above_n: f64,
 }
 
 impl RowOwner {

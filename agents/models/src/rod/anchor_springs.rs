@@ -13,6 +13,8 @@ use metachron_core::{AgentId, Anchor};
 /// The spring of an attachment at one node.
 #[derive(Debug, Clone, Copy)]
 pub struct NodeSpring {
+    /// Number of the attachment.
+    pub attachment: u32,
     /// Index of the node.
     pub node: usize,
     /// Rest position of the node, metres.
@@ -54,6 +56,12 @@ impl NodeSpring {
         Linear { force: d * (-self.stiffness * share), stiffness: across + along, damping: self.damping }
     }
 
+    /// Force on the node at `x` with the velocity `v`, N.
+    pub fn force(&self, x: DVec3, v: DVec3) -> DVec3 {
+        let Linear { force, damping, .. } = self.linear(x);
+        force - v * damping
+    }
+
     /// Energy in the spring, J.
     pub fn energy_j(&self, x: DVec3) -> f64 {
         let beyond = ((x - self.anchor).length() - self.slack).max(0.0);
@@ -61,17 +69,22 @@ impl NodeSpring {
     }
 }
 
-/// Lists the springs of `attachments` at the nodes of `division`: each node takes the share of its dual length (eq. 23).
-pub fn springs(attachments: &[Attachment], division: &Discretization, into: &mut Vec<NodeSpring>) {
+/// Lists the springs of `attachments`, by their numbers, at the nodes of `division`: each node takes the share of its dual length (eq. 23).
+pub fn springs<'a>(
+    attachments: impl Iterator<Item = (u32, &'a Attachment)>,
+    division: &Discretization,
+    into: &mut Vec<NodeSpring>,
+) {
     into.clear();
     let (total, count) = (division.total_m(), division.segments());
-    for attachment in attachments {
+    for (number, attachment) in attachments {
         for node in 0..=count {
             let from = if node == 0 { 0.0 } else { division.middle_m(node - 1) };
             let to = if node == count { total } else { division.middle_m(node) };
             let overlap = to.min(attachment.to * total) - from.max(attachment.from * total);
             if overlap > 0.0 {
                 into.push(NodeSpring {
+                    attachment: number,
                     node,
                     anchor: division.place[node],
                     stiffness: attachment.stiffness_n_m2 * overlap,
@@ -147,18 +160,32 @@ mod tests {
 
     #[test]
     fn the_springs_of_a_stretch_sum_to_its_stiffness() {
-        let stretch = Attachment { from: 0.13, to: 0.71, stiffness_n_m2: 50.0, slack_m: 0.0, damping_n_s_m2: 0.0 };
+        let stretch = Attachment {
+            from: 0.13,
+            to: 0.71,
+            stiffness_n_m2: 50.0,
+            slack_m: 0.0,
+            damping_n_s_m2: 0.0,
+            tears_above_n: f64::INFINITY,
+        };
         let mut list = vec![];
-        springs(&[stretch], &line(), &mut list);
+        springs(std::iter::once((0, &stretch)), &line(), &mut list);
         let sum: f64 = list.iter().map(|s| s.stiffness).sum();
         assert!((sum - 50.0 * 0.58).abs() < 1e-13); // seven rounding errors of 29
     }
 
     #[test]
     fn a_slack_spring_does_nothing_and_a_taut_one_pulls_beyond_its_slack() {
-        let stretch = Attachment { from: 0.0, to: 1.0, stiffness_n_m2: 70.0, slack_m: 0.1, damping_n_s_m2: 0.0 };
+        let stretch = Attachment {
+            from: 0.0,
+            to: 1.0,
+            stiffness_n_m2: 70.0,
+            slack_m: 0.1,
+            damping_n_s_m2: 0.0,
+            tears_above_n: f64::INFINITY,
+        };
         let mut list = vec![];
-        springs(&[stretch], &line(), &mut list);
+        springs(std::iter::once((0, &stretch)), &line(), &mut list);
         let spring = list[3];
         assert_eq!(spring.linear(spring.anchor + DVec3::Y * 0.09).force, DVec3::ZERO);
         let at = spring.anchor + DVec3::new(0.0, 0.3, 0.4);

@@ -140,6 +140,10 @@ fn check_attachments(spec: &TubeSpec) -> Result<(), TubeError> {
         not_negative("attachment.stiffness_n_m2", a.stiffness_n_m2)?;
         not_negative("attachment.slack_m", a.slack_m)?;
         not_negative("attachment.damping_n_s_m2", a.damping_n_s_m2)?;
+        // infinite is never
+        if a.tears_above_n != f64::INFINITY {
+            positive("attachment.tears_above_n", a.tears_above_n)?;
+        }
     }
     Ok(())
 }

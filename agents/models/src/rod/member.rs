@@ -14,7 +14,7 @@ use super::system::SubstepProblem;
 use super::tube::Tube;
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
 use metachron_geometry::narrow_phase::RestShape;
@@ -31,6 +31,8 @@ pub(super) struct Unknowns {
     /// By how much its free motion in the step begun raises its energy, J.
     rise_j: f64,
     quiet_before: bool,
+    /// What its attachments that may tear gave in the last step.
+    attached: Vec<OwnAttachment>,
     kept: Kept,
 }
 
@@ -213,12 +215,25 @@ impl ClusterMember for Tube {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
         self.unknowns.places.clone_from(&self.now.x);
+        self.note_attachments();
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
         self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         self.unknowns.quiet_before = self.observe_rest(h_s);
         self.at_rest = false;
         self.steps += 1;
         Ok(())
+    }
+
+    fn attachments(&self) -> &[OwnAttachment] {
+        &self.unknowns.attached
+    }
+
+    fn let_go(&mut self, number: u32) {
+        if !self.let_go.contains(&number) {
+            self.let_go.push(number);
+            self.lay_out_springs();
+            self.rest.wake();
+        }
     }
 
     fn is_calm(&self) -> bool {
@@ -240,6 +255,24 @@ impl Tube {
     /// Whether its own integrator makes a step of `h_s` seconds that nothing acts on; in contact all of them are implicit Euler.
     fn integrates_free_motion(&self, h_s: f64) -> bool {
         self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
+    }
+
+    /// Notes what the attachments that may tear give at the end of a step: implicit Euler has given that all along it.
+    fn note_attachments(&mut self) {
+        let Self { spec, springs, now, unknowns, .. } = self;
+        let attached = &mut unknowns.attached;
+        attached.clear();
+        for spring in springs {
+            let (number, force_n) = (spring.attachment, spring.force(now.x[spring.node], now.u[2 * spring.node]));
+            let tears_above_n = spec.attachments[number as usize].tears_above_n;
+            if tears_above_n == f64::INFINITY {
+                continue;
+            }
+            match attached.last_mut().filter(|last| last.number == number) {
+                Some(last) => last.force_n += force_n,
+                None => attached.push(OwnAttachment { number, force_n, tears_above_n }),
+            }
+        }
     }
 
     /// Makes the step begun by its own integrator; whether its state is finite then.

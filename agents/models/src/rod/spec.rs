@@ -88,6 +88,9 @@ pub struct Attachment {
     pub slack_m: f64,
     /// Damping per length, N·s/m², ≥ 0.
     pub damping_n_s_m2: f64,
+    /// The force of the whole interval above which all of it tears off, N, > 0: the mean over a macro step of the tube's cluster. Infinite
+    /// where it never does.
+    pub tears_above_n: f64,
 }
 
 /// A wave of contraction: r(s, t) = r₀ (1 − a·(1 + cos(2π (s − c t)/λ))/2).

@@ -36,7 +36,9 @@ pub struct Tube {
     pub(super) now: RodState,
     pub(super) stepper: Stepper,
     remesher: Remesher,
-    springs: Vec<NodeSpring>,
+    /// Numbers of attachments that no longer hold it.
+    pub(super) let_go: Vec<u32>,
+    pub(super) springs: Vec<NodeSpring>,
     pub(super) ties: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
     pub(super) rest: RestDetector,
@@ -89,6 +91,7 @@ impl Tube {
             now,
             stepper: Stepper::default(),
             remesher: Remesher::default(),
+            let_go: vec![],
             springs: vec![],
             ties: vec![],
             grips: vec![],
@@ -101,8 +104,15 @@ impl Tube {
             steps: 0,
             unknowns: Unknowns::default(),
         };
-        springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
+        tube.lay_out_springs();
         Ok(tube)
+    }
+
+    /// Lays out the springs of the attachments that hold it.
+    pub(super) fn lay_out_springs(&mut self) {
+        let Self { spec, let_go, division, springs: list, .. } = self;
+        let holding = (0..).zip(&spec.attachments).filter(|(number, _)| !let_go.contains(number));
+        springs(holding, division, list);
     }
 
     /// Passes all that the stepper works on to `act`, for a step of `dt` seconds.
@@ -321,7 +331,7 @@ impl Agent for Tube {
         self.remesher.transfer(&self.matter, old, &mut next, &self.division);
         next.strain(&self.matter, &self.division);
         self.now = next;
-        springs(&self.spec.attachments, &self.division, &mut self.springs);
+        self.lay_out_springs();
         self.stepper.forget();
         self.rest.wake();
         self.at_rest = false;

@@ -73,6 +73,9 @@ impl Clocks {
 
     /// Links two agents, as both see it.
     pub fn link(&mut self, ends: [usize; 2], link: Link) {
+        // both ends have each
+        let number = self.all.iter().map(|one| one.links.len()).sum::<usize>() as u32 / 2;
+        let link = Link { number, ..link };
         let back = Link { other: AgentId(ends[0] as u32), here: link.there, there: link.here, ..link };
         self.all[ends[0]].links.push(Link { other: AgentId(ends[1] as u32), ..link });
         self.all[ends[1]].links.push(back);

@@ -30,7 +30,18 @@ pub fn hand(target: DVec3, stiffness_n_m: f64) -> AnchorSpring {
 
 fn link(stiffness_n_m: f64, rest_m: f64, law: Law) -> Link {
     let (anchor, damping_n_s_m) = (Anchor::Local(DVec3::ZERO), 2.0);
-    Link { other: AgentId(1), here: anchor, there: anchor, stiffness_n_m, damping_n_s_m, rest_m, law }
+    let (number, tears_above_n) = (0, f64::INFINITY);
+    Link {
+        other: AgentId(1),
+        here: anchor,
+        there: anchor,
+        stiffness_n_m,
+        damping_n_s_m,
+        rest_m,
+        law,
+        number,
+        tears_above_n,
+    }
 }
 
 #[test]

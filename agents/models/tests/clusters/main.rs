@@ -20,5 +20,6 @@ mod slope;
 mod stacks;
 mod steps;
 mod table;
+mod tearing;
 mod tools;
 mod tubes;

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, StepDoubling,
+    Torn,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
@@ -70,7 +71,8 @@ pub struct Findings {
 /// A spring whose ends are still to be named.
 pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
     let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
-    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Cluster }
+    let (number, tears_above_n) = (0, f64::INFINITY);
+    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Cluster, number, tears_above_n }
 }
 
 /// A body with its rate.
@@ -114,9 +116,11 @@ impl Table {
 
     /// Links two bodies by a spring, as both of them see it.
     pub fn link(&mut self, ends: [(usize, Anchor); 2], spring: Link) {
+        // both ends have each
+        let number = self.bodies.iter().map(|body| body.links.len()).sum::<usize>() as u32 / 2;
         for (at, (body, here)) in ends.into_iter().enumerate() {
             let (other, there) = ends[1 - at];
-            let link = Link { other: AgentId(other as u32), here, there, ..spring };
+            let link = Link { other: AgentId(other as u32), here, there, number, ..spring };
             self.bodies[body].links.push(link);
         }
     }
@@ -124,6 +128,11 @@ impl Table {
     /// The forces by which a body was held at the end of the last step.
     pub fn grips(&self, body: usize) -> &[Grip] {
         &self.bodies[body].grips
+    }
+
+    /// What tore in the last macro step.
+    pub fn torn(&self) -> &[Torn] {
+        self.stepper.torn()
     }
 
     /// What all bodies have published, as each other sees it.

@@ -112,6 +112,8 @@ fn laws_and_attachments_are_known_on_both_sides() {
         damping_n_s_m: 0.0,
         rest_m: 0.0,
         law: Law::Cluster,
+        number: 0,
+        tears_above_n: f64::INFINITY,
     };
     spawns[1].attached = vec![link];
     let mut run = assemble(spawns, Helpers::none()).unwrap();

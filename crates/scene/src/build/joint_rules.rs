@@ -21,6 +21,7 @@ pub(super) struct PlacedJoint {
     pub(super) anchors: [DVec3; 2],
     pub(super) free_motion: FreeMotion,
     pub(super) collide: bool,
+    pub(super) tears_above_n: f64,
 }
 
 impl PlacedJoint {

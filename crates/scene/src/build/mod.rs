@@ -58,5 +58,8 @@ const STIFFNESS: Allowed = allowed(1e-6..=1e9, "N/m");
 /// Damping of the same springs.
 const DAMPING: Allowed = allowed(0.0..=1e7, "N·s/m");
 
+/// Forces above which couplings and joints tear.
+const TEARING: Allowed = allowed(1e-6..=1e9, "N");
+
 /// Times of keyframes and loads.
 const TIME: Allowed = allowed(0.0..=1e6, "s");

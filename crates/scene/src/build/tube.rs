@@ -1,7 +1,7 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
 use super::object::ModelContext;
-use super::{FRICTION, POSITION_MAX_M};
+use super::{FRICTION, POSITION_MAX_M, TEARING};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
 use glam::DVec3;
@@ -255,6 +255,7 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
         damping_n_s_m2: c
             .optional(place, "damping_n_s_m2", file.damping_n_s_m2, &allowed(0.0..=1e6, "N·s/m²"))
             .unwrap_or(0.0),
+        tears_above_n: c.optional(place, "tears_above_n", file.tears_above_n, &TEARING).unwrap_or(f64::INFINITY),
     }
 }
 

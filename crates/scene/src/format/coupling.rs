@@ -27,6 +27,9 @@ pub struct CouplingFile {
     pub damping_n_s_m: Option<f64>,
     /// Rest length of an `attach`, metres, 0 … 1e4. Default 0.
     pub rest_m: Option<f64>,
+    /// Force above which an `attach` without a `law` tears, N, 1e-6 … 1e9: the mean over a common step of the two. It is gone then for
+    /// good, and the report has it under `events`. Default: never.
+    pub tears_above_n: Option<f64>,
 }
 
 /// Parts of two objects that are coupled.

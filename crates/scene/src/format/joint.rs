@@ -36,8 +36,12 @@ pub struct JointFile {
     pub rest_m: Option<f64>,
     /// Greatest length of a `rope`, metres, 1e-6 … 1e4. Default: its length at the start.
     pub length_m: Option<f64>,
-    /// Whether the two objects can collide with each other. Default true for a spring or rope, false for the others.
+    /// Whether the two objects can collide with each other, also once the joint has torn. Default true for a spring or rope, false for
+    /// the others.
     pub collide: Option<bool>,
+    /// Force above which it tears, N, 1e-6 … 1e9: the mean over a common step of the two; what it gives against turns does not count. It
+    /// is gone then for good, and the report has it under `events`. Default: never.
+    pub tears_above_n: Option<f64>,
 }
 
 /// Motion that a joint leaves free.

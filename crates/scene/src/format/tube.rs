@@ -112,6 +112,9 @@ pub struct AttachFile {
     pub slack_m: Option<f64>,
     /// Damping per length, N·s/m², 0 … 1e6. Default 0.
     pub damping_n_s_m2: Option<f64>,
+    /// Force of the whole part above which all of it tears off, N, 1e-6 … 1e9: the mean over a common step of what the tube touches. It is
+    /// gone then for good, and the report has it under `events`. Default: never.
+    pub tears_above_n: Option<f64>,
 }
 
 /// A travelling wave of contraction: r = r₀ (1 − a (1 + cos(2π (s − c t)/λ))/2).

@@ -50,6 +50,9 @@ pub struct Report {
     pub agents: Vec<AgentReport>,
     /// The couplings between agents.
     pub couplings: Vec<CouplingReport>,
+    /// What happened once, in the order of time; left out where nothing did.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub events: Vec<EventReport>,
     /// The contact clusters of the last states.
     pub clusters: Vec<ClusterRow>,
     /// Agents that started inside each other or fixed solids.
@@ -189,6 +192,23 @@ pub struct CouplingReport {
     pub parasitic_kg: f64,
 }
 
+/// Something that happened once in a run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct EventReport {
+    /// Simulated time, seconds: the end of the step in which it happened.
+    pub at_s: f64,
+    /// What happened: `tore`, an attachment by its `tears_above_n`.
+    pub kind: &'static str,
+    /// The attachment, as its place in the scene: `joint.0`, `coupling.2`, `attach.1` of the tube `a`.
+    pub attachment: String,
+    /// The first object's name.
+    pub a: String,
+    /// The second object's name, or `world`.
+    pub b: String,
+    /// Force that it gave in that step, newtons.
+    pub force_n: f64,
+}
+
 /// Two agents that started inside each other.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct OverlapReport {
@@ -312,6 +332,7 @@ impl Report {
             summary,
             agents: vec![AgentReport::default()],
             couplings: vec![CouplingReport::default()],
+            events: vec![EventReport::default()],
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],
             moved: vec![MovedReport::default()],
@@ -383,6 +404,12 @@ mod tests {
         "/couplings/0/momentum_error",
         "/couplings/0/inverse_mass_per_kg",
         "/couplings/0/penetration_m",
+        "/events/0/at_s",
+        "/events/0/kind",
+        "/events/0/attachment",
+        "/events/0/a",
+        "/events/0/b",
+        "/events/0/force_n",
         "/overlaps/0/depth_m",
         "/moved/0/by_m",
         "/oracle/dt_ms",

@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, ReferenceReport, Report, Spread};
+use super::{AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, Spread};
 use std::fmt::Write;
 
 impl Report {
@@ -26,6 +26,7 @@ impl Report {
         self.agents.iter().for_each(|agent| agent_row(&mut out, agent));
         self.agents.iter().for_each(|agent| out_of_reach(&mut out, agent));
         coupling_table(&mut out, &self.couplings);
+        event_lines(&mut out, &self.events);
         if let Some(oracle) = &self.oracle {
             reference_table(&mut out, oracle);
         }
@@ -105,8 +106,8 @@ fn out_of_reach(out: &mut String, agent: &AgentReport) {
     );
 }
 
-/// More couplings than this are counted, not shown: the report has them all.
-const COUPLINGS_SHOWN: usize = 20;
+/// More couplings or events than this are counted, not shown: the report has them all.
+const ROWS_SHOWN: usize = 20;
 
 fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
     if couplings.is_empty() {
@@ -117,7 +118,7 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
         "\n{:<41} {:<8} {:>8} {:>10} {:>10} {:>11} {:>11}",
         "coupling", "kind", "contacts", "force N", "greatest", "overlap mm", "momentum %"
     );
-    for c in couplings.iter().take(COUPLINGS_SHOWN) {
+    for c in couplings.iter().take(ROWS_SHOWN) {
         let pair = format!("{} · {}", c.a, c.b);
         let error = c.momentum_error.map_or_else(|| "-".to_owned(), |error| format!("{:.4}", error * 100.0));
         let _ = writeln!(
@@ -133,6 +134,13 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
     omitted_rows(out, couplings.len());
 }
 
+fn event_lines(out: &mut String, events: &[EventReport]) {
+    for EventReport { at_s, kind, attachment, a, b, force_n } in events.iter().take(ROWS_SHOWN) {
+        let _ = writeln!(out, "note  `{attachment}` of `{a}` and `{b}` {kind} at {at_s:.4} s: {force_n:.3} N");
+    }
+    omitted_rows(out, events.len());
+}
+
 fn reference_table(out: &mut String, oracle: &ReferenceReport) {
     let ReferenceReport { dt_ms, sim_s, states, sensitivity_m, .. } = oracle;
     let _ = writeln!(out, "\nagainst one common clock of {dt_ms:.4} ms over {sim_s:.2} s, {states} points compared");
@@ -143,7 +151,7 @@ fn reference_table(out: &mut String, oracle: &ReferenceReport) {
         "coupling", "rms mm", "greatest mm", "momentum N·s", "impulse N·s", "common N·s"
     );
     let shown = |impulse: f64| format!("{impulse:.5}");
-    for c in oracle.couplings.iter().take(COUPLINGS_SHOWN) {
+    for c in oracle.couplings.iter().take(ROWS_SHOWN) {
         let pair = format!("{} · {}", c.a, c.b);
         let _ = writeln!(
             out,
@@ -159,7 +167,7 @@ fn reference_table(out: &mut String, oracle: &ReferenceReport) {
 }
 
 fn omitted_rows(out: &mut String, count: usize) {
-    if count > COUPLINGS_SHOWN {
-        let _ = writeln!(out, "and {} more in the report", count - COUPLINGS_SHOWN);
+    if count > ROWS_SHOWN {
+        let _ = writeln!(out, "and {} more in the report", count - ROWS_SHOWN);
     }
 }

@@ -206,7 +206,14 @@ fn attachments_hold_a_tube_at_its_weight_over_their_stiffness_beyond_their_slack
         let mut spec = reference_spec(1e6, 16);
         spec.gravity = DVec3::NEG_Z * 9.81;
         spec.damping_per_s = 8.0;
-        spec.attachments = vec![Attachment { from: 0.0, to: 1.0, stiffness_n_m2: 90.0, slack_m, damping_n_s_m2: 1.0 }];
+        spec.attachments = vec![Attachment {
+            from: 0.0,
+            to: 1.0,
+            stiffness_n_m2: 90.0,
+            slack_m,
+            damping_n_s_m2: 1.0,
+            tears_above_n: f64::INFINITY,
+        }];
         let weight = spec.section.mass_per_length_kg_m * 9.81;
         let mut tube = Tube::new(spec).unwrap();
         run(&mut tube, 10.0, 20.0);

@@ -98,9 +98,11 @@ fn ring(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     ];
     let (ball, start, end) = (Anchor::Local(DVec3::ZERO), Anchor::Arc(0.0), Anchor::Arc(RING_TUBE_M));
     let ties = [(0, ball, 1, start), (1, end, 2, ball), (2, ball, 3, start), (3, end, 4, ball), (4, ball, 0, ball)];
-    for (a, here, b, there) in ties {
-        let (other, stiffness_n_m, rest_m) = (ids[b], SPRING_N_M, SPRING_REST_M);
-        play.link(ids[a], Link { other, here, there, stiffness_n_m, damping_n_s_m: 0.0, rest_m, law: Law::Ledger });
+    for (number, (a, here, b, there)) in (0..).zip(ties) {
+        let (other, stiffness_n_m, damping_n_s_m, rest_m) = (ids[b], SPRING_N_M, 0.0, SPRING_REST_M);
+        let (law, tears_above_n) = (Law::Ledger, f64::INFINITY);
+        let link = Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n };
+        play.link(ids[a], link);
     }
     Some((play, ids))
 }

@@ -1,0 +1,41 @@
+//! Attachments of a scene that have torn, as the agents publish them that they held.
+//!
+//! In: what tore, when, and by which force. Out: the same in snapshots and reports. Never here: forces.
+
+use crate::{AgentId, SimTime};
+use std::fmt;
+
+/// An attachment of a scene, by its number among those of its kind, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AttachmentId {
+    /// A coupling that joins a point of one agent to one of another.
+    Coupling(u32),
+    /// A joint.
+    Joint(u32),
+    /// A part of an agent that is attached to its place at the start; by its number among those of the agent.
+    Part(u32),
+}
+
+/// Written as places of scenes are: `coupling.0`, `joint.3`, `attach.1` of an object.
+impl fmt::Display for AttachmentId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coupling(number) => write!(f, "coupling.{number}"),
+            Self::Joint(number) => write!(f, "joint.{number}"),
+            Self::Part(number) => write!(f, "attach.{number}"),
+        }
+    }
+}
+
+/// An attachment that has torn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TornAttachment {
+    /// Which one.
+    pub attachment: AttachmentId,
+    /// The agent at its other end; `None` is the world.
+    pub with: Option<AgentId>,
+    /// When it tore, in the scene's time: the end of the step over which it gave too much.
+    pub at: SimTime,
+    /// The force that it gave: its mean over that step, newtons.
+    pub force_n: f64,
+}
