@@ -32,7 +32,9 @@ pub enum TubeError {
         degrees: f64,
     },
     /// The integrator has no steps for a wall that gives.
-    #[error("the tube's integrator is {integrator}, whose steps take the bend stiffness as constant; a wall that gives needs an implicit one")]
+    #[error(
+        "the tube's integrator is {integrator}, whose steps take the bend stiffness as constant; a wall that gives needs an implicit one"
+    )]
     StiffWall {
         /// Name of the integrator.
         integrator: &'static str,

@@ -155,7 +155,11 @@ impl ClusterMember for Tube {
             Place::Chain { segment, share, radius_m } => {
                 let arm_m = contact.outward * (radius_m - self.recess_m(place, contact));
                 let side = self.point_side(segment as usize, share, arm_m);
-                if self.wall.is_some() { self.skin_side(side, [segment as usize, segment as usize + 1], share, contact.outward) } else { side }
+                if self.wall.is_some() {
+                    self.skin_side(side, [segment as usize, segment as usize + 1], share, contact.outward)
+                } else {
+                    side
+                }
             }
             Place::Point(_) | Place::Surface { .. } => Side::FIXED,
         }
@@ -216,7 +220,8 @@ impl ClusterMember for Tube {
     }
 
     fn go_back(&mut self) {
-        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } = self;
+        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } =
+            self;
         let kept = &unknowns.kept;
         now.copy_from(&kept.now);
         wall.iter_mut().for_each(|wall| wall.now.copy_from(&kept.wall));

@@ -21,3 +21,4 @@ mod steps;
 mod table;
 mod tools;
 mod tubes;
+mod walls;

@@ -9,16 +9,11 @@ const RADIUS_M: f64 = 0.01;
 
 /// A straight tube of 0.2 m with a wall that gives, this thick.
 fn giving(wall_m: f64, segments: usize) -> TubeSpec {
-    let material =
-        Material { young_pa: YOUNG_PA, poisson: POISSON, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    let material = Material { young_pa: YOUNG_PA, poisson: POISSON, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     TubeSpec {
         wall: WallModel::Gives,
         damping_per_s: 20.0,
-        ..TubeSpec::free(
-            vec![DVec3::ZERO, DVec3::X * 0.2],
-            Section::hollow(RADIUS_M, wall_m, material),
-            segments,
-        )
+        ..TubeSpec::free(vec![DVec3::ZERO, DVec3::X * 0.2], Section::hollow(RADIUS_M, wall_m, material), segments)
     }
 }
 
@@ -63,7 +58,8 @@ fn a_bent_thin_tube_carries_braziers_moment_at_most() {
     for k in 14..=24 {
         let curvature = critical_1_m * f64::from(k) / 20.0;
         let step = 0.01 * critical_1_m;
-        let ((before, _), (after, _), (_, flat)) = (bent(wall_m, curvature - step), bent(wall_m, curvature + step), bent(wall_m, curvature));
+        let ((before, _), (after, _), (_, flat)) =
+            (bent(wall_m, curvature - step), bent(wall_m, curvature + step), bent(wall_m, curvature));
         let moment = (after - before) / (2.0 * step);
         println!("{:.2}: moment {:.4} of Brazier's, flattening {flat:.4}", f64::from(k) / 20.0, moment / brazier_n_m);
         if moment > best.0 {

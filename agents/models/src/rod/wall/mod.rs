@@ -159,6 +159,12 @@ impl Wall {
         self.floored_m(self.law.outer_m + self.now.shape[node].x)
     }
 
+    /// The two components of a node's flattening, metres: no more than leaves the section its least radius.
+    pub fn flattening_m(&self, node: usize) -> DVec2 {
+        let shape = self.now.shape[node];
+        DVec2::new(shape.y, shape.z).clamp_length_max(self.mean_m(node) - RADIUS_MIN * self.law.outer_m)
+    }
+
     /// Not less than a section keeps.
     pub fn floored_m(&self, radius_m: f64) -> f64 {
         radius_m.max(RADIUS_MIN * self.law.outer_m)
