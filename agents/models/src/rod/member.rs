@@ -248,12 +248,13 @@ impl ClusterMember for Tube {
         let gained = v.iter().zip(&unknowns.free).all(|(v, free)| v.distance(*free) <= ROUNDING_M_S);
         let is_free = !touched && gained && self.integrates_free_motion(h_s);
         let (of_rod, of_wall) = v.split_at(self.now.u.len());
-        let moved = if is_free { self.advance_freely(h_s) } else { self.advance_with(of_rod, h_s, &unknowns) };
-        let finite = moved && self.end_wall(Some(of_wall), h_s);
+        let finite = self.wall_stays_finite(of_wall, h_s)
+            && if is_free { self.advance_freely(h_s) } else { self.advance_with(of_rod, h_s, &unknowns) };
         self.unknowns = unknowns;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
+        self.end_wall(Some(of_wall), h_s);
         self.unknowns.places.clone_from(&self.now.x);
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
         self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);

@@ -242,9 +242,13 @@ impl Tube {
     /// A step of the wall that nothing touches, after that of the centre line.
     fn step_wall(&mut self, dt_s: f64, then: SimTime) -> Result<(), Divergence> {
         self.begin_wall(dt_s, then)?;
-        let finite = self.end_wall(None, dt_s);
+        let finite = self.wall.as_ref().is_none_or(|wall| wall.stays_finite(wall.free(), dt_s));
+        if !finite {
+            return Err(Divergence { slot: None });
+        }
+        self.end_wall(None, dt_s);
         self.present_velocities();
-        if finite { Ok(()) } else { Err(Divergence { slot: None }) }
+        Ok(())
     }
 
     fn record_grips(&mut self, dt: f64) {
@@ -313,6 +317,7 @@ impl Tube {
 
     /// Replaces the state, for violent starts; its strains are recomputed.
     pub(super) fn set_state(&mut self, mut state: RodState) {
+        self.wall.iter().for_each(|wall| wall.soften(&mut state.softening));
         state.strain(&self.matter, &self.division);
         self.now = state;
     }

@@ -6,12 +6,13 @@
 
 use super::{Drive, Filling, WallProblem};
 use crate::limits::QUIET_SPEED_M_S;
-use crate::rod::energy_limiter;
 use crate::rod::step::Divergence;
 use crate::rod::tube::Tube;
 use glam::DVec3;
 use metachron_core::SimTime;
 
+/// How much of its way a wall goes, the first of these that makes no energy; the last makes none.
+const SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.0];
 /// A rise of energy below this share of the energies involved is rounding.
 const ENERGY_SLACK: f64 = 1e-9;
 
@@ -39,27 +40,32 @@ impl Tube {
         begun
     }
 
-    /// Moves the wall at `rates` for the `h_s` seconds begun, freely where there are none; whether the tube is finite then (eq. 66).
-    pub(in crate::rod) fn end_wall(&mut self, rates: Option<&[DVec3]>, h_s: f64) -> bool {
+    /// Moves the wall at `rates` for the `h_s` seconds begun, freely where there are none: as far as that makes no energy (eq. 66).
+    pub(in crate::rod) fn end_wall(&mut self, rates: Option<&[DVec3]>, h_s: f64) {
         let filling = self.filling();
-        let Self { wall, now, matter, division, stepper, squeeze_m, .. } = self;
-        let Some(wall) = wall else { return true };
-        let before = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
+        let Self { wall, now, matter, division, squeeze_m, .. } = self;
+        let Some(wall) = wall else { return };
         let work_j = rates.map_or(0.0, |rates| wall.work_j(rates));
-        let finite = wall.advance(rates, h_s);
-        wall.soften(&mut now.softening);
-        now.strain(matter, division);
-        let after = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
-        let at_work: f64 = before.iter().chain(&after).map(|part| part.abs()).sum::<f64>() + work_j.abs();
-        let rise_j = after.iter().sum::<f64>() - before.iter().sum::<f64>() - work_j - ENERGY_SLACK * at_work;
-        if rise_j > 0.0 {
-            let left_j = wall.slow(rise_j, division);
-            if left_j > 0.0 {
-                energy_limiter::remove(left_j, now, matter, division);
-                stepper.past.forget();
+        let before = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
+        wall.keep();
+        for share in SHARES {
+            wall.advance(rates, share, h_s);
+            wall.soften(&mut now.softening);
+            now.strain(matter, division);
+            let after = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
+            let work_j = share * work_j;
+            let at_work: f64 = before.iter().chain(&after).map(|part| part.abs()).sum::<f64>() + work_j.abs();
+            let rise_j = after.iter().sum::<f64>() - before.iter().sum::<f64>() - work_j - ENERGY_SLACK * at_work;
+            // what its motion can give back, it does
+            if rise_j <= 0.0 || wall.slow(rise_j, division) {
+                return;
             }
         }
-        finite && now.is_finite()
+    }
+
+    /// Whether the wall would be finite after `h_s` seconds at these rates.
+    pub(in crate::rod) fn wall_stays_finite(&self, rates: &[DVec3], h_s: f64) -> bool {
+        self.wall.as_ref().is_none_or(|wall| wall.stays_finite(rates, h_s))
     }
 
     /// Whether no section moves fast enough to be seen.

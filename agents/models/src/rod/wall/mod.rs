@@ -77,6 +77,8 @@ pub struct Wall {
     factor: BandFactor,
     /// Rates after the step begun without contact, m/s.
     free: Vec<DVec3>,
+    /// Shapes before the step begun, metres.
+    kept: Vec<DVec3>,
 }
 
 /// The closed gas or the open pressure at some volume.
@@ -120,7 +122,7 @@ impl Wall {
     /// The round wall of a tube of `nodes` nodes.
     pub fn round(law: WallLaw, nodes: usize) -> Self {
         let now = Sections { shape: vec![DVec3::ZERO; nodes], rate: vec![DVec3::ZERO; nodes] };
-        Self { law, now, rows: vec![], factor: BandFactor::default(), free: vec![] }
+        Self { law, now, rows: vec![], factor: BandFactor::default(), free: vec![], kept: vec![] }
     }
 
     /// The rates that the step begun leads to without contact.
@@ -281,22 +283,35 @@ impl Wall {
         rates.iter().enumerate().map(of).sum()
     }
 
-    /// Moves the sections for `h_s` seconds at these rates, or at their free ones; whether all of them are finite then.
-    pub fn advance(&mut self, rates: Option<&[DVec3]>, h_s: f64) -> bool {
-        let Sections { shape, rate } = &mut self.now;
-        rate.copy_from_slice(rates.unwrap_or(&self.free));
-        shape.iter_mut().zip(&*rate).for_each(|(shape, rate)| *shape += *rate * h_s);
-        shape.iter().all(|shape| shape.is_finite())
+    /// Whether all sections would be finite after `h_s` seconds at these rates.
+    pub fn stays_finite(&self, rates: &[DVec3], h_s: f64) -> bool {
+        self.now.shape.iter().zip(rates).all(|(shape, rate)| (*shape + *rate * h_s).is_finite())
     }
 
-    /// Takes up to `excess_j` of kinetic energy from the wall; returns what is left to take.
-    pub fn slow(&mut self, excess_j: f64, division: &Discretization) -> f64 {
+    /// Keeps the sections as they are, for [`Self::advance`].
+    pub fn keep(&mut self) {
+        self.kept.clone_from(&self.now.shape);
+    }
+
+    /// Moves the sections kept for `h_s` seconds at a share of these rates, or of their free ones.
+    pub fn advance(&mut self, rates: Option<&[DVec3]>, share: f64, h_s: f64) {
+        let Self { now: Sections { shape, rate }, kept, free, .. } = self;
+        rate.copy_from_slice(rates.unwrap_or(free));
+        rate.iter_mut().for_each(|rate| *rate *= share);
+        shape.iter_mut().zip(&*rate).zip(&*kept).for_each(|((shape, rate), kept)| *shape = *kept + *rate * h_s);
+    }
+
+    /// Takes `excess_j` of kinetic energy from the wall; whether there is as much.
+    pub fn slow(&mut self, excess_j: f64, division: &Discretization) -> bool {
         let Self { law, now, .. } = self;
         let of = |(node, rate): (usize, &DVec3)| 0.5 * dual_m(division, node) * (law.inertia * *rate).dot(*rate);
         let kinetic_j: f64 = now.rate.iter().enumerate().map(of).sum();
-        let share = if kinetic_j > 0.0 { (1.0 - excess_j / kinetic_j).max(0.0).sqrt() } else { 0.0 };
-        now.rate.iter_mut().for_each(|rate| *rate *= share);
-        (excess_j - kinetic_j).max(0.0)
+        let enough = excess_j <= kinetic_j;
+        if enough && kinetic_j > 0.0 {
+            let share = (1.0 - excess_j / kinetic_j).sqrt();
+            now.rate.iter_mut().for_each(|rate| *rate *= share);
+        }
+        enough
     }
 
     /// Stops it.
