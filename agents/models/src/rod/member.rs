@@ -53,6 +53,8 @@ struct Kept {
 
 /// Velocities differ by less than this through rounding alone, m/s and rad/s.
 const ROUNDING_M_S: f64 = 1e-9;
+/// What a section may change by in a step as a share of its radius: its forces are linear in it.
+const WALL_REACH: f64 = 0.05;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
 const RISES: f64 = 2.0;
 
@@ -198,12 +200,15 @@ impl ClusterMember for Tube {
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
-        let v = &v[..self.now.u.len()];
+        let (v, rates) = v.split_at(self.now.u.len());
+        let reaches_m = self.wall.as_ref().map_or(f64::INFINITY, |wall| WALL_REACH * wall.law.outer_m);
+        let fastest_m_s = rates.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
         let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
         // what a segment turns or stretches by, as a share of it
-        let changes = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
+        let bent = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
+        let changes = bent.max(fastest_m_s * h_s / reaches_m);
         // an energy that is no number rises too
         if self.unknowns.rise_j <= 0.0 { changes } else { changes.max(RISES) }
     }

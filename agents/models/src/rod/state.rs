@@ -177,7 +177,7 @@ impl RodState {
         }
     }
 
-    /// The same where walls give: a section that is flat bends more easily across its flat sides (eq. 61).
+    /// The same where walls give: a section that is flat bends more easily across its flat sides (eq. 62).
     fn bend_soft_sections(&mut self, matter: &RodMaterial, division: &Discretization) {
         let count = self.q.len();
         self.curvature.clear();
@@ -254,7 +254,7 @@ impl Joint {
         self.carried(m)
     }
 
-    /// The same of a section that bends by `softening` in the axes of the segment `before`, and the curvature there, 1/m (eq. 61).
+    /// The same of a section that bends by `softening` in the axes of the segment `before`, and the curvature there, 1/m (eq. 62).
     #[inline(always)]
     fn soft_moment(
         &self,

@@ -125,7 +125,7 @@ fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
     }
 }
 
-/// What the softening of a section adds to its relative bend stiffness (eq. 61), in world axes, from the axes of the segment before it.
+/// What the softening of a section adds to its relative bend stiffness (eq. 62), in world axes, from the axes of the segment before it.
 /// Across the mean director it takes away no more than there is.
 fn softened(softening: &Softening, axes: DQuat, director: DVec3) -> Sym3 {
     let Softening { mean, oval } = *softening;

@@ -27,7 +27,6 @@ fn pressure_widens_thin_and_thick_walls_by_lames_law() {
         // a closed tube: σ_θ = 2 p a²/(b² − a²) outside, σ_z = p a²/(b² − a²)
         let lame_m = pressure_pa * a2 * RADIUS_M * (2.0 - POISSON) / (YOUNG_PA * (b2 - a2));
         let widened_m = tube.radius_at_m(0.1) - RADIUS_M;
-        println!("wall {wall_m}: {widened_m:.6e} of {lame_m:.6e}, {:.3} %", 1e2 * (widened_m / lame_m - 1.0));
         assert!((widened_m / lame_m - 1.0).abs() < 1e-6, "{widened_m} m, not {lame_m} m"); // the law at rest, settled to rounding
     }
 }
@@ -61,7 +60,6 @@ fn a_bent_thin_tube_carries_braziers_moment_at_most() {
         let ((before, _), (after, _), (_, flat)) =
             (bent(wall_m, curvature - step), bent(wall_m, curvature + step), bent(wall_m, curvature));
         let moment = (after - before) / (2.0 * step);
-        println!("{:.2}: moment {:.4} of Brazier's, flattening {flat:.4}", f64::from(k) / 20.0, moment / brazier_n_m);
         if moment > best.0 {
             best = (moment, flat);
         }
@@ -88,7 +86,6 @@ fn a_bend_past_braziers_moment_kinks() {
         run(&mut tube, 2.0, 4.0);
         let mut flat: Vec<f64> =
             tube.wall.as_ref().unwrap().now.shape.iter().map(|s| (s.y * s.y + s.z * s.z).sqrt() / r).collect();
-        println!("{share}: {:?}", flat.iter().map(|f| (f * 100.0).round() / 100.0).collect::<Vec<_>>());
         flat.sort_by(f64::total_cmp);
         [flat[24], flat[48]]
     };
@@ -113,7 +110,6 @@ fn growth(share: f64) -> f64 {
 #[test]
 fn a_thin_tube_collapses_under_the_critical_outer_pressure_of_a_ring() {
     let (below, above) = (growth(0.95), growth(1.05));
-    println!("{below} {above}");
     assert!(below.abs() < 1.0 && above > 2.0, "{below} below the critical pressure, {above} above it"); // Lévy: p = 3 E'I/R³
 }
 
@@ -140,7 +136,6 @@ fn a_sealed_tube_is_as_wide_as_its_gas_and_its_wall_agree() {
     let held_pa = widened_m * YOUNG_PA * (b * b - a * a) / (a * a * b * (2.0 - POISSON));
     let slope_m = 2.0 * PI * a * a * b * (2.0 - POISSON) / ((1.0 - POISSON) * b * b + (1.0 + POISSON) * a * a);
     let product = (101_325.0 + held_pa) * (PI * a * a + slope_m * widened_m) / ((101_325.0 + pressure_pa) * PI * a * a);
-    println!("widened {widened_m:.4e}, {held_pa} Pa of {pressure_pa}, p V {product}");
     assert!((product - 1.0).abs() < 1e-6, "p V is {product} of what was shut in"); // settled to rounding
     assert!((tube.pressure_pa() / held_pa - 1.0).abs() < 1e-6 && held_pa < 0.9 * pressure_pa);
 }
@@ -170,7 +165,6 @@ fn muscles_alone_narrow_a_tube_as_the_prescribed_wave_does_and_pressure_resists_
         tube.radius_at_m(0.12)
     };
     let (prescribed, free) = (narrowest(WallModel::Prescribed, 0.0), narrowest(WallModel::Gives, 0.0));
-    println!("prescribed {prescribed}, muscles {free}");
     // 10 mm/s along 100 mm is slow: the wall lags by its damping over its stiffness, and bends along the wave by less than 1e-3
     assert!((free / prescribed - 1.0).abs() < 0.01, "{free} m, prescribed {prescribed} m");
     let (blown, widened_m) = (narrowest(WallModel::Gives, 2000.0), 2000.0 / 200.0 * 1.449_474e-5);

@@ -22,7 +22,7 @@ impl Tube {
         Filling { pressure_pa: self.spec.pressure_pa, sealed: self.spec.sealed }
     }
 
-    /// Prepares the wall for a step of `h_s` seconds that ends at `then`, with the curvature of the present centre line (eq. 64, 65).
+    /// Prepares the wall for a step of `h_s` seconds that ends at `then`, with the curvature of the present centre line (eq. 65).
     pub(in crate::rod) fn begin_wall(&mut self, h_s: f64, then: SimTime) -> Result<(), Divergence> {
         let Some(mut wall) = self.wall.take() else { return Ok(()) };
         let radius_m = wall.law.outer_m;
@@ -47,6 +47,7 @@ impl Tube {
         let Some(wall) = wall else { return };
         let work_j = rates.map_or(0.0, |rates| wall.work_j(rates));
         let before = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
+        let rounding_j = wall.rounding_j(division, filling);
         wall.keep();
         for share in SHARES {
             wall.advance(rates, share, h_s);
@@ -55,7 +56,8 @@ impl Tube {
             let after = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
             let work_j = share * work_j;
             let at_work: f64 = before.iter().chain(&after).map(|part| part.abs()).sum::<f64>() + work_j.abs();
-            let rise_j = after.iter().sum::<f64>() - before.iter().sum::<f64>() - work_j - ENERGY_SLACK * at_work;
+            let rise_j =
+                after.iter().sum::<f64>() - before.iter().sum::<f64>() - work_j - ENERGY_SLACK * at_work - rounding_j;
             // what its motion can give back, it does
             if rise_j <= 0.0 || wall.slow(rise_j, division) {
                 return;

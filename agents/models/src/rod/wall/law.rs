@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 /// The flattening of a section over its mid-wall radius up to which Brazier's first-order law holds as it stands; his tube fails at 2/9.
 const FIRST_ORDER: f64 = 1.0 / 3.0;
-/// The curvature of the bend's softening by flattening past that (eq. 62), which bounds it everywhere.
+/// The curvature of the bend's softening by flattening past that (eq. 63), which bounds it everywhere.
 const SOFTENING_CURVATURE: f64 = 2.25;
 /// Inertia of flattening over that of widening: cos 2φ outwards, −½ sin 2φ along the wall, squared and averaged.
 const OVAL_INERTIA: f64 = 0.625;
@@ -25,11 +25,11 @@ pub struct WallLaw {
     pub inner_m: f64,
     /// Inertia, kg/m.
     pub inertia: DVec3,
-    /// Stiffness against widening and flattening, N/m² (eq. 55, 56).
+    /// Stiffness against widening and flattening, N/m² (eq. 56, 57).
     pub stiffness: DVec3,
-    /// Stiffness against their second derivative along the tube, N·m² (eq. 57).
+    /// Stiffness against their second derivative along the tube, N·m² (eq. 58).
     pub along: DVec3,
-    /// Force on the widening per length and pressure, metres (eq. 58).
+    /// Force on the widening per length and pressure, metres (eq. 59).
     pub lift_m: f64,
     /// Stiffness of opposite walls that meet, N/m²; zero of a solid rod.
     pub closed: f64,
@@ -56,7 +56,7 @@ pub struct Brazier {
 }
 
 impl Softening {
-    /// What a round section of this bend, in the section's axes, would have to be bent by for the same moment (eq. 61).
+    /// What a round section of this bend, in the section's axes, would have to be bent by for the same moment (eq. 62).
     #[inline(always)]
     pub fn of(&self, bend: DVec2) -> DVec2 {
         let Self { mean, oval } = *self;
@@ -91,7 +91,7 @@ impl WallLaw {
         }
     }
 
-    /// The area of the lumen of this section, m² (eq. 58).
+    /// The area of the lumen of this section, m² (eq. 59).
     pub fn lumen_m2(&self, wall: DVec3) -> f64 {
         let flat2 = wall.y * wall.y + wall.z * wall.z;
         PI * self.inner_m * self.inner_m + self.lift_m * wall.x - 1.5 * PI * flat2
@@ -102,7 +102,7 @@ impl WallLaw {
         (wall.y * wall.y + wall.z * wall.z).sqrt() - wall.x - self.inner_m
     }
 
-    /// How a section bends (eq. 61, 62).
+    /// How a section bends (eq. 62, 63).
     pub fn softening(&self, wall: DVec3) -> Softening {
         let flat = DVec2::new(wall.y, wall.z) / self.middle_m;
         let f = flat.length();
@@ -132,14 +132,14 @@ impl WallLaw {
     }
 }
 
-/// The bend stiffness of a section that is flatter by f > 1/3 across the bend, over that of the round one, and its derivative (eq. 62).
+/// The bend stiffness of a section that is flatter by f > 1/3 across the bend, over that of the round one, and its derivative (eq. 63).
 fn share(f: f64) -> (f64, f64) {
     let open = (1.0 - f).max(0.0);
     (0.5 * SOFTENING_CURVATURE * open * open, -SOFTENING_CURVATURE * open)
 }
 
 /// Stiffness of an annulus of inner over outer radius `hollow` against a pressure q cos 2φ on its outside, in plane strain: the force q π b on
-/// the amplitude over the displacement there, N/m² (eq. 56; Michell's solution of the second harmonic).
+/// the amplitude over the displacement there, N/m² (eq. 57; Michell's solution of the second harmonic).
 fn ovalisation_n_m2(plate_pa: f64, poisson: f64, hollow: f64) -> f64 {
     let nu = poisson / (1.0 - poisson);
     if hollow <= 0.0 {

@@ -90,7 +90,7 @@ struct Pressure {
 }
 
 impl Filling {
-    /// The pressure in `volume_m3` of a lumen that holds `rest_m3` undeformed (eq. 59).
+    /// The pressure in `volume_m3` of a lumen that holds `rest_m3` undeformed (eq. 61).
     fn pressure(self, volume_m3: f64, rest_m3: f64) -> Pressure {
         if !self.sealed || rest_m3 <= 0.0 {
             let energy_j = -self.pressure_pa * (volume_m3 - rest_m3);
@@ -185,7 +185,7 @@ impl Wall {
         filling.pressure(volume, rest).pa
     }
 
-    /// Kinetic and elastic energy of the wall and the potential of its filling, J, without that of its muscles (eq. 54).
+    /// Kinetic and elastic energy of the wall and the potential of its filling, J, without that of its muscles (eq. 55).
     pub fn energy_j(&self, division: &Discretization, filling: Filling) -> f64 {
         let Self { law, now, .. } = self;
         let mut sum = 0.0;
@@ -203,13 +203,20 @@ impl Wall {
         sum + filling.pressure(volume, rest).energy_j
     }
 
-    /// The potential of the muscles' tension, J (eq. 60).
+    /// What the energy of the filling, a small difference of volumes, rounds by, J.
+    pub fn rounding_j(&self, division: &Discretization, filling: Filling) -> f64 {
+        let air_pa = if filling.sealed { AIR_PA } else { 0.0 };
+        let rest_m3 = division.total_m() * self.law.lumen_m2(DVec3::ZERO);
+        64.0 * f64::EPSILON * (air_pa + filling.pressure_pa.abs()) * rest_m3
+    }
+
+    /// The potential of the muscles' tension, J (docs/theory/rod.md, section 15).
     pub fn muscle_j(&self, division: &Discretization, squeeze_m: &[f64]) -> f64 {
         let of = |(node, (shape, squeeze_m)): (usize, (&DVec3, &f64))| dual_m(division, node) * shape.x * squeeze_m;
         self.law.stiffness.x * self.now.shape.iter().zip(squeeze_m).enumerate().map(of).sum::<f64>()
     }
 
-    /// Builds and solves the step without contact (eq. 64, 65).
+    /// Builds and solves the step without contact (eq. 65).
     ///
     /// # Errors
     /// [`Divergence`] where the matrix has no factor.
@@ -257,7 +264,7 @@ impl Wall {
         self.join(division, h_s);
     }
 
-    /// Adds what joins a node to its neighbours (eq. 57).
+    /// Adds what joins a node to its neighbours (eq. 58).
     fn join(&mut self, division: &Discretization, h_s: f64) {
         let Self { law, now, rows, free, .. } = self;
         for node in 1..now.shape.len() - 1 {
