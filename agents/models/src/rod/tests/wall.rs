@@ -195,3 +195,32 @@ fn a_wall_that_gives_makes_no_energy() {
         }
     }
 }
+
+#[test]
+fn a_load_at_one_place_dents_as_much_of_the_tube_as_its_wall_can_reach() {
+    use metachron_contact::cluster::Response;
+    use metachron_contact::stepper::ClusterMember;
+    let wall_m: f64 = 5e-4;
+    let spec = giving(wall_m, 400);
+    let mut tube = Tube::new(TubeSpec { damping_per_s: 0.0, ..spec }).unwrap();
+    // in a step of a thousand seconds nothing is left of inertia: what an impulse moves it by is what its force does
+    let (h_s, load_n) = (1e3, 1e-3);
+    tube.begin(h_s).unwrap();
+    let first = tube.state().u.len();
+    let mut impulses = vec![DVec3::ZERO; first + 401];
+    impulses[first + 200].y = load_n * h_s;
+    tube.respond(&mut impulses);
+    let (plate_pa, r) = (YOUNG_PA / (1.0 - POISSON * POISSON), RADIUS_M - 0.5 * wall_m);
+    let stiffness = 9.0 * PI * plate_pa * wall_m.powi(3) / (12.0 * r.powi(3));
+    let along = PI * YOUNG_PA * wall_m * r.powi(3) / 16.0;
+    let lambda = (stiffness / (4.0 * along)).powf(0.25);
+    let at = |node: usize| impulses[first + node].y * h_s;
+    let deepest_m = load_n * lambda / (2.0 * stiffness);
+    // a beam on an elastic bed; the annulus is stiffer than its mid-wall ring where it is loaded from outside, by its thickness of 5 %
+    assert!((at(200) / deepest_m - 1.0).abs() < 0.05, "{} m deep, the beam {deepest_m} m", at(200));
+    for node in [220, 250, 280] {
+        let x = lambda * 0.2 / 400.0 * (node - 200) as f64;
+        let beam = libm::exp(-x) * (libm::cos(x) + libm::sin(x));
+        assert!((at(node) / at(200) - beam).abs() < 0.03, "{} of the deepest at λx = {x}, the beam {beam}", at(node) / at(200));
+    }
+}
