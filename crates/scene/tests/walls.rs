@@ -54,7 +54,8 @@ fn a_wall_that_gives_shows_how_a_brick_flattens_it() {
 
 #[test]
 fn walls_that_give_keep_lockstep_to_the_bit_and_prescribed_ones_are_the_default() {
-    let wave = "wall = \"gives\"\nsealed = true\nperistalsis = { amplitude = 0.2, wavelength_m = 0.1, speed_m_s = 0.05 }";
+    let wave =
+        "wall = \"gives\"\nsealed = true\nperistalsis = { amplitude = 0.2, wavelength_m = 0.1, speed_m_s = 0.05 }";
     assert_eq!(played(wave).1, played(wave).1);
     assert_eq!(played("").1, played("wall = \"prescribed\"").1);
     assert_ne!(played("").1, played("wall = \"gives\"").1);

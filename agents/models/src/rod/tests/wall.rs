@@ -221,6 +221,10 @@ fn a_load_at_one_place_dents_as_much_of_the_tube_as_its_wall_can_reach() {
     for node in [220, 250, 280] {
         let x = lambda * 0.2 / 400.0 * (node - 200) as f64;
         let beam = libm::exp(-x) * (libm::cos(x) + libm::sin(x));
-        assert!((at(node) / at(200) - beam).abs() < 0.03, "{} of the deepest at λx = {x}, the beam {beam}", at(node) / at(200));
+        assert!(
+            (at(node) / at(200) - beam).abs() < 0.03,
+            "{} of the deepest at λx = {x}, the beam {beam}",
+            at(node) / at(200)
+        );
     }
 }
