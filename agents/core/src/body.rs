@@ -3,7 +3,7 @@
 //! In: a model writes its state. Out: points, probes, bounds. Never here: how anything moves.
 
 use crate::AgentId;
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// Position of matter and the fastest speed at which it may leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,8 +52,11 @@ pub struct CurveState {
     pub velocities: Vec<DVec3>,
     /// Section frames, one per segment: the third axis (z) is the axial director; N entries.
     pub frames: Vec<DQuat>,
-    /// Outer radius at each node in metres; N + 1 entries.
+    /// Outer radius at each node in metres, the mean of a section that is not round; N + 1 entries.
     pub radii_m: Vec<f64>,
+    /// How far the section at each node is from round, metres: in the direction φ of the axes of the segment before it (of the first one at
+    /// the first node) the outer radius is larger by x cos 2φ + y sin 2φ. N + 1 entries; none where all sections are round.
+    pub flattening_m: Vec<DVec2>,
 }
 
 /// The pose and motion of a rigid body, about its centre of mass.
@@ -222,6 +225,7 @@ impl Body {
                     && c.velocities.iter().all(|v| v.is_finite())
                     && c.frames.iter().all(|q| q.is_finite())
                     && c.radii_m.iter().all(|r| r.is_finite())
+                    && c.flattening_m.iter().all(|f| f.is_finite())
             }
             Self::Rigid(b) => {
                 b.position.is_finite() && b.rotation.is_finite() && b.velocity.is_finite() && b.spin.is_finite()

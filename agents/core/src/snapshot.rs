@@ -111,6 +111,7 @@ impl Snapshot {
                 c.positions.iter().chain(&c.velocities).for_each(|v| fold.vector(*v));
                 c.frames.iter().for_each(|q| fold.rotation(*q));
                 c.radii_m.iter().for_each(|r| fold.word(r.to_bits()));
+                c.flattening_m.iter().for_each(|f| f.to_array().into_iter().for_each(|x| fold.word(x.to_bits())));
             }
             Body::Rigid(b) => {
                 [b.position, b.velocity, b.spin].into_iter().for_each(|v| fold.vector(v));
@@ -161,6 +162,7 @@ mod tests {
             velocities: vec![DVec3::ZERO, DVec3::Z, DVec3::Z],
             frames: vec![DQuat::IDENTITY; 2],
             radii_m: vec![0.1; 3],
+            flattening_m: vec![],
         }
     }
 

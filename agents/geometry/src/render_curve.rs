@@ -5,7 +5,7 @@
 //! Between nodes the curve is the cubic of Hermite with the tangents of the parabola through three nodes, so it is C¹ and reproduces
 //! parabolas; frames follow by double reflection (WJZL08, §4), whose error is O(ε⁴).
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use metachron_core::CurveState;
 
 /// Most intervals of a skeleton: beyond, a single tube exceeds the budget of any frame.
@@ -31,6 +31,8 @@ pub struct SkinFrame {
     pub radius_m: f64,
     /// Derivative of the radius by rest arc length.
     pub radius_slope: f64,
+    /// By how much the radius is larger along cos 2φ and sin 2φ, φ from `normal`, metres; zero of a round section.
+    pub flattening_m: DVec2,
 }
 
 /// Cuts curves into intervals; its storage is reused.
@@ -147,6 +149,10 @@ impl Skeleton {
             twist_rad: 0.0,
             radius_m: (r[left] * a + r[right] * b + (m * c + n * d) * h).max(0.0),
             radius_slope,
+            flattening_m: match (curve.flattening_m.get(left), curve.flattening_m.get(right)) {
+                (Some(left), Some(right)) => left.lerp(*right, w),
+                _ => DVec2::ZERO,
+            },
         }
     }
 }
@@ -240,6 +246,9 @@ fn follow_twist(frames: &mut [SkinFrame], curve: &CurveState) {
         let angle = libm::atan2(x.dot(t.cross(frame.normal)), x.dot(frame.normal));
         let turns = libm::round((before - angle) / std::f64::consts::TAU);
         frame.twist_rad = angle + turns * std::f64::consts::TAU;
+        // from the section's own axes to the frame's
+        let (sin, cos) = libm::sincos(2.0 * angle);
+        frame.flattening_m = DVec2::new(cos, sin).rotate(frame.flattening_m);
         before = frame.twist_rad;
     }
 }
@@ -272,6 +281,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; nodes],
             frames: Vec::new(),
             radii_m: vec![0.1; nodes],
+            flattening_m: vec![],
         }
     }
 
@@ -298,6 +308,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; 5],
             frames: Vec::new(),
             radii_m: vec![0.1; 5],
+            flattening_m: vec![],
             arc_m,
             positions,
         };
@@ -351,6 +362,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; n + 1],
             frames: (0..n).map(|i| DQuat::from_rotation_z(rate * (i as f64 + 0.5) / n as f64)).collect(),
             radii_m: vec![0.01; n + 1],
+            flattening_m: vec![],
             arc_m,
         };
         let mut skeleton = Skeleton::default();
@@ -378,6 +390,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; nodes],
             frames: Vec::new(),
             radii_m: vec![0.01; nodes],
+            flattening_m: vec![],
         };
         let mut skeleton = Skeleton::default();
         let frames = skeleton.rebuild(&curve, 0.03);

@@ -13,7 +13,7 @@ use super::picture::{
 use super::scene_view::{Appearance, Form, Material, SceneView, Track};
 use super::skin::{ROPE_LEVEL, SkinOptions, SkinScratch, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
-use glam::{DQuat, DVec3, Vec3};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use metachron_core::{AgentId, Anchor, Body, Resolution};
 use metachron_geometry::{Primitive, Rounding, SkinFrame};
 use std::f64::consts::TAU;
@@ -258,6 +258,7 @@ fn sample(f: &SkinFrame, origin: DVec3, texture_per_m: f32, paint: Paint) -> Ski
         texture_per_m,
         colour: paint.packed(),
         tint: paint.tint,
+        flattening_m: f.flattening_m.as_vec2().to_array(),
     }
 }
 
@@ -298,6 +299,7 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
             twist_rad: 0.0,
             radius_m: 0.2 * radius_m,
             radius_slope: 0.0,
+            flattening_m: DVec2::ZERO,
         };
         picture.samples.push(sample(&frame, picture.origin, 0.0, paint));
     }
@@ -329,6 +331,7 @@ mod tests {
             velocities: vec![DVec3::Z; 41],
             frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); 40],
             radii_m: vec![0.01; 41],
+            flattening_m: vec![],
             arc_m,
         });
         Arc::new(Snapshot { time: SimTime::from_nanos(ms * 1_000_000), steps: ms, body, ..Snapshot::default() })

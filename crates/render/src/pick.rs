@@ -199,6 +199,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; 11],
             frames: vec![DQuat::IDENTITY; 10],
             radii_m: vec![0.05; 11],
+            flattening_m: vec![],
             arc_m,
         };
         let scene_view = scene_view(vec![(Form::Tube, Body::Curve(curve))]);

@@ -34,7 +34,7 @@ pub struct Style {
     pub wireframe: bool,
 }
 
-/// One end of an interval of a tube, in the GPU's layout: 64 bytes.
+/// One end of an interval of a tube, in the GPU's layout: 72 bytes.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct SkinSample {
@@ -58,6 +58,8 @@ pub struct SkinSample {
     pub colour: [u8; 4],
     /// Tint over everything (sRGB), and its opacity.
     pub tint: [u8; 4],
+    /// By how much the radius is larger along cos 2φ and sin 2φ, φ from the normal, metres.
+    pub flattening_m: [f32; 2],
 }
 
 /// One solid, in the GPU's layout: 64 bytes.

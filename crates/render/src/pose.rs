@@ -3,7 +3,7 @@
 //! In: one or two snapshots and a time. Out: a body at a time, written into reused storage.
 //! Never here: the choice of snapshots. Curves whose division changed between snapshots are matched by rest arc length.
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use metachron_core::{Body, CurveState, RigidState, SimTime, Snapshot, SoftState, ToolState};
 
 /// Limit of extrapolation, seconds: the displayed state of an agent that stopped must not fly apart.
@@ -61,6 +61,7 @@ pub fn copy(from: &Body, into: &mut Body) {
             to.velocities.clone_from(&curve.velocities);
             to.frames.clone_from(&curve.frames);
             to.radii_m.clone_from(&curve.radii_m);
+            to.flattening_m.clone_from(&curve.flattening_m);
         }
         Body::Soft(soft) => {
             let to = into.soft_mut();
@@ -126,12 +127,17 @@ fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
     into.velocities.clear();
     into.frames.clear();
     into.radii_m.clear();
+    into.flattening_m.clear();
     let mut reader = CurveReader { curve: a, left: 0 };
     for (i, &arc_m) in b.arc_m.iter().enumerate() {
         let (position, velocity, radius) = reader.node(arc_m);
         into.positions.push(position.lerp(b.positions[i], w));
         into.velocities.push(velocity.lerp(b.velocities[i], w));
         into.radii_m.push(radius + (b.radii_m[i] - radius) * w);
+    }
+    reader.left = 0;
+    for (&arc_m, &flattening) in b.arc_m.iter().zip(&b.flattening_m) {
+        into.flattening_m.push(reader.flattening(arc_m).unwrap_or(flattening).lerp(flattening, w));
     }
     reader.left = 0;
     for (i, &frame) in b.frames.iter().enumerate() {
@@ -154,12 +160,25 @@ impl CurveReader<'_> {
         }
     }
 
-    fn node(&mut self, arc_m: f64) -> (DVec3, DVec3, f64) {
+    /// The nodes on both sides, and the share of the second.
+    fn beside(&mut self, arc_m: f64) -> ([usize; 2], f64) {
         self.seek(arc_m);
         let (curve, left) = (self.curve, self.left);
         let right = (left + 1).min(curve.arc_m.len() - 1);
         let h = curve.arc_m[right] - curve.arc_m[left];
-        let w = if h > 0.0 { ((arc_m - curve.arc_m[left]) / h).clamp(0.0, 1.0) } else { 0.0 };
+        ([left, right], if h > 0.0 { ((arc_m - curve.arc_m[left]) / h).clamp(0.0, 1.0) } else { 0.0 })
+    }
+
+    /// `None` where the sections are round.
+    fn flattening(&mut self, arc_m: f64) -> Option<DVec2> {
+        let ([left, right], w) = self.beside(arc_m);
+        let list = &self.curve.flattening_m;
+        Some(list.get(left)?.lerp(*list.get(right)?, w))
+    }
+
+    fn node(&mut self, arc_m: f64) -> (DVec3, DVec3, f64) {
+        let ([left, right], w) = self.beside(arc_m);
+        let curve = self.curve;
         let r = &curve.radii_m;
         (
             curve.positions[left].lerp(curve.positions[right], w),
@@ -190,6 +209,7 @@ mod tests {
             velocities: vec![DVec3::new(0.0, 0.0, 2.0); n + 1],
             frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); n],
             radii_m: vec![0.01; n + 1],
+            flattening_m: vec![],
             arc_m,
         })
     }

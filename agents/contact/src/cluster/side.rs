@@ -6,8 +6,8 @@
 use super::error::ProblemError;
 use glam::{DMat3, DVec3};
 
-/// The most blocks that a side may have: two nodes and two spins of a tube, the corners of a tetrahedron, a rigid body's two.
-pub const SIDE_TERMS_MAX: usize = 4;
+/// The most blocks that a side may have: two nodes, a spin and two sections of a tube, the corners of a tetrahedron, a rigid body's two.
+pub const SIDE_TERMS_MAX: usize = 5;
 
 /// The share that one block has in the velocity of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]

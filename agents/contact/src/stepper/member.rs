@@ -65,6 +65,13 @@ pub trait ClusterMember: Send {
     /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
     fn side(&self, place: &Place, contact: ContactSide) -> Side;
 
+    /// By how much its skin at `place` lies inside the shape that [`Self::skin`] gives, metres: of a section that is not round, whose shape
+    /// is the round one about it.
+    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
+        let _ = (place, contact);
+        0.0
+    }
+
     /// The velocity of the point `place` of its skin in the step begun beyond that of its blocks, m/s: of a body that is led, all of it.
     fn led_m_s(&self, place: &Place) -> DVec3 {
         let _ = place;

@@ -151,6 +151,8 @@ struct Named {
 /// The two sides of a touch.
 struct Facing {
     sides: [Side; 2],
+    /// How far the skins lie inside the shapes that touch, metres.
+    recess_m: f64,
     /// The velocity of each side that it is led by, beyond that of its blocks, m/s.
     led_m_s: [DVec3; 2],
 }
@@ -309,7 +311,7 @@ impl Search {
                 continue;
             }
             let opening_m_s = facing.opening_m_s(touch.normal, |member| round.moved(member));
-            let gap_m = touch.gap_m - opening_m_s * after_s;
+            let gap_m = touch.gap_m + facing.recess_m - opening_m_s * after_s;
             let touch = Touch { gap_m, ..*touch };
             let ends_m = gap_m + opening_m_s * round.h_s;
             let taken = match round.judge {
@@ -402,7 +404,9 @@ impl Pair<'_> {
         };
         let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
         let other = self.other();
+        let recess_m = |member: usize, place: &Place, contact: ContactSide| all[member].member.recess_m(place, contact);
         Facing {
+            recess_m: recess_m(self.member, &on_a, first) + other.map_or(0.0, |other| recess_m(other, &on_b, second)),
             sides: [side(self.member, &on_a, first), other.map_or(Side::FIXED, |other| side(other, &on_b, second))],
             led_m_s: [
                 all[self.member].member.led_m_s(&on_a),
@@ -460,7 +464,7 @@ fn restitution(skins: [&CollisionShape; 2]) -> f64 {
 }
 
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
-    let Facing { sides, led_m_s } = *facing;
+    let Facing { sides, led_m_s, .. } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
     Contact {

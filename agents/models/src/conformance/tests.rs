@@ -78,6 +78,7 @@ impl Agent for Row {
             velocities: vec![DVec3::Z * self.speed; n + 1],
             frames: vec![DQuat::IDENTITY; n],
             radii_m: vec![0.1; n + 1],
+            flattening_m: vec![],
         });
     }
 

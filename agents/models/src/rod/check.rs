@@ -1,6 +1,6 @@
 //! Validates a tube's specification; each error carries the value that is wrong.
 
-use super::TubeSpec;
+use super::{Integrator, TubeSpec, WallModel};
 use glam::DVec3;
 
 /// Why a tube cannot be built.
@@ -31,6 +31,14 @@ pub enum TubeError {
         /// Angle of the turn, degrees.
         degrees: f64,
     },
+    /// The integrator has no steps for a wall that gives.
+    #[error(
+        "the tube's integrator is {integrator}, whose steps take the bend stiffness as constant; a wall that gives needs an implicit one"
+    )]
+    StiffWall {
+        /// Name of the integrator.
+        integrator: &'static str,
+    },
     /// A number is outside its range.
     #[error("the tube's {name} is {value}; expected {range}")]
     OutOfRange {
@@ -55,6 +63,7 @@ pub fn check(spec: &TubeSpec) -> Result<(), TubeError> {
     check_path(&spec.path_m)?;
     check_section(spec)?;
     check_numbers(spec)?;
+    check_wall(spec)?;
     check_attachments(spec)
 }
 
@@ -131,6 +140,20 @@ fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
         number("peristalsis.speed_m_s", wave.speed_m_s, true, "finite")?;
     }
     Ok(())
+}
+
+/// A wall that gives changes the stiffness of its bend: methods that need it before a step do not take one.
+fn check_wall(spec: &TubeSpec) -> Result<(), TubeError> {
+    let gives = spec.wall == WallModel::Gives;
+    if gives && matches!(spec.integrator, Integrator::SymplecticEuler | Integrator::Xpbd) {
+        return Err(TubeError::StiffWall { integrator: spec.integrator.name() });
+    }
+    if !spec.sealed {
+        return Ok(());
+    }
+    let inner_m = if gives { spec.section.radius_m - spec.section.wall_m } else { 0.0 };
+    number("inner radius", inner_m, inner_m > 0.0, "above zero, in a wall that gives, where it is sealed")?;
+    number("pressure_pa", spec.pressure_pa, spec.pressure_pa > -super::wall::AIR_PA, "above -101325 in a sealed tube")
 }
 
 fn check_attachments(spec: &TubeSpec) -> Result<(), TubeError> {

@@ -10,6 +10,7 @@ use super::rotation::{bend_share, cayley};
 use super::state::{Joint, RodMaterial, RodState};
 use super::sym3::Sym3;
 use super::system::SubstepProblem;
+use super::wall::Softening;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Below this difference between the turns of a joint's two segments, radians, the work of the joint is indistinguishable from rounding.
@@ -53,26 +54,33 @@ fn fill_joints(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rh
     let SubstepProblem { matter, division, .. } = *problem;
     let (count, wall) = (now.q.len(), division.wall);
     let ends = |k: usize| (now.q[k], next.q[k]);
+    let soft = |k: usize| now.softening.get(k);
     if matter.clamp[0] {
-        rhs[1] -= moment(problem, 0, [(wall[0], wall[0]), ends(0)]) * problem.h;
+        rhs[1] -= moment(problem, 0, [(wall[0], wall[0]), ends(0)], soft(0)) * problem.h;
     }
     for k in 1..count {
-        let m = moment(problem, k, [ends(k - 1), ends(k)]) * problem.h;
+        let m = moment(problem, k, [ends(k - 1), ends(k)], soft(k)) * problem.h;
         rhs[2 * k - 1] += m;
         rhs[2 * k + 1] -= m;
     }
     if matter.clamp[1] {
-        rhs[2 * count - 1] += moment(problem, count, [ends(count - 1), (wall[1], wall[1])]) * problem.h;
+        rhs[2 * count - 1] += moment(problem, count, [ends(count - 1), (wall[1], wall[1])], soft(count)) * problem.h;
     }
 }
 
 /// Twice the mean moment of joint `k` between two segments, each given as (before, after).
-fn moment(problem: &SubstepProblem<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DVec3 {
+fn moment(
+    problem: &SubstepProblem<'_>,
+    k: usize,
+    [left, right]: [(DQuat, DQuat); 2],
+    softening: Option<&Softening>,
+) -> DVec3 {
     let SubstepProblem { matter, division, .. } = *problem;
     let joints = [Joint::between(division, k, left.0, right.0), Joint::between(division, k, left.1, right.1)];
     let own = [left.0.conjugate() * joints[0].strain, left.1.conjugate() * joints[1].strain];
-    let stiffness = DVec3::new(matter.ei, matter.ei, matter.gj) * division.joint[k];
-    let sum = stiffness * (own[0] + own[1]);
+    let strains = own[0] + own[1];
+    let bend = softening.map_or(strains.truncate(), |softening| softening.of(strains.truncate()));
+    let sum = DVec3::new(matter.ei, matter.ei, matter.gj) * division.joint[k] * bend.extend(strains.z);
     let m = (left.0 * sum + left.1 * sum) * 0.5;
     let theta = (joints[0].theta + joints[1].theta) * 0.5;
     let across = theta.cross(m);

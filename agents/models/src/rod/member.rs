@@ -12,8 +12,9 @@ use super::state::RodState;
 use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::SubstepProblem;
 use super::tube::Tube;
-use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Response, Side, SideTerm};
+use super::wall::{Sections, Wall};
+use glam::{DMat3, DVec2, DVec3};
+use metachron_contact::cluster::{Block, Response, SIDE_TERMS_MAX, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
@@ -25,6 +26,8 @@ use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 pub(super) struct Unknowns {
     blocks: Vec<Block>,
     free: Vec<DVec3>,
+    /// Present velocities of all slots, those of a wall that gives included; empty without one.
+    present: Vec<DVec3>,
     /// Positions of its nodes where its skin is now, and the radius there, metres.
     places: Vec<DVec3>,
     radii_m: Vec<f64>,
@@ -40,6 +43,7 @@ pub(super) struct Unknowns {
 #[derive(Debug, Clone, Default)]
 struct Kept {
     now: RodState,
+    wall: Sections,
     past: History,
     rest: RestDetector,
     time: SimTime,
@@ -51,6 +55,8 @@ struct Kept {
 
 /// Velocities differ by less than this through rounding alone, m/s and rad/s.
 const ROUNDING_M_S: f64 = 1e-9;
+/// What a section may change by in a step as a share of its radius: its forces are linear in it.
+const WALL_REACH: f64 = 0.05;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
 const RISES: f64 = 2.0;
 
@@ -90,16 +96,28 @@ impl ClusterMember for Tube {
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let solved = self.step_by(h_s, |stepper, now, setting, _| {
             let problem = whole_step(setting, h_s);
+            stepper.take_sections(now);
             stepper.solve(now, &problem, true)?;
             stepper.follow(now, &problem)
         });
         self.unknowns.rise_j = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
         let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        self.begin_wall(h_s, then).map_err(|divergence| self.diverged(divergence, h_s))?;
         let mut unknowns = std::mem::take(&mut self.unknowns);
         unknowns.take(&self.stepper.rows, &self.stepper.next.u, &self.now.x);
         unknowns.radii_m.clear();
-        unknowns.radii_m.extend(self.division.arc_m.iter().map(|&arc_m| self.radius_at_time_m(arc_m, then)));
+        match &self.wall {
+            Some(wall) => {
+                unknowns.take_wall(wall);
+                unknowns.radii_m.extend((0..wall.now.shape.len()).map(|node| wall.reach_m(node)));
+            }
+            None => {
+                let radius_m = |&arc_m: &f64| self.radius_at_time_m(arc_m, then);
+                unknowns.radii_m.extend(self.division.arc_m.iter().map(radius_m));
+            }
+        }
         self.unknowns = unknowns;
+        self.present_velocities();
         Ok(())
     }
 
@@ -108,7 +126,7 @@ impl ClusterMember for Tube {
     }
 
     fn response(&self) -> Option<&dyn Response> {
-        Some(self.stepper.factor())
+        if self.wall.is_some() { Some(self) } else { Some(self.stepper.factor()) }
     }
 
     fn free(&self) -> &[DVec3] {
@@ -116,7 +134,7 @@ impl ClusterMember for Tube {
     }
 
     fn velocities(&self) -> &[DVec3] {
-        &self.now.u
+        if self.wall.is_some() { &self.unknowns.present } else { &self.now.u }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -139,9 +157,26 @@ impl ClusterMember for Tube {
     fn side(&self, place: &Place, contact: ContactSide) -> Side {
         match *place {
             Place::Chain { segment, share, radius_m } => {
-                self.point_side(segment as usize, share, contact.outward * radius_m)
+                let arm_m = contact.outward * (radius_m - self.recess_m(place, contact));
+                let side = self.point_side(segment as usize, share, arm_m);
+                if self.wall.is_some() {
+                    self.skin_side(side, [segment as usize, segment as usize + 1], share, contact.outward)
+                } else {
+                    side
+                }
             }
             Place::Point(_) | Place::Surface { .. } => Side::FIXED,
+        }
+    }
+
+    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
+        match (&self.wall, *place) {
+            (Some(wall), Place::Chain { segment, share, radius_m }) => {
+                let node = segment as usize;
+                let at = |node: usize| wall.radius_m(node, self.across(node, contact.outward));
+                radius_m - (at(node) * (1.0 - share) + at(node + 1) * share)
+            }
+            _ => 0.0,
         }
     }
 
@@ -159,25 +194,32 @@ impl ClusterMember for Tube {
     }
 
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let (v, wall) = v.split_at(self.now.u.len());
         let nodes = v.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
-        nodes + spins * self.widest_m()
+        let rates = wall.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
+        nodes + spins * self.widest_m() + 2.0 * rates
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let (v, rates) = v.split_at(self.now.u.len());
+        let reaches_m = self.wall.as_ref().map_or(f64::INFINITY, |wall| WALL_REACH * wall.law.outer_m);
+        let fastest_m_s = rates.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
         let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
         // what a segment turns or stretches by, as a share of it
-        let changes = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
+        let bent = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
+        let changes = bent.max(fastest_m_s * h_s / reaches_m);
         // an energy that is no number rises too
         if self.unknowns.rise_j <= 0.0 { changes } else { changes.max(RISES) }
     }
 
     fn keep(&mut self) {
-        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, stepper, .. } = self;
+        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, stepper, .. } = self;
         let kept = &mut unknowns.kept;
         kept.now.copy_from(now);
+        wall.iter().for_each(|wall| kept.wall.copy_from(&wall.now));
         kept.past.copy_from(&stepper.past);
         kept.rest.copy_from(rest);
         (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
@@ -185,15 +227,18 @@ impl ClusterMember for Tube {
     }
 
     fn go_back(&mut self) {
-        let Self { now, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } = self;
+        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } =
+            self;
         let kept = &unknowns.kept;
         now.copy_from(&kept.now);
+        wall.iter_mut().for_each(|wall| wall.now.copy_from(&kept.wall));
         stepper.past.copy_from(&kept.past);
         // a copy has no forces
         now.strain(matter, division);
         rest.copy_from(&kept.rest);
         (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
         *acceleration = kept.acceleration;
+        self.present_velocities();
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {
@@ -209,11 +254,14 @@ impl ClusterMember for Tube {
         // what it gained in parts is what it would have gained but for rounding
         let gained = v.iter().zip(&unknowns.free).all(|(v, free)| v.distance(*free) <= ROUNDING_M_S);
         let is_free = !touched && gained && self.integrates_free_motion(h_s);
-        let finite = if is_free { self.advance_freely(h_s) } else { self.advance_with(v, h_s, &unknowns) };
+        let (of_rod, of_wall) = v.split_at(self.now.u.len());
+        let finite = self.wall_stays_finite(of_wall, h_s)
+            && if is_free { self.advance_freely(h_s) } else { self.advance_with(of_rod, h_s, &unknowns) };
         self.unknowns = unknowns;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
+        self.end_wall(Some(of_wall), h_s);
         self.unknowns.places.clone_from(&self.now.x);
         self.note_attachments();
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
@@ -221,6 +269,7 @@ impl ClusterMember for Tube {
         self.unknowns.quiet_before = self.observe_rest(h_s);
         self.at_rest = false;
         self.steps += 1;
+        self.present_velocities();
         Ok(())
     }
 
@@ -244,6 +293,7 @@ impl ClusterMember for Tube {
         self.at_rest = true;
         self.acceleration = DVec3::ZERO;
         self.stop();
+        self.present_velocities();
     }
 
     fn work(&self) -> f64 {
@@ -252,6 +302,40 @@ impl ClusterMember for Tube {
 }
 
 impl Tube {
+    /// The direction `outward` in the axes of the section at a node, across the tube.
+    fn across(&self, node: usize, outward: DVec3) -> DVec2 {
+        let axes = self.now.q[node.saturating_sub(1)];
+        (axes.conjugate() * outward).truncate().normalize_or_zero()
+    }
+
+    /// Adds what the skin moves by where the sections of two nodes widen and flatten: in and out, and along itself, for it does not stretch
+    /// as it flattens (eq. 67).
+    fn skin_side(&self, side: Side, nodes: [usize; 2], share: f64, outward: DVec3) -> Side {
+        let mut terms = [SideTerm::weighted(0, 0.0); SIDE_TERMS_MAX];
+        let mut count = side.terms().len();
+        terms[..count].copy_from_slice(side.terms());
+        for (node, weight) in nodes.into_iter().zip([1.0 - share, share]) {
+            if weight != 0.0 {
+                let axes = self.now.q[node.saturating_sub(1)];
+                let e = self.across(node, outward);
+                let (out, along) = (axes * e.extend(0.0) * weight, axes * e.perp().extend(0.0) * weight);
+                let (cos, sin) = (e.x * e.x - e.y * e.y, 2.0 * e.x * e.y);
+                let map = DMat3::from_cols(out, out * cos - along * (0.5 * sin), out * sin + along * (0.5 * cos));
+                terms[count] = SideTerm { block: self.now.u.len() + node, map };
+                count += 1;
+            }
+        }
+        Side::new(0, &terms[..count]).unwrap_or(side)
+    }
+
+    /// Gathers the velocities of all slots, of a tube with a wall that gives.
+    pub(super) fn present_velocities(&mut self) {
+        let Some(wall) = &self.wall else { return };
+        let present = &mut self.unknowns.present;
+        present.clear();
+        present.extend(self.now.u.iter().chain(&wall.now.rate));
+    }
+
     /// Whether its own integrator makes a step of `h_s` seconds that nothing acts on; in contact all of them are implicit Euler.
     fn integrates_free_motion(&self, h_s: f64) -> bool {
         self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
@@ -285,7 +369,7 @@ impl Tube {
     fn advance_with(&mut self, v: &[DVec3], h_s: f64, unknowns: &Unknowns) -> bool {
         self.step_by(h_s, |stepper, now, setting, _| {
             let mut rise_j = unknowns.rise_j;
-            if v != unknowns.free {
+            if *v != unknowns.free[..v.len()] {
                 let problem = whole_step(setting, h_s);
                 stepper.rhs.clear();
                 stepper.rhs.extend_from_slice(v);
@@ -325,7 +409,28 @@ fn work_j(rows: &[Row], v: &[DVec3], free: &[DVec3]) -> f64 {
     rows.iter().enumerate().map(of_row).sum()
 }
 
+/// Nothing joins the centre line to a wall that gives within a step (eq. 66).
+impl Response for Tube {
+    fn respond(&self, impulses: &mut [DVec3]) {
+        let (rod, rates) = impulses.split_at_mut(self.now.u.len());
+        self.stepper.factor().solve(rod);
+        self.wall.iter().for_each(|wall| wall.factor().solve(rates));
+    }
+}
+
 impl Unknowns {
+    /// Adds the system of a wall that gives, with its solution.
+    fn take_wall(&mut self, wall: &Wall) {
+        let first = self.free.len();
+        let block = |(row, column, value): (usize, usize, DVec3)| Block {
+            row: first + row,
+            column: first + column,
+            value: DMat3::from_diagonal(value),
+        };
+        self.blocks.extend(wall.entries().map(block));
+        self.free.extend_from_slice(wall.free());
+    }
+
     /// Takes over a system with its solution, and the places of the nodes.
     fn take(&mut self, rows: &[Row], free: &[DVec3], places: &[DVec3]) {
         self.blocks.clear();

@@ -34,13 +34,14 @@ mod system;
 #[cfg(test)]
 mod tests;
 mod tube;
+mod wall;
 mod work_size;
 mod xpbd;
 
 pub use check::TubeError;
 pub use discretization::{SEGMENTS_MAX, SEGMENTS_MIN};
 pub use method::Integrator;
-pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec};
+pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec, WallModel};
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 
 /// The most substeps a scene may request per step: past it a step no longer runs in real time.

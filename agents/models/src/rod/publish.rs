@@ -41,6 +41,12 @@ impl Tube {
         curve.velocities.extend(self.now.u.iter().step_by(2));
         curve.frames.clone_from(&self.now.q);
         curve.radii_m.clear();
-        curve.radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_at_m(s)));
+        curve.flattening_m.clear();
+        if let Some(wall) = &self.wall {
+            curve.radii_m.extend((0..wall.now.shape.len()).map(|node| wall.mean_m(node)));
+            curve.flattening_m.extend((0..wall.now.shape.len()).map(|node| wall.flattening_m(node)));
+        } else {
+            curve.radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_at_m(s)));
+        }
     }
 }

@@ -36,10 +36,15 @@ pub struct TubeSpec {
     pub pin: [bool; 2],
     /// Springs along the length to the rest positions (a mesentery).
     pub attachments: Vec<Attachment>,
-    /// A travelling wave of the radius.
+    /// A travelling wave of the radius; of a wall that gives, of the tension that would narrow it so if nothing resisted.
     pub peristalsis: Option<Peristalsis>,
-    /// Inside minus outside pressure, Pa: widens the tube by dr = p r² (1 − ν/2) / (E t).
+    /// Whether its sections have freedoms of their own.
+    pub wall: WallModel,
+    /// Inside minus outside pressure, Pa: widens a prescribed wall by dr = p r² (1 − ν/2) / (E t), and a wall that gives by Lamé's law.
     pub pressure_pa: f64,
+    /// Whether a gas fills the tube that cannot leave: `pressure_pa` is then that in the undeformed tube, and p V = const from there on.
+    /// Only of a hollow tube with a wall that gives.
+    pub sealed: bool,
     /// Whether the tube collides with itself.
     pub self_contact: bool,
     /// Coulomb friction coefficient of its skin, ≥ 0; a pair takes the geometric mean.
@@ -48,6 +53,16 @@ pub struct TubeSpec {
     pub gravity: DVec3,
     /// Whether the tube may report that it is at rest.
     pub sleep: bool,
+}
+
+/// What a tube's sections do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum WallModel {
+    /// They stay round, and their radius is given: pressure and peristalsis widen and narrow them, and nothing else does.
+    #[default]
+    Prescribed,
+    /// They widen and flatten under pressure, bending, contact and the tension of their muscles (docs/theory/rod.md, section 15).
+    Gives,
 }
 
 /// A tube's section: dimensions, stiffnesses of stretch, shear, bend and twist, and inertia.
@@ -139,7 +154,9 @@ impl TubeSpec {
             pin: [false; 2],
             attachments: Vec::new(),
             peristalsis: None,
+            wall: WallModel::Prescribed,
             pressure_pa: 0.0,
+            sealed: false,
             self_contact: false,
             friction: 0.0,
             gravity: DVec3::ZERO,

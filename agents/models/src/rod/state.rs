@@ -5,7 +5,8 @@
 
 use super::discretization::Discretization;
 use super::rotation::{bend_share, director, log};
-use glam::{DQuat, DVec3};
+use super::wall::Softening;
+use glam::{DQuat, DVec2, DVec3};
 
 /// The material of the tube, as its solver needs it.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +62,10 @@ pub struct RodState {
     pub b: Vec<f64>,
     /// Elastic and gravity forces in slots (N and N·m); 2N + 1.
     pub force: Vec<DVec3>,
+    /// How the section at each joint bends, where walls give; else empty. Steps of the rod take it as it is.
+    pub softening: Vec<Softening>,
+    /// Curvature beyond rest at each joint in the axes of the segment before it, 1/m, where walls give; else empty.
+    pub curvature: Vec<DVec2>,
     /// Elastic energy, J.
     pub elastic_j: f64,
     /// Gravitational energy, J, zero at the origin.
@@ -97,6 +102,8 @@ impl RodState {
         self.u.clone_from(&other.u);
         self.t.clone_from(&other.t);
         self.e.clone_from(&other.e);
+        self.softening.clone_from(&other.softening);
+        self.curvature.clone_from(&other.curvature);
         let Self { elastic_j, gravity_j, kinetic_j, stretch, .. } = *other;
         (self.elastic_j, self.gravity_j, self.kinetic_j, self.stretch) = (elastic_j, gravity_j, kinetic_j, stretch);
     }
@@ -148,6 +155,9 @@ impl RodState {
 
     /// Moments of every joint, and of the walls that hold clamped ends (eq. 5, 6, 9).
     fn bend_and_twist(&mut self, matter: &RodMaterial, division: &Discretization) {
+        if !self.softening.is_empty() {
+            return self.bend_soft_sections(matter, division);
+        }
         let count = self.q.len();
         if matter.clamp[0] {
             let joint = Joint::between(division, 0, division.wall[0], self.q[0]);
@@ -164,6 +174,28 @@ impl RodState {
             let joint = Joint::between(division, count, self.q[count - 1], division.wall[1]);
             let moment = joint.moment(matter, self.t[count - 1], &mut self.elastic_j);
             self.force[2 * count - 1] += moment;
+        }
+    }
+
+    /// The same where walls give: a section that is flat bends more easily across its flat sides (eq. 62).
+    fn bend_soft_sections(&mut self, matter: &RodMaterial, division: &Discretization) {
+        let count = self.q.len();
+        self.curvature.clear();
+        self.curvature.resize(count + 1, DVec2::ZERO);
+        let first = usize::from(!matter.clamp[0]);
+        let last = if matter.clamp[1] { count } else { count - 1 };
+        for k in first..=last {
+            let before = if k == 0 { division.wall[0] } else { self.q[k - 1] };
+            let after = if k == count { division.wall[1] } else { self.q[k] };
+            let joint = Joint::between(division, k, before, after);
+            let (moment, curvature) = joint.soft_moment(matter, before, &self.softening[k], &mut self.elastic_j);
+            self.curvature[k] = curvature;
+            if k > 0 {
+                self.force[2 * k - 1] += moment;
+            }
+            if k < count {
+                self.force[2 * k + 1] -= moment;
+            }
         }
     }
 
@@ -216,10 +248,31 @@ impl Joint {
     /// The moment that turns the segment before the joint forward and the one after it back (eq. 6, 9).
     #[inline(always)]
     fn moment(&self, matter: &RodMaterial, axis: DVec3, energy_j: &mut f64) -> DVec3 {
-        let Self { theta, strain, inverse } = *self;
+        let Self { strain, inverse, .. } = *self;
         let m = (strain * matter.ei + axis * ((matter.gj - matter.ei) * axis.dot(strain))) * inverse;
         *energy_j += 0.5 * strain.dot(m);
-        let across = theta.cross(m);
-        m + across * 0.5 + theta.cross(across) * bend_share(theta.length_squared())
+        self.carried(m)
+    }
+
+    /// The same of a section that bends by `softening` in the axes of the segment `before`, and the curvature there, 1/m (eq. 62).
+    #[inline(always)]
+    fn soft_moment(
+        &self,
+        matter: &RodMaterial,
+        before: DQuat,
+        softening: &Softening,
+        energy_j: &mut f64,
+    ) -> (DVec3, DVec2) {
+        let own = before.conjugate() * self.strain * self.inverse;
+        let m = before * (softening.of(own.truncate()) * matter.ei).extend(matter.gj * own.z);
+        *energy_j += 0.5 * self.strain.dot(m);
+        (self.carried(m), own.truncate())
+    }
+
+    /// J⁻ᵀ m (eq. 6).
+    #[inline(always)]
+    fn carried(&self, m: DVec3) -> DVec3 {
+        let across = self.theta.cross(m);
+        m + across * 0.5 + self.theta.cross(across) * bend_share(self.theta.length_squared())
     }
 }

@@ -92,6 +92,7 @@ impl Stepper {
     /// # Errors
     /// [`Divergence`] where the next state is not finite; `now` is then the last state that was.
     pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Divergence> {
+        self.take_sections(now);
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
         let (mut elapsed, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
@@ -125,13 +126,19 @@ impl Stepper {
         Ok(taken)
     }
 
+    /// Lets the states that a step leads to bend as `now` does: sections change between steps.
+    pub(super) fn take_sections(&mut self, now: &RodState) {
+        self.next.softening.clone_from(&now.softening);
+        self.ahead.softening.clone_from(&now.softening);
+    }
+
     /// Discards all data by node and segment: the tube was divided anew.
     pub fn forget(&mut self) {
         self.factor.forget();
         self.past.forget();
     }
 
-    /// The factor of the last substep; without slots where the division has changed since.
+    /// The factor of the last substep of the centre line; without slots where the division has changed since.
     pub fn factor(&self) -> &Factor {
         &self.factor
     }

@@ -64,6 +64,7 @@ impl Doubling {
             again.state.b.clone_from(&now.b);
             again.past.copy_from(&stepper.past);
         }
+        again.state.softening.clone_from(&now.softening);
         again.ties.clear();
         again.ties.extend_from_slice(ties);
     }

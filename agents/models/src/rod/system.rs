@@ -9,7 +9,8 @@ use super::discretization::Discretization;
 use super::method::Integrator;
 use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
-use glam::{DMat3, DVec3};
+use super::wall::Softening;
+use glam::{DMat3, DQuat, DVec3};
 
 /// All inputs of a substep except the state.
 #[derive(Clone, Copy)]
@@ -99,11 +100,16 @@ fn fill_segments(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) 
 fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
     let SubstepProblem { matter, division, .. } = *problem;
     let (h2, count) = (problem.h * problem.h, at.q.len());
+    let soft = |k: usize, axis: DVec3| {
+        let axes = if k == 0 { division.wall[0] } else { at.q[k - 1] };
+        softened(&at.softening[k], axes, axis) * (h2 * division.joint[k] * matter.ei)
+    };
     let stiffness = |k: usize, axis: DVec3| {
         let size = axis.length_squared();
         let scale = h2 * division.joint[k];
         let twist = if size > 0.0 { scale * (matter.gj - matter.ei) / size } else { 0.0 };
-        Sym3::identity(scale * matter.ei) + Sym3::outer(axis, twist)
+        let round = Sym3::identity(scale * matter.ei) + Sym3::outer(axis, twist);
+        if at.softening.is_empty() { round } else { round + soft(k, axis) }
     };
     if matter.clamp[0] {
         rows[1].diag += stiffness(0, at.t[0]);
@@ -117,6 +123,17 @@ fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
     if matter.clamp[1] {
         rows[2 * count - 1].diag += stiffness(count, at.t[count - 1]);
     }
+}
+
+/// What the softening of a section adds to its relative bend stiffness (eq. 62), in world axes, from the axes of the segment before it.
+/// Across the mean director it takes away no more than there is.
+fn softened(softening: &Softening, axes: DQuat, director: DVec3) -> Sym3 {
+    let Softening { mean, oval } = *softening;
+    let across = |v: DVec3| v - director * (director.dot(v) / director.length_squared().max(f64::MIN_POSITIVE));
+    let (x, y) = (across(axes * DVec3::X), across(axes * DVec3::Y));
+    let (sum, difference) = (x + y, x - y);
+    let straight = Sym3::outer(x, mean - 1.0 + oval.x) + Sym3::outer(y, mean - 1.0 - oval.x);
+    straight + Sym3::outer(sum, 0.5 * oval.y) + Sym3::outer(difference, -0.5 * oval.y)
 }
 
 /// r = M (v_n − v_i) − h c M v_i + h f (eq. 11), the spin of v_n turned by its own gyroscopic torque (eq. 19).

@@ -15,7 +15,8 @@ use super::rest_curve::RestCurve;
 use super::state::{RodMaterial, RodState};
 use super::step::{Divergence, Setting, Stepper, energy};
 use super::step_doubling::Doubling;
-use super::{Section, TubeSpec};
+use super::wall::{Wall, WallLaw};
+use super::{Section, TubeSpec, WallModel};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
@@ -38,6 +39,10 @@ pub struct Tube {
     remesher: Remesher,
     /// Numbers of attachments that no longer hold it.
     pub(super) let_go: Vec<u32>,
+    /// Its sections, where they give.
+    pub(super) wall: Option<Wall>,
+    /// By how much its muscles alone would narrow each node in the step begun, metres.
+    pub(super) squeeze_m: Vec<f64>,
     pub(super) springs: Vec<NodeSpring>,
     pub(super) ties: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
@@ -79,6 +84,11 @@ impl Tube {
         let division = Discretization::first(&skeleton, count);
         let matter = matter_of(&spec);
         let mut now = RodState::at_rest(&division);
+        let wall = match spec.wall {
+            WallModel::Prescribed => None,
+            WallModel::Gives => Some(Wall::round(WallLaw::of(&spec.section), division.segments() + 1)),
+        };
+        wall.iter().for_each(|wall| wall.soften(&mut now.softening));
         now.strain(&matter, &division);
         let form = CollisionShape { kind: ShapeKind::Chain, friction: spec.friction, restitution: 0.0 };
         let mut tube = Self {
@@ -92,6 +102,8 @@ impl Tube {
             stepper: Stepper::default(),
             remesher: Remesher::default(),
             let_go: vec![],
+            wall,
+            squeeze_m: vec![],
             springs: vec![],
             ties: vec![],
             grips: vec![],
@@ -105,6 +117,7 @@ impl Tube {
             unknowns: Unknowns::default(),
         };
         tube.lay_out_springs();
+        tube.present_velocities();
         Ok(tube)
     }
 
@@ -152,10 +165,35 @@ impl Tube {
         self.now.stretch
     }
 
-    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravitational, zero at the origin.
+    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravitational, zero at the origin; of a tube whose wall gives also
+    /// that of the wall and of what fills it, zero in the undeformed tube.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
-        energy(&self.now, &self.springs)
+        let rod_j = energy(&self.now, &self.springs);
+        self.wall.as_ref().map_or(rod_j, |wall| rod_j + wall.energy_j(&self.division, self.filling()))
+    }
+
+    /// Sets the pressure inside minus outside, Pa, while it runs; of a sealed tube that of its gas in the undeformed tube, as if more had
+    /// been let in.
+    ///
+    /// # Errors
+    /// [`TubeError::OutOfRange`] for a pressure that a new tube would not take; it then keeps the one it has.
+    pub fn set_pressure_pa(&mut self, pressure_pa: f64) -> Result<(), TubeError> {
+        let before = std::mem::replace(&mut self.spec.pressure_pa, pressure_pa);
+        if let Err(error) = check(&self.spec) {
+            self.spec.pressure_pa = before;
+            return Err(error);
+        }
+        self.rest.wake();
+        self.at_rest = false;
+        Ok(())
+    }
+
+    /// The pressure inside minus outside, Pa: of a sealed tube as its gas is compressed now.
+    #[must_use]
+    pub fn pressure_pa(&self) -> f64 {
+        let given = self.spec.pressure_pa;
+        self.wall.as_ref().map_or(given, |wall| wall.pressure_pa(&self.division, self.filling()))
     }
 
     /// Warnings to the user about the present state: one sentence each, normally none.
@@ -173,24 +211,32 @@ impl Tube {
         list
     }
 
-    /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
+    /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34); the mean of a section that is
+    /// not round.
     #[must_use]
     pub fn radius_at_m(&self, arc_m: f64) -> f64 {
-        self.radius_at_time_m(arc_m, self.time)
+        let Some(wall) = &self.wall else { return self.radius_at_time_m(arc_m, self.time) };
+        let (left, share) = self.division.locate(arc_m);
+        wall.mean_m(left) * (1.0 - share) + wall.mean_m(left + 1) * share
     }
 
-    /// The same at another time.
+    /// The prescribed radius at a time.
     pub(super) fn radius_at_time_m(&self, arc_m: f64, time: SimTime) -> f64 {
-        let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
-        let Some(wave) = self.spec.peristalsis else { return radius };
+        pressed_radius_m(&self.spec.section, self.spec.pressure_pa) * (1.0 - self.contraction_at(arc_m, time))
+    }
+
+    /// By what share of the radius its wave contracts it at a time, as far as nothing resists.
+    pub(super) fn contraction_at(&self, arc_m: f64, time: SimTime) -> f64 {
+        let Some(wave) = self.spec.peristalsis else { return 0.0 };
         let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.wave_from_s)) / wave.wavelength_m;
         let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
-        radius * (1.0 - wave.amplitude * lift)
+        wave.amplitude * lift
     }
 
-    /// The largest radius that its skin can have, metres.
+    /// The largest radius that its skin can have now, metres.
     pub(super) fn widest_m(&self) -> f64 {
-        pressed_radius_m(&self.spec.section, self.spec.pressure_pa)
+        let Some(wall) = &self.wall else { return pressed_radius_m(&self.spec.section, self.spec.pressure_pa) };
+        (0..wall.now.shape.len()).map(|node| wall.reach_m(node)).fold(0.0, f64::max)
     }
 
     /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
@@ -201,6 +247,18 @@ impl Tube {
         let mut doubling = std::mem::take(&mut self.doubling);
         self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
         self.doubling = doubling;
+    }
+
+    /// A step of the wall that nothing touches, after that of the centre line.
+    fn step_wall(&mut self, dt_s: f64, then: SimTime) -> Result<(), Divergence> {
+        self.begin_wall(dt_s, then)?;
+        let finite = self.wall.as_ref().is_none_or(|wall| wall.stays_finite(wall.free(), dt_s));
+        if !finite {
+            return Err(Divergence { slot: None });
+        }
+        self.end_wall(None, dt_s);
+        self.present_velocities();
+        Ok(())
     }
 
     fn record_grips(&mut self, dt: f64) {
@@ -224,6 +282,9 @@ impl Tube {
 
     /// Whether it has been quiet for long enough after a step of `dt` seconds, as far as it can tell by itself.
     pub(super) fn observe_rest(&mut self, dt: f64) -> bool {
+        if !self.has_quiet_wall() {
+            self.rest.wake();
+        }
         self.spec.sleep && !self.has_wave() && self.rest.observe(&self.now, dt)
     }
 
@@ -231,6 +292,7 @@ impl Tube {
     pub(super) fn stop(&mut self) {
         self.now.u.fill(DVec3::ZERO);
         self.now.kinetic_j = 0.0;
+        self.wall.iter_mut().for_each(Wall::stop);
     }
 
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
@@ -239,7 +301,7 @@ impl Tube {
             self.rest.wake();
             return false;
         }
-        let at_rest = self.rest.observe(&self.now, dt);
+        let at_rest = self.observe_rest(dt);
         if at_rest {
             self.doubling.rest();
             self.stop();
@@ -265,6 +327,7 @@ impl Tube {
 
     /// Replaces the state, for violent starts; its strains are recomputed.
     pub(super) fn set_state(&mut self, mut state: RodState) {
+        self.wall.iter().for_each(|wall| wall.soften(&mut state.softening));
         state.strain(&self.matter, &self.division);
         self.now = state;
     }
@@ -295,6 +358,7 @@ impl Agent for Tube {
         let substeps = taken.map_err(|divergence| self.diverged(divergence, dt_s))?;
         self.repeat_step(dt_s, substeps);
         self.record_grips(dt_s);
+        self.step_wall(dt_s, context.time + dt).map_err(|divergence| self.diverged(divergence, dt_s))?;
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * dt_s);
         self.time = context.time + dt;
         self.steps += 1;
@@ -329,10 +393,15 @@ impl Agent for Tube {
         let mut next = RodState::default();
         let old = MeshedRod { state: &self.now, division: &old };
         self.remesher.transfer(&self.matter, old, &mut next, &self.division);
+        if let Some(wall) = &mut self.wall {
+            wall.transfer(old.division, &self.division);
+            wall.soften(&mut next.softening);
+        }
         next.strain(&self.matter, &self.division);
         self.now = next;
         self.lay_out_springs();
         self.stepper.forget();
+        self.present_velocities();
         self.rest.wake();
         self.at_rest = false;
     }

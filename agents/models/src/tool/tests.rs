@@ -35,6 +35,7 @@ fn tube() -> Neighbour {
         velocities: vec![DVec3::ZERO; 3],
         frames: vec![DQuat::IDENTITY; 2],
         radii_m: vec![0.01; 3],
+        flattening_m: vec![],
     };
     Neighbour::observed(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
 }

@@ -23,3 +23,4 @@ mod table;
 mod tearing;
 mod tools;
 mod tubes;
+mod walls;

@@ -79,7 +79,8 @@ struct PipelineBuilder<'a> {
     shadow_taps: u32,
 }
 
-const SAMPLE_STRIDE: u64 = 64;
+const SAMPLE_STRIDE: u64 = 72;
+const BODY_STRIDE: u64 = 64;
 const CORNER_STRIDE: u64 = 32;
 
 /// Cells along a side of the floor's shadowed patch, and rings around it; the shader uses the same numbers.
@@ -89,10 +90,16 @@ const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
 const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
 
 /// The sample at which an interval of a tube begins.
-const BEGIN: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
+const BEGIN: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4, 11 => Float32x2];
 /// The one at which it ends.
-const END: [wgpu::VertexAttribute; 4] =
-    wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
+const END: [wgpu::VertexAttribute; 5] = [
+    wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x4, offset: 0, shader_location: 7 },
+    wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x4, offset: 16, shader_location: 8 },
+    wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x4, offset: 32, shader_location: 9 },
+    wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x2, offset: 48, shader_location: 10 },
+    // past the colours, which are those of the beginning
+    wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x2, offset: 64, shader_location: 12 },
+];
 /// A mesh's corner.
 const CORNER: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 9 => Float32x2];
 /// The corner at the end of its geomorph.
@@ -127,7 +134,7 @@ impl Pipelines {
         ];
         let solids = [
             layout(CORNER_STRIDE, vertex, &CORNER),
-            layout(SAMPLE_STRIDE, instance, &BODY),
+            layout(BODY_STRIDE, instance, &BODY),
             layout(CORNER_STRIDE, vertex, &CORNER_TO),
         ];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
@@ -240,7 +247,7 @@ impl<'a> PipelineBuilder<'a> {
         let tip = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
         let buffers = [
             layout(32, wgpu::VertexStepMode::Vertex, &tip),
-            layout(SAMPLE_STRIDE, wgpu::VertexStepMode::Instance, &BODY),
+            layout(BODY_STRIDE, wgpu::VertexStepMode::Instance, &BODY),
         ];
         let topology = wgpu::PrimitiveTopology::TriangleList;
         [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {

@@ -187,6 +187,7 @@ fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
         velocities: vec![DVec3::ZERO; 21],
         frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); 20],
         radii_m: vec![0.1; 21],
+        flattening_m: vec![],
         arc_m,
     });
     stage.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);

@@ -131,6 +131,7 @@ pub fn folded_tube(n: usize) -> CurveState {
         velocities: vec![DVec3::ZERO; n + 1],
         frames: (0..n).map(|i| DQuat::from_rotation_arc(DVec3::Z, chord(i))).collect(),
         radii_m: arc_m.iter().map(|s| 0.0195 * (1.0 - 0.13 * (TAU * s / 0.11).cos())).collect(),
+        flattening_m: vec![],
         arc_m,
         positions,
     }

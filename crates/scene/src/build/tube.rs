@@ -3,13 +3,13 @@
 use super::object::ModelContext;
 use super::{FRICTION, POSITION_MAX_M, TEARING};
 use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
+use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile, Wall};
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::SUBSTEPS_MAX;
 use metachron_models::rod::Tube;
-use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec};
+use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec, WallModel};
 
 /// Most points of a path.
 const PATH_MAX: usize = 100_000;
@@ -64,6 +64,8 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         pin,
         attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
         peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
+        wall: wall(c, place, file),
+        sealed: sealed(c, place, file, &section),
         pressure_pa: c.optional(place, "pressure_pa", file.pressure_pa, &allowed(0.0..=1e7, "Pa")).unwrap_or(0.0),
         self_contact: file.self_contact.unwrap_or(true),
         friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
@@ -81,6 +83,27 @@ const fn integrator(file: Method) -> Integrator {
         Method::Bdf2 => Integrator::Bdf2,
         Method::EnergyMomentum => Integrator::EnergyMomentum,
     }
+}
+
+/// What the sections do; a wall that gives needs steps that take its bend as it is then.
+fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
+    if file.wall != Some(Wall::Gives) {
+        return WallModel::Prescribed;
+    }
+    if let Some(method @ (Method::SymplecticEuler | Method::Xpbd)) = file.integrator {
+        let what = format!("is \"gives\", which `{}` has no steps for", integrator(method).name());
+        c.wrong(place, "wall", what, "expected `integrator` to be \"implicit-euler\", \"bdf2\" or \"energy-momentum\"");
+    }
+    WallModel::Gives
+}
+
+/// Whether the tube is closed: what is shut in needs room, and walls that give.
+fn sealed(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, section: &Section) -> bool {
+    let sealed = file.sealed.unwrap_or(false);
+    if sealed && (file.wall != Some(Wall::Gives) || section.wall_m >= section.radius_m) {
+        c.wrong(place, "sealed", "is true", "expected false, or `wall = \"gives\"` and a `wall_m` below `radius_m`");
+    }
+    sealed
 }
 
 /// Reports a longest step that is too long for the tube's integrator (docs/theory/rod.md, 13).

@@ -60,10 +60,15 @@ pub struct TubeFile {
     pub pin: Option<Vec<End>>,
     /// Springs between parts of the tube and their rest positions (a mesentery).
     pub attach: Option<Vec<AttachFile>>,
-    /// A travelling wave of the radius.
+    /// A travelling wave of the radius; where the wall gives, of the tension that would narrow it so if nothing resisted.
     pub peristalsis: Option<PeristalsisFile>,
+    /// What the sections do. Default `prescribed`.
+    pub wall: Option<Wall>,
     /// Pressure inside relative to outside, Pa, 0 … 1e7: widens the tube. Default 0.
     pub pressure_pa: Option<f64>,
+    /// Whether a gas fills the tube that cannot leave: `pressure_pa` is then that in the undeformed tube, and rises as the tube is squeezed.
+    /// Only of a hollow tube whose wall gives. Default false.
+    pub sealed: Option<bool>,
     /// Whether the tube collides with itself. Default true.
     pub self_contact: Option<bool>,
     /// Coulomb friction coefficient of the surface, 0 … 10; a pair takes the geometric mean. Default 0.2.
@@ -78,6 +83,16 @@ pub enum End {
     Start,
     /// Where the path ends.
     End,
+}
+
+/// What the sections of a tube do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Wall {
+    /// They stay round, and pressure and peristalsis alone set their radius.
+    Prescribed,
+    /// They widen and flatten under pressure, bending and contact; not with `symplectic-euler` and `xpbd`.
+    Gives,
 }
 
 /// Time integrator of a tube.

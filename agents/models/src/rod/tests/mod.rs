@@ -8,6 +8,7 @@ mod remesh;
 mod statics;
 mod strained;
 mod violent;
+mod wall;
 
 use super::state::RodState;
 use super::*;

@@ -1,5 +1,5 @@
 // The skin of a tube: a cylinder patch bent between the frames at the two ends of an interval.
-// Hermite's cubic through both ends, the normal turned least between them, the radius likewise: a C¹ surface.
+// Hermite's cubic through both ends, the normal turned least between them, the radius likewise: a C¹ surface where sections are round.
 
 struct Patch {
     @location(0) at: vec4f, // u along, turn around, its cosine and sine
@@ -13,6 +13,8 @@ struct Patch {
     @location(8) slope_b: vec4f,
     @location(9) normal_b: vec4f,
     @location(10) arc_b: vec2f,
+    @location(11) flat_a: vec2f,
+    @location(12) flat_b: vec2f,
     @builtin(instance_index) interval: u32,
 }
 
@@ -47,10 +49,18 @@ fn bend(in: Patch) -> Bent {
     let t = slope.xyz / speed;
     let across = mix(in.normal_a.xyz, in.normal_b.xyz, u);
     let n = normalize(across - t * dot(across, t));
-    let out = n * in.at.z + cross(t, n) * in.at.w;
+    let across_n = cross(t, n);
+    let out = n * in.at.z + across_n * in.at.w;
+    let side = across_n * in.at.z - n * in.at.w;
+    // a section that is not round: its second harmonic, linear between both ends
+    let twice = vec2f(in.at.z * in.at.z - in.at.w * in.at.w, 2.0 * in.at.z * in.at.w);
+    let flattening = mix(in.flat_a, in.flat_b, u);
+    let radius = max(place.w + dot(flattening, twice), 0.0);
+    let widens = slope.w + dot(in.flat_b - in.flat_a, twice) / h;
+    let turns = 2.0 * (flattening.y * twice.x - flattening.x * twice.y) / max(radius, 1e-9);
     var b: Bent;
-    b.p = place.xyz + out * max(place.w, 0.0);
-    b.n = normalize(out - t * (slope.w / speed));
+    b.p = place.xyz + out * radius;
+    b.n = normalize(out - t * (widens / speed) - side * turns);
     b.t = t;
     return b;
 }
