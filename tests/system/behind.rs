@@ -32,16 +32,63 @@ fn put_off(scene: &str, seconds: &str, (model, step_us): (&str, u32)) -> Value {
     report
 }
 
+/// A soft slab that is grown to its bed, a marble that falls on it, a closed tool that presses into it.
+const SLAB: &str = r#"
+[[object]]
+name = "organ"
+model = "solid"
+shape = "box"
+size_m = [0.18, 0.12, 0.06]
+segments = [9, 6, 3]
+young_pa = 1.2e4
+poisson = 0.4
+density_kg_m3 = 1050.0
+damping_per_s = 4.0
+position_m = [0.0, 0.0, 0.03]
+hold = ["bottom"]
+friction = 0.4
+rate_hz = 100.0
+
+[[object]]
+name = "probe"
+model = "tool"
+grasps = []
+rate_hz = 120.0
+keyframe = [
+    { at_s = 0.0, tip_m = [0.03, 0.0, 0.12], rotation_deg = [180.0, 0.0, 0.0], jaw = 0.0 },
+    { at_s = 1.0, tip_m = [0.03, 0.0, 0.075] },
+    { at_s = 2.0, tip_m = [0.03, 0.0, 0.043] },
+]
+
+[[object]]
+name = "marble"
+model = "rigid"
+shape = "ball"
+radius_m = 0.014
+position_m = [-0.04, 0.0, 0.078]
+density_kg_m3 = 2500.0
+rate_hz = 240.0
+
+[[object]]
+name = "table"
+model = "rigid"
+shape = "plane"
+
+[[probe]]
+object = "marble"
+"#;
+
 #[test]
 fn a_marble_stays_on_an_organ_that_steps_at_a_quarter_of_its_rate() {
     // 6.9 cm at the full rate
-    let at = slowed("organ", "2", ("solid", 10), "marble");
+    let at = slowed(Folder::with(SLAB).scene(), "2", ("solid", 10), "marble");
     assert!(at[2] > 0.06, "{at:?}");
 }
 
 #[test]
 fn a_marble_waits_for_an_organ_whose_step_is_held_up() {
     // as a system does that gives a thread no time: the organ's step takes 30 to 200 ms, once, before or after the marble lands
+    let folder = Folder::with(SLAB);
     for (begin_s, held_ms) in [(0.0, 30), (0.0, 80), (0.0, 150), (0.02, 80), (0.03, 150), (0.4, 80), (0.4, 200)] {
         let load = format!("[{{at_s={begin_s},factor={}}},{{at_s={},factor=1}}]", held_ms / 3, begin_s + 0.01);
         let step_load = format!("machine.step_load={load}");
@@ -55,7 +102,7 @@ fn a_marble_waits_for_an_organ_whose_step_is_held_up() {
             "--set",
             &step_load,
         ];
-        let report = lockstep("organ", &[&["--seconds", "2"], &slow[..]].concat());
+        let report = lockstep(folder.scene(), &[&["--seconds", "2"], &slow[..]].concat());
         let probes = report["probes"].as_array().unwrap();
         let marble = probes.iter().position(|probe| probe["object"] == "marble").unwrap();
         let at = point(&report, &format!("/probes/{marble}/position_m"));

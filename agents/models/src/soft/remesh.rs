@@ -28,9 +28,8 @@ struct Kept {
 }
 
 impl SoftBody {
-    /// The resolution that it has; `None` where its division never changes.
+    /// The resolution of its cage; `None` of a lattice.
     pub(super) fn present_resolution(&self) -> Option<Resolution> {
-        self.spec.resolutions()?;
         let skin = self.skin.as_ref()?;
         Some(Resolution { eps_m: skin.cage.cell_m().max_element(), n: self.level })
     }
