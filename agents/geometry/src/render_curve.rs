@@ -308,6 +308,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; 5],
             frames: Vec::new(),
             radii_m: vec![0.1; 5],
+            flattening_m: vec![],
             arc_m,
             positions,
         };
@@ -361,6 +362,7 @@ mod tests {
             velocities: vec![DVec3::ZERO; n + 1],
             frames: (0..n).map(|i| DQuat::from_rotation_z(rate * (i as f64 + 0.5) / n as f64)).collect(),
             radii_m: vec![0.01; n + 1],
+            flattening_m: vec![],
             arc_m,
         };
         let mut skeleton = Skeleton::default();
@@ -403,5 +405,25 @@ mod tests {
         assert_eq!(intervals(1.0, 5.0), 1);
         assert_eq!(intervals(1.0, f64::NAN), 1);
         assert_eq!(intervals(1.0, 0.0), INTERVALS_MAX);
+    }
+
+    #[test]
+    fn a_flat_section_lies_where_its_own_axes_say() {
+        let arc_m: Vec<f64> = (0..5).map(f64::from).collect();
+        // sections turned by 0.3 rad about a straight curve, flattened along their own x
+        let curve = CurveState {
+            positions: arc_m.iter().map(|&s| DVec3::Z * s).collect(),
+            velocities: vec![DVec3::ZERO; 5],
+            frames: (0..4).map(|k| DQuat::from_rotation_z(0.3 * f64::from(k))).collect(),
+            radii_m: vec![0.1; 5],
+            flattening_m: vec![DVec2::new(0.02, 0.0); 5],
+            arc_m,
+        };
+        let mut skeleton = Skeleton::default();
+        for frame in skeleton.rebuild(&curve, 0.5) {
+            // in the direction of the section's x the radius is larger by all of it
+            let (sin, cos) = (libm::sin(2.0 * frame.twist_rad), libm::cos(2.0 * frame.twist_rad));
+            assert!((frame.flattening_m - DVec2::new(0.02 * cos, 0.02 * sin)).length() < 1e-15, "{frame:?}");
+        }
     }
 }
