@@ -406,4 +406,24 @@ mod tests {
         assert_eq!(intervals(1.0, f64::NAN), 1);
         assert_eq!(intervals(1.0, 0.0), INTERVALS_MAX);
     }
+
+    #[test]
+    fn a_flat_section_lies_where_its_own_axes_say() {
+        let arc_m: Vec<f64> = (0..5).map(f64::from).collect();
+        // sections turned by 0.3 rad about a straight curve, flattened along their own x
+        let curve = CurveState {
+            positions: arc_m.iter().map(|&s| DVec3::Z * s).collect(),
+            velocities: vec![DVec3::ZERO; 5],
+            frames: (0..4).map(|k| DQuat::from_rotation_z(0.3 * f64::from(k))).collect(),
+            radii_m: vec![0.1; 5],
+            flattening_m: vec![DVec2::new(0.02, 0.0); 5],
+            arc_m,
+        };
+        let mut skeleton = Skeleton::default();
+        for frame in skeleton.rebuild(&curve, 0.5) {
+            // in the direction of the section's x the radius is larger by all of it
+            let (sin, cos) = (libm::sin(2.0 * frame.twist_rad), libm::cos(2.0 * frame.twist_rad));
+            assert!((frame.flattening_m - DVec2::new(0.02 * cos, 0.02 * sin)).length() < 1e-15, "{frame:?}");
+        }
+    }
 }
