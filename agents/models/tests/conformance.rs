@@ -11,6 +11,7 @@ use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
+use metachron_models::soft::{SoftBody, SoftMatter, SoftShape, SoftSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -248,6 +249,38 @@ fn a_synthetic_agent_keeps_every_promise() {
         resolutions: [0.08, 0.04, 0.02, 0.01].map(|eps_m| Resolution { eps_m, n: 1 }).to_vec(),
         converging: Some((&make, 1)),
         allocations: Some((&count, 0.0)),
+        ..Suite::new(&make, DT)
+    };
+    assert_eq!(check(&suite), []);
+}
+
+#[test]
+fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
+    let surface = Arc::new(SoftShape::Ball { radius_m: 0.1, segments: 8 }.skin().unwrap());
+    let make = || {
+        let shape = SoftShape::Embedded { surface: surface.clone(), eps_m: 0.05, range_m: (0.025, 0.1) };
+        let matter =
+            SoftMatter { young_pa: 2e4, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.0, damping_s: 0.0 };
+        let spec = SoftSpec {
+            shape,
+            matter,
+            position: DVec3::Z,
+            rotation: DQuat::from_rotation_x(0.3),
+            velocity: DVec3::ZERO,
+            held: vec![],
+            friction: 0.3,
+            gravity: GRAVITY,
+            self_contact: false,
+            sleep: false,
+        };
+        Box::new(SoftBody::new(spec).unwrap()) as Box<dyn Agent>
+    };
+    let spacings = [0.1, 0.05, 0.034, 0.025].map(|eps_m| Resolution { eps_m, n: 0 });
+    let suite = Suite {
+        closed_form: Some((&falls, 1e-6)), // conjugate gradients end at 5e-8 m/s
+        pull: Some(hand(Anchor::Vertex(3), DVec3::new(0.2, 0.1, 1.2))),
+        absurd: absurd(Anchor::Vertex(0)),
+        resolutions: spacings.to_vec(),
         ..Suite::new(&make, DT)
     };
     assert_eq!(check(&suite), []);

@@ -66,6 +66,8 @@ impl SoftBody {
         self.free.clone_from(&self.velocities);
         self.keep_momentum(&before);
         self.relax(before.energy_j);
+        // nodes that have moved have other arms
+        self.keep_momentum(&before);
         self.slow(before.energy_j);
         self.woken();
     }

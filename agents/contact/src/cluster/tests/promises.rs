@@ -1,7 +1,7 @@
 //! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
 
 use super::{Case, contact, rigid};
-use crate::cluster::{Block, Hold, JointRow, ProblemError, Side, SideTerm, Solver, Way};
+use crate::cluster::{Block, Hold, JointRow, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver, Way};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;
 
@@ -47,8 +47,8 @@ fn what_is_wrong_is_named() {
     for (message, wanted) in reasons {
         assert!(message.contains(wanted), "{message} lacks {wanted}");
     }
-    let terms = [SideTerm::weighted(0, 1.0); 5];
-    assert_eq!(Side::new(0, &terms), Err(ProblemError::LongSide { terms: 5 }));
+    let terms = [SideTerm::weighted(0, 1.0); SIDE_TERMS_MAX + 1];
+    assert_eq!(Side::new(0, &terms), Err(ProblemError::LongSide { terms: SIDE_TERMS_MAX + 1 }));
 }
 
 #[test]
