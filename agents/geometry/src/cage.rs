@@ -207,18 +207,16 @@ impl Cage {
         while next < reached.len() {
             let from = reached[next];
             next += 1;
-            let place = self.place(from);
             let mut stride = 1;
-            for axis in 0..3 {
-                let beside = [
-                    (place[axis] > 0).then(|| from - stride),
-                    (place[axis] + 1 < self.counts[axis]).then(|| from + stride),
-                ];
-                for to in beside.into_iter().flatten().filter(|to| self.cell_at[*to] == NONE).collect::<Vec<_>>() {
-                    self.cell_at[to] = self.cell_at[from];
-                    reached.push(to);
+            for (at, count) in self.place(from).into_iter().zip(self.counts) {
+                let beside = [(at > 0).then(|| from - stride), (at + 1 < count).then(|| from + stride)];
+                for to in beside.into_iter().flatten() {
+                    if self.cell_at[to] == NONE {
+                        self.cell_at[to] = self.cell_at[from];
+                        reached.push(to);
+                    }
                 }
-                stride *= self.counts[axis];
+                stride *= count;
             }
         }
     }

@@ -31,9 +31,7 @@ fn sag(shape: SoftShape, young_pa: f64, gravity: DVec3) -> f64 {
     let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], gravity, ..spec(shape) }).unwrap();
     let start = state(&body);
     run(&mut body, 0.01, 600);
-    let moved =
-        state(&body).positions.iter().zip(&start.positions).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max);
-    moved
+    state(&body).positions.iter().zip(&start.positions).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max)
 }
 
 #[test]
