@@ -55,7 +55,7 @@ fn a_strip_that_folds_lies_on_itself_in_layers() {
         let spec = strip(touches_itself);
         let (rest, triangles) = lattice(&spec);
         let mut table = Table::new(vec![placed(SoftBody::new(spec).unwrap(), false)]).at_rates(480.0, 480.0);
-        let findings = table.play(2.0);
+        let findings = table.play(1.2);
         found.push((least_gap_m(&skin(&table, 0), &rest, &triangles, 0.04), findings));
     }
     let [(own_m, findings), (through_m, _)] = found[..] else { panic!() };
@@ -78,7 +78,7 @@ fn the_legs_of_a_horseshoe_meet_and_bear() {
     let rest = surface.points.clone();
     let plate = block(DVec3::new(0.09, 0.0, 0.076), DVec3::new(0.03, 0.03, 0.005), 0.1, 0.0);
     let mut table = Table::new(vec![placed(SoftBody::new(spec).unwrap(), true), plate]).at_rates(480.0, 480.0);
-    let findings = table.play(1.5);
+    let findings = table.play(1.0);
     assert!(findings.rest_m < 0.05e-3, "{} m deep", findings.rest_m);
     // the legs touch: the slot of 2 cm is closed at its mouth, and none has gone through the other
     let now = skin(&table, 0);
