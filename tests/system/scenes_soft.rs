@@ -118,12 +118,13 @@ fn stl(surface: &Triangles, text: bool) -> Vec<u8> {
 const STL: &str = "[[object]]\nname = \"s\"\nmodel = \"solid\"\nshape = \"mesh\"\nfile = \"s.stl\"\n";
 
 #[test]
-fn a_solid_from_an_stl_file_in_millimetres_lies_on_the_floor_with_its_weight() {
+fn a_solid_from_an_stl_file_in_millimetres_lies_on_a_scale_with_its_weight() {
     let surface = generate_surface(Generator::Sphere, 0, 1200);
     let small = Triangles { points: surface.points.iter().map(|p| *p * 0.05).collect(), triangles: surface.triangles };
-    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n";
+    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n\
+        [[object]]\nname = \"scale\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.1, 0.1, 0.01]\nposition_m = [0, 0, 0.01]\n";
     for text in [true, false] {
-        let keys = "scale = 0.001\neps_m = 0.02\nyoung_pa = 3e4\ndamping_per_s = 3\nposition_m = [0, 0, 0.051]\n";
+        let keys = "scale = 0.001\neps_m = 0.02\nyoung_pa = 3e4\ndamping_per_s = 3\nposition_m = [0, 0, 0.071]\n";
         let folder = Folder::with(&format!("{STL}{keys}{floor}"));
         std::fs::write(folder.file("s.stl"), stl(&small, text)).unwrap();
         let report = folder.lockstep(&["--seconds", "2"]);
