@@ -50,7 +50,7 @@ pub struct Snapshot {
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
     pub bonds: Vec<AgentId>,
-    /// Attachments that have torn since the start; each is told by one of its two agents.
+    /// Attachments that have torn since the start; each is reported by one of its two agents.
     pub torn: Vec<TornAttachment>,
 }
 

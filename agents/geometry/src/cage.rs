@@ -73,10 +73,11 @@ pub struct Cage {
     node_at: Vec<u32>,
 }
 
-/// Cells along each axis of a cage about `size_m` with cells of at most `eps_m`.
+/// Cells along each axis of a cage about a surface with cells of at most `eps_m`.
 #[must_use]
-pub fn cage_counts(size_m: DVec3, eps_m: f64) -> [usize; 3] {
-    size_m.to_array().map(|size| ((size / eps_m) * (1.0 - 1e-9)).ceil().clamp(1.0, 1e6) as usize)
+pub fn cage_counts(surface: &Triangles, eps_m: f64) -> [usize; 3] {
+    let Aabb { low, high } = Aabb::of(&surface.points);
+    (high - low).to_array().map(|size| ((size / eps_m) * (1.0 - 1e-9)).ceil().clamp(1.0, 1e6) as usize)
 }
 
 impl Cage {
@@ -85,7 +86,7 @@ impl Cage {
     #[must_use]
     pub fn new(surface: &Triangles, eps_m: f64, nodes_max: usize) -> Option<Self> {
         let Aabb { low, high } = Aabb::of(&surface.points);
-        let counts = cage_counts(high - low, eps_m);
+        let counts = cage_counts(surface, eps_m);
         // what is inside fills no less than a hundredth of any box around an organ: far more places than nodes are a mistake
         let places = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count))?;
         if places > nodes_max.saturating_mul(200) {

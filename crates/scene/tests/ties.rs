@@ -152,7 +152,7 @@ fn what_a_joint_held_together_falls_and_parts_once_it_has_torn() {
     let (holding, _) = play("10.8");
     assert_eq!((holding[0].0.torn.len(), holding[1].1), (0, Some(AgentId(0))), "1.1 times its weight");
     let (torn, hash) = play("8.8");
-    // it is told by the joint's first body alone, with its weight
+    // the joint's first body alone reports it, with its weight
     let [event] = torn[0].0.torn[..] else { panic!("{:?}", torn[0].0.torn) };
     assert_eq!((event.attachment, event.with), (AttachmentId::Joint(1), Some(AgentId(1))));
     // joints hold to 5 µm: in a step of 1/240 s up to 0.3 N of 1 kg, and 1.2 mm/s afterwards

@@ -15,8 +15,8 @@ pub struct Event {
 
 /// The events that the agents in `states`, by rising numbers, tell of.
 pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Event> {
-    let told = |(agent, state): (AgentId, &'a Snapshot)| state.torn.iter().map(move |&torn| Event { agent, torn });
-    let mut events: Vec<Event> = (0..).map(AgentId).zip(states).flat_map(told).collect();
+    let reported = |(agent, state): (AgentId, &'a Snapshot)| state.torn.iter().map(move |&torn| Event { agent, torn });
+    let mut events: Vec<Event> = (0..).map(AgentId).zip(states).flat_map(reported).collect();
     events.sort_by_key(|event| (event.torn.at, event.torn.attachment, event.agent));
     events
 }

@@ -196,10 +196,7 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
         SoftShape::Sheet { segments, .. } => segments.to_vec(),
         SoftShape::Box { segments, .. } => segments.to_vec(),
         SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
-        SoftShape::Embedded { surface, eps_m, .. } => {
-            let Aabb { low, high } = Aabb::of(&surface.points);
-            cage_counts(high - low, *eps_m).map(|count| count as u32).to_vec()
-        }
+        SoftShape::Embedded { surface, eps_m, .. } => cage_counts(surface, *eps_m).map(|count| count as u32).to_vec(),
     }
 }
 

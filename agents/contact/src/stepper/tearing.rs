@@ -1,7 +1,7 @@
 //! Attachments that tear: what gave more than it can bear over a macro step is gone from the next one on.
 //!
 //! In: rows with the impulses that they gave, what members say of their own attachments. Out: what tore; its members remember nothing of it
-//! but that. Never here: what a row is made of, who is told. Theory: docs/theory/clusters.md, eq. 28.
+//! but that. Never here: what a row is made of, how events are reported. Theory: docs/theory/clusters.md, eq. 28.
 
 use super::memory::{Partner, UnfinishedLoad};
 use super::ties::RowOwner;

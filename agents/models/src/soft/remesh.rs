@@ -10,7 +10,7 @@ use super::system::Purpose;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::Resolution;
-use metachron_geometry::{Aabb, Cage, cage_counts};
+use metachron_geometry::{Cage, cage_counts};
 
 /// Spans of the steps from rest that give up elastic energy, seconds: the first, and how many, each twice as long as the one before.
 const RELAX_S: f64 = 1e-3;
@@ -41,9 +41,8 @@ impl SoftBody {
         };
         let wanted = range.clamp(wanted);
         self.level = wanted.n;
-        let Aabb { low, high } = Aabb::of(&surface.points);
         let counts = self.skin.as_ref().map(|skin| skin.cage.counts());
-        if counts == Some(cage_counts(high - low, wanted.eps_m)) {
+        if counts == Some(cage_counts(surface, wanted.eps_m)) {
             return;
         }
         if let Some(cage) = Cage::new(surface, wanted.eps_m, VERTICES_MAX as usize) {

@@ -3,7 +3,7 @@
 use super::grid::Side;
 use glam::{DQuat, DVec3};
 use metachron_core::ResolutionRange;
-use metachron_geometry::{Aabb, Triangles, cage_counts, is_closed};
+use metachron_geometry::{Triangles, cage_counts, is_closed};
 use std::sync::Arc;
 
 /// A soft body before it is built.
@@ -175,8 +175,7 @@ impl SoftShape {
             Self::Box { segments: [x, y, z], .. } => along(*x).saturating_mul(along(*y)).saturating_mul(along(*z)),
             Self::Ball { segments, .. } => along(*segments).saturating_pow(3),
             Self::Embedded { surface, eps_m, .. } => {
-                let Aabb { low, high } = Aabb::of(&surface.points);
-                let along = cage_counts(high - low, *eps_m).map(|count| count as u64 + 1);
+                let along = cage_counts(surface, *eps_m).map(|count| count as u64 + 1);
                 along.into_iter().fold(1, u64::saturating_mul)
             }
             Self::Rope { segments, .. } => along(*segments),

@@ -107,17 +107,9 @@ fn mesh_of(
     if file.seed.is_some() && file.generate.is_none() {
         c.wrong(place, "seed", "has no effect alone", "expected `generate` beside it");
     }
-    let made_from = match (&file.file, file.generate) {
-        (Some(name), None) => name.clone(),
-        (None, Some(kind)) => format!("{kind:?}"),
-        (Some(_), Some(_)) => {
-            c.wrong(place, "generate", "contradicts `file`", "expected one of them");
-            return None;
-        }
-        (None, None) => {
-            c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table");
-            return None;
-        }
+    let made_from = match surface_source(c, place, file.file.as_deref(), file.generate)? {
+        SurfaceSource::File(name) => name.to_owned(),
+        SurfaceSource::Generated(kind) => format!("{kind:?}"),
     };
     let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
     if let Some((mesh, reach)) = meshes.made.get(&key) {
@@ -167,6 +159,30 @@ fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, scale: f64, reac
         c.wrong(place, key, format_args!("makes it too large: {why}"), "expected a mesh within the bounds of a scene");
     }
     within.is_ok()
+}
+
+/// Where the triangles of a surface come from.
+pub(super) enum SurfaceSource<'a> {
+    /// A file, by its path relative to the scene's.
+    File(&'a str),
+    /// A generator.
+    Generated(GeneratorKind),
+}
+
+/// The one of `file` and `generate` that a table has; `None` where it has both or neither, which is reported.
+pub(super) fn surface_source<'a>(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: Option<&'a str>,
+    generate: Option<GeneratorKind>,
+) -> Option<SurfaceSource<'a>> {
+    match (file, generate) {
+        (Some(name), None) => return Some(SurfaceSource::File(name)),
+        (None, Some(kind)) => return Some(SurfaceSource::Generated(kind)),
+        (Some(_), Some(_)) => c.wrong(place, "generate", "contradicts `file`", "expected one of them"),
+        (None, None) => c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table"),
+    }
+    None
 }
 
 pub(super) const fn generator(kind: GeneratorKind) -> Generator {

@@ -3,7 +3,7 @@
 use super::mesh::{self, Mesh};
 use super::object::ModelContext;
 use super::rigid::rotation;
-use super::scenery::generator;
+use super::scenery::{SurfaceSource, generator, surface_source};
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
@@ -199,19 +199,11 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
     let place = context.place;
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), &allowed(4.0..=1e5, "")) as u32);
-    let (key, read) = match (&file.file, file.generate) {
-        (Some(name), None) => ("file", context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale))),
-        (None, Some(kind)) => {
+    let (key, read) = match surface_source(c, place, file.file.as_deref(), file.generate)? {
+        SurfaceSource::File(name) => ("file", context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale))),
+        SurfaceSource::Generated(kind) => {
             let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), count.unwrap_or(4000));
             ("generate", Ok(Mesh { points: made.points, uvs: vec![], triangles: made.triangles }))
-        }
-        (Some(_), Some(_)) => {
-            c.wrong(place, "generate", "contradicts `file`", "expected one of them");
-            return None;
-        }
-        (None, None) => {
-            c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table");
-            return None;
         }
     };
     let name = file.file.as_deref().unwrap_or("its surface");
