@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::time::Instant;
 
 const WARM_UP: u32 = 20;
@@ -12,14 +12,26 @@ const STEPS: u32 = 40;
 fn main() {
     for cells in [4, 6, 8, 10, 12, 15, 19] {
         let shape = SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] };
-        let matter =
-            SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, damping_s: 0.0 };
+        let matter = SoftMatter {
+            young_pa: 12e3,
+            poisson: 0.4,
+            density_kg_m3: 1050.0,
+            damping_per_s: 0.2,
+            damping_s: 0.0,
+            law: MaterialLaw::Corotational,
+        };
         step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, matter, Side::Bottom);
     }
     for cells in [10, 20, 30, 60] {
         let shape = SoftShape::Sheet { size_m: [0.3; 2], thickness_m: 0.004, segments: [cells; 2] };
-        let matter =
-            SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 0.2, damping_s: 0.0 };
+        let matter = SoftMatter {
+            young_pa: 1e5,
+            poisson: 0.3,
+            density_kg_m3: 1050.0,
+            damping_per_s: 0.2,
+            damping_s: 0.0,
+            law: MaterialLaw::Corotational,
+        };
         step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, matter, Side::Left);
     }
 }

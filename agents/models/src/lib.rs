@@ -24,5 +24,6 @@ mod limits;
 pub mod rigid;
 pub mod rod;
 pub mod soft;
+mod symmetric;
 pub mod synthetic;
 pub mod tool;

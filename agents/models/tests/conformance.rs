@@ -11,7 +11,7 @@ use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
-use metachron_models::soft::{SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -259,8 +259,14 @@ fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
     let surface = Arc::new(SoftShape::Ball { radius_m: 0.1, segments: 8 }.skin().unwrap());
     let make = || {
         let shape = SoftShape::Embedded { surface: surface.clone(), eps_m: 0.1, range_m: (0.034, 0.1) };
-        let matter =
-            SoftMatter { young_pa: 2e4, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.0, damping_s: 0.0 };
+        let matter = SoftMatter {
+            young_pa: 2e4,
+            poisson: 0.4,
+            density_kg_m3: 1050.0,
+            damping_per_s: 0.0,
+            damping_s: 0.0,
+            law: MaterialLaw::Corotational,
+        };
         let spec = SoftSpec {
             shape,
             matter,

@@ -8,6 +8,7 @@ use metachron_lod::control::PRIMITIVE_LEVELS;
 use metachron_models::soft::{SoftBody, SoftShape, SoftSpec};
 use metachron_render::{Form, ROPE_LEVEL};
 use metachron_world::Spec;
+use std::collections::BTreeSet;
 
 /// The form of an agent.
 pub(super) fn form(spec: &Spec) -> Form {
@@ -50,6 +51,14 @@ pub(super) fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
 fn soft_triangles(shape: &SoftShape) -> u32 {
     match shape {
         SoftShape::Embedded { surface, .. } => surface.triangles.len() as u32,
+        SoftShape::Tetrahedra { mesh, .. } => mesh.boundary().len() as u32,
+        // both faces, and two for each edge of the rim
+        SoftShape::Shell { surface, .. } => {
+            let sides = || surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+            let known: BTreeSet<[u32; 2]> = sides().collect();
+            let rim = sides().filter(|[a, b]| !known.contains(&[*b, *a])).count();
+            2 * (surface.triangles.len() + rim) as u32
+        }
         SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
         SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
         SoftShape::Ball { segments: n, .. } => 12 * n * n,

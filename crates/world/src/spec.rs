@@ -9,7 +9,7 @@ use metachron_contact::Agent;
 use metachron_core::{Body, CurveState, ResolutionRange, Snapshot};
 use metachron_geometry::{Aabb, cage_counts};
 use metachron_models::rod::{Integrator, Tube, TubeSpec};
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
 
 /// How an agent is divided into elements, and how its steps are integrated.
@@ -161,6 +161,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
             density_kg_m3: tube.section.mass_per_length_kg_m / area_m2,
             damping_per_s: tube.damping_per_s,
             damping_s: 0.0,
+            law: MaterialLaw::Corotational,
         },
         position: DVec3::ZERO,
         rotation: glam::DQuat::IDENTITY,
@@ -197,6 +198,7 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
         SoftShape::Box { segments, .. } => segments.to_vec(),
         SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
         SoftShape::Embedded { surface, eps_m, .. } => cage_counts(surface, *eps_m).map(|count| count as u32).to_vec(),
+        SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => Vec::new(),
     }
 }
 
@@ -213,6 +215,8 @@ fn set_cells(shape: &mut SoftShape, most: u32) {
             *eps_m = (high - low).max_element() / f64::from(most.max(1));
             *range_m = (*eps_m, *eps_m);
         }
+        // a mesh is taken as it is
+        SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => {}
     }
 }
 

@@ -6,9 +6,12 @@ use super::bar::Bar;
 use super::bending::BendingElement;
 use super::grid::Grid;
 use super::hexahedron::{Hexahedron, HexahedronKind};
+use super::material::Law;
 use super::membrane::Membrane;
+use super::shell_bending::ShellBending;
 use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::system::System;
+use super::tetrahedron::Tetrahedron;
 use glam::{DQuat, DVec2, DVec3};
 use metachron_geometry::narrow_phase::VoronoiRegions;
 use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles};
@@ -23,16 +26,22 @@ pub(super) struct FeMesh {
     /// Whether each vertex is fixed.
     pub held: Vec<bool>,
     bars: Vec<Bar>,
-    membranes: Vec<Membrane>,
+    pub(super) membranes: Vec<Membrane>,
     bending: Vec<BendingElement>,
+    pub(super) shells: Vec<ShellBending>,
+    pub(super) tetrahedra: Vec<Tetrahedron>,
+    /// The materials of the tetrahedra.
+    pub(super) laws: Vec<Law>,
     hexahedra: Vec<Hexahedron>,
     kinds: Vec<HexahedronKind>,
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     rows: Vec<([u32; 3], f64)>,
-    triangles: Vec<[u32; 3]>,
-    /// Pairs of vertices whose distance says how far a step bends the body: of a lattice those of its skin.
-    edges: Vec<[u32; 2]>,
-    radius_m: f64,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// The edges of its skin; of a cage those of its cells.
+    pub(super) edges: Vec<[u32; 2]>,
+    /// Pairs of vertices whose distance says how far a step bends the body, where its edges do not say all.
+    pub(super) stretched: Vec<[u32; 2]>,
+    pub(super) radius_m: f64,
 }
 
 impl FeMesh {
@@ -86,6 +95,8 @@ impl FeMesh {
             SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
             SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
             SoftShape::Embedded { .. } => {} // its mesh is that of a cage
+            SoftShape::Tetrahedra { mesh, regions } => return Self::tetrahedral(mesh, regions, spec),
+            SoftShape::Shell { surface, thickness_m } => return Self::shell(surface, *thickness_m, spec),
             SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.matter),
         }
         let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
@@ -230,7 +241,7 @@ impl FeMesh {
 
     /// The system of this body.
     pub fn system(&mut self, positions: &[DVec3]) -> System {
-        let (held, bulky) = (self.held.clone(), !self.hexahedra.is_empty());
+        let (held, bulky) = (self.held.clone(), self.is_solid());
         System::new(&held, bulky, |system| self.add(positions, system))
     }
 
@@ -239,21 +250,34 @@ impl FeMesh {
         self.bars.iter().for_each(|bar| bar.add(positions, system));
         self.membranes.iter().for_each(|membrane| membrane.add(positions, system));
         self.bending.iter().for_each(|element| element.add(positions, system));
+        self.shells.iter().for_each(|element| element.add(positions, system));
         for hexahedron in &mut self.hexahedra {
             let kind = &self.kinds[hexahedron.kind];
-            let firm = hexahedron.follow(kind, positions);
-            hexahedron.add(kind, positions, firm, system);
+            let mean = hexahedron.follow(kind, positions);
+            hexahedron.add(kind, positions, &mean, system);
+        }
+        for element in &mut self.tetrahedra {
+            let deformation = element.follow(positions);
+            element.add(&self.laws[element.material], &deformation, system);
         }
     }
 
-    /// The rotations of the cells, from which they are followed on.
+    /// Whether it fills a volume.
+    pub fn is_solid(&self) -> bool {
+        !(self.hexahedra.is_empty() && self.tetrahedra.is_empty())
+    }
+
+    /// The rotations of the cells and tetrahedra, from which they are followed on.
     pub fn turns(&self) -> impl Iterator<Item = DQuat> + '_ {
-        self.hexahedra.iter().map(|cell| cell.turn)
+        let cells = self.hexahedra.iter().map(|cell| cell.turn);
+        cells.chain(self.tetrahedra.iter().map(|element| element.turn))
     }
 
     /// Sets the rotations of the cells back to `turns`.
     pub fn set_turns(&mut self, turns: &[DQuat]) {
-        self.hexahedra.iter_mut().zip(turns).for_each(|(cell, turn)| cell.turn = *turn);
+        let cells = self.hexahedra.iter_mut().map(|cell| &mut cell.turn);
+        let all = cells.chain(self.tetrahedra.iter_mut().map(|element| &mut element.turn));
+        all.zip(turns).for_each(|(own, turn)| *own = *turn);
     }
 
     /// Elastic energy, J; uses updated rotations of the cells.
@@ -263,16 +287,21 @@ impl FeMesh {
         let bending: f64 = self.bending.iter().map(|element| element.energy_j(positions)).sum();
         let hexahedra = self.hexahedra.iter().map(|hexahedron| {
             let mut hexahedron = *hexahedron;
-            hexahedron.follow(&self.kinds[hexahedron.kind], positions);
-            hexahedron.energy_j(&self.kinds[hexahedron.kind], positions)
+            let mean = hexahedron.follow(&self.kinds[hexahedron.kind], positions);
+            hexahedron.energy_j(&self.kinds[hexahedron.kind], positions, &mean)
         });
-        bars + membranes + bending + hexahedra.sum::<f64>()
+        let tetrahedra = self.tetrahedra.iter().map(|element| {
+            let deformation = { *element }.follow(positions);
+            element.energy_j(&self.laws[element.material], &deformation)
+        });
+        let shells: f64 = self.shells.iter().map(|element| element.energy_j(positions)).sum();
+        bars + membranes + bending + shells + hexahedra.sum::<f64>() + tetrahedra.sum::<f64>()
     }
 
     /// The largest change of sag of three vertices in a row against rest, metres: the error of straight pieces.
     pub fn residual_m(&self, positions: &[DVec3]) -> f64 {
         // a rope bends freely: the loss of a kink is no error
-        let slack = self.membranes.is_empty() && self.hexahedra.is_empty();
+        let slack = self.membranes.is_empty() && !self.is_solid();
         let sag = |(row, rest): &([u32; 3], f64)| {
             let now = sagitta(*row, positions).length();
             let beyond = (now - rest).abs();
@@ -286,7 +315,8 @@ impl FeMesh {
         let share = |&[a, b]: &[u32; 2]| {
             velocity(a).distance(velocity(b)) * h / self.rest[a as usize].distance(self.rest[b as usize])
         };
-        self.edges.iter().map(share).fold(0.0, f64::max)
+        let edges = if self.stretched.is_empty() { &self.edges } else { &self.stretched };
+        edges.iter().map(share).fold(0.0, f64::max)
     }
 
     /// The skin of a lattice, as others touch it.
@@ -299,14 +329,14 @@ impl FeMesh {
             edges: self.edges.clone().into(),
             triangles: self.triangles.clone().into(),
             radius_m: self.radius_m,
-            closed: !self.hexahedra.is_empty(),
+            closed: self.is_solid(),
             fans: VoronoiRegions::of(&self.edges, &self.triangles).into(),
         }
     }
 
     /// Number of elements.
     pub fn elements(&self) -> usize {
-        self.bars.len() + self.membranes.len() + self.hexahedra.len()
+        self.bars.len() + self.membranes.len() + self.hexahedra.len() + self.tetrahedra.len()
     }
 }
 
@@ -331,7 +361,11 @@ pub(super) fn skin_of(shape: &SoftShape) -> Option<Triangles> {
     match shape {
         SoftShape::Box { size_m, .. } => mesh.place(&grid, |share| *size_m * share),
         SoftShape::Ball { radius_m, .. } => mesh.place(&grid, |share| ball(share) * *radius_m),
-        SoftShape::Sheet { .. } | SoftShape::Embedded { .. } | SoftShape::Rope { .. } => return None,
+        SoftShape::Sheet { .. }
+        | SoftShape::Embedded { .. }
+        | SoftShape::Tetrahedra { .. }
+        | SoftShape::Shell { .. }
+        | SoftShape::Rope { .. } => return None,
     }
     mesh.skin(&grid);
     let mut number = vec![u32::MAX; mesh.rest.len()];
@@ -348,7 +382,7 @@ pub(super) fn skin_of(shape: &SoftShape) -> Option<Triangles> {
 }
 
 /// The edges of all triangles, each once, its lesser vertex first.
-fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+pub(super) fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let sides = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
     let mut edges: Vec<_> = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
     edges.sort_unstable();

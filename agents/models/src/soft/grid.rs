@@ -54,7 +54,10 @@ impl Side {
         let axes = match shape {
             SoftShape::Rope { .. } => 1,
             SoftShape::Sheet { .. } => 2,
-            SoftShape::Box { .. } | SoftShape::Embedded { .. } => 3,
+            SoftShape::Box { .. }
+            | SoftShape::Embedded { .. }
+            | SoftShape::Tetrahedra { .. }
+            | SoftShape::Shell { .. } => 3,
             SoftShape::Ball { .. } => 0,
         };
         self.place().0 < axes
@@ -77,7 +80,8 @@ impl Grid {
             SoftShape::Sheet { segments: [x, y], .. } => [x, y, 0],
             SoftShape::Box { segments, .. } => segments,
             SoftShape::Ball { segments, .. } => [segments; 3],
-            SoftShape::Embedded { .. } => [0; 3], // it has a cage
+            // these have a cage or a mesh
+            SoftShape::Embedded { .. } | SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => [0; 3],
         };
         let cells = cells.map(|count| count as usize);
         let mut axes = [2, 1, 0];

@@ -1,8 +1,10 @@
-//! A cell of a solid: eight vertices, linear elasticity in corotated axes.
+//! A cell of a solid: eight vertices, linear elasticity in corotated axes, or another law of its mean deformation.
 //!
-//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the incompatible modes of (TBW76)
+//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14, 31: the incompatible modes of (TBW76)
 //! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
+use super::deformation::{ConstantStrain, Deformation, follow_turn, outer};
+use super::material::{Lame, Law, Material};
 use super::spec::SoftMatter;
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
@@ -15,8 +17,11 @@ pub(super) struct HexahedronKind {
     rest: [DVec3; 8],
     /// Mean gradient of each corner's share, 1/m.
     gradients: [DVec3; 8],
-    /// Stiffness between corners, N/m.
+    /// Stiffness between corners, N/m: without that of the mean deformation where a law has that.
     stiffness: Box<[[DMat3; 8]; 8]>,
+    /// The law of the mean deformation; none where it is a part of the stiffness.
+    law: Option<Law>,
+    volume_m3: f64,
     /// The volume that belongs to each corner, m³.
     pub volumes_m3: [f64; 8],
 }
@@ -38,13 +43,6 @@ pub(super) struct Hexahedron {
 const MODES: usize = 11;
 /// Coordinate of the Gauss points along each axis.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-/// Most Newton iterations for a cell's rotation: it needs three, more where a cell is turned inside out.
-const TURN_TRIES: usize = 30;
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
-
 /// The place of a corner in the cell's own coordinates, −1 … 1.
 fn corner(i: usize) -> DVec3 {
     let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -63,9 +61,7 @@ fn slopes(at: DVec3) -> [DVec3; 8] {
 impl HexahedronKind {
     /// The kind of a cell with these corners at rest, metres.
     pub fn new(corners: [DVec3; 8], matter: &SoftMatter) -> Self {
-        let SoftMatter { young_pa, poisson, .. } = *matter;
-        let mu = 0.5 * young_pa / (1.0 + poisson);
-        let lambda = young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
+        let Lame { mu, lambda } = Lame::of(matter);
         let jacobian = |at: DVec3| slopes(at).iter().zip(&corners).fold(DMat3::ZERO, |j, (s, x)| j + outer(*x, *s));
         let middle = jacobian(DVec3::ZERO);
         let mut whole = [[DMat3::ZERO; MODES]; MODES];
@@ -98,7 +94,20 @@ impl HexahedronKind {
         dilatation.add(lambda, &mut whole);
         let gradients = gradients.map(|g| g / volume);
         let rest = corners.map(|x| x - corners[0]);
-        Self { rest, gradients, stiffness: Box::new(condensed(&whole)), volumes_m3 }
+        let mut stiffness = Box::new(condensed(&whole));
+        let law = match Law::of(matter) {
+            Law::Corotational(_) => None,
+            law @ Law::Ogden(_) => Some(law),
+        };
+        if law.is_some() {
+            for (ga, row) in gradients.iter().zip(stiffness.iter_mut()) {
+                for (gb, block) in gradients.iter().zip(row) {
+                    let round = DMat3::from_diagonal(DVec3::splat(mu * ga.dot(*gb)));
+                    *block -= (outer(*gb, *ga) * mu + round + outer(*ga, *gb) * lambda) * volume;
+                }
+            }
+        }
+        Self { rest, gradients, stiffness, law, volume_m3: volume, volumes_m3 }
     }
 
     /// Whether two kinds are equal up to rounding.
@@ -196,29 +205,15 @@ struct Bent {
 }
 
 impl Hexahedron {
-    /// Updates the rotation of the cell, by Newton's method on the trace of RᵀF from the last rotation on (eq. 12); returns the matrix
-    /// that maps a change of F to a further rotation.
-    pub fn follow(&mut self, kind: &HexahedronKind, positions: &[DVec3]) -> DMat3 {
-        let mut f = DMat3::ZERO;
-        for (vertex, gradient) in self.vertices.iter().zip(&kind.gradients) {
-            f += outer(positions[*vertex as usize] - positions[self.vertices[0] as usize], *gradient);
-        }
-        let mut firm = DMat3::ZERO;
-        for _ in 0..TURN_TRIES {
-            let h = f * DMat3::from_quat(self.turn).transpose();
-            let twist = DVec3::new(h.y_axis.z - h.z_axis.y, h.z_axis.x - h.x_axis.z, h.x_axis.y - h.y_axis.x);
-            let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
-            let slope = DMat3::from_diagonal(DVec3::splat(trace)) - (h + h.transpose()) * 0.5;
-            let minor = slope.x_axis.x * slope.y_axis.y - slope.x_axis.y * slope.y_axis.x;
-            let solid = slope.x_axis.x > 0.0 && minor > 0.0 && slope.determinant() > 1e-9;
-            firm = if solid { slope.inverse() } else { DMat3::ZERO };
-            let by = if solid { firm * twist } else { twist / (trace.abs() + 1.0) };
-            if by.length_squared() < 1e-28 || !by.is_finite() {
-                break;
-            }
-            self.turn = (DQuat::from_scaled_axis(by.clamp_length_max(1.0)) * self.turn).normalize();
-        }
-        firm
+    const fn strain<'a>(&self, kind: &'a HexahedronKind) -> ConstantStrain<'a, 8> {
+        ConstantStrain { vertices: self.vertices, gradients: &kind.gradients, volume_m3: kind.volume_m3 * self.fill }
+    }
+
+    /// Updates the rotation of the cell; returns how it is deformed on the mean.
+    pub fn follow(&mut self, kind: &HexahedronKind, positions: &[DVec3]) -> MeanDeformation {
+        let f = self.strain(kind).gradient(positions);
+        let firm = follow_turn(&mut self.turn, f);
+        MeanDeformation { f, firm }
     }
 
     fn bent(&self, kind: &HexahedronKind, positions: &[DVec3]) -> Bent {
@@ -233,25 +228,45 @@ impl Hexahedron {
         Bent { turn, by, force }
     }
 
-    /// Adds its forces and stiffness at these positions; `firm` is the result of [`Self::follow`] (eq. 13, 14).
-    pub fn add(&self, kind: &HexahedronKind, positions: &[DVec3], firm: DMat3, system: &mut System) {
+    /// Adds its forces and stiffness at these positions; `mean` is the result of [`Self::follow`] (eq. 13, 14, 31).
+    pub fn add(&self, kind: &HexahedronKind, positions: &[DVec3], mean: &MeanDeformation, system: &mut System) {
         let Bent { turn, force, .. } = self.bent(kind, positions);
         let origin = positions[self.vertices[0] as usize];
         let arms = self.vertices.map(|vertex| positions[vertex as usize] - origin);
         let torque: DVec3 = arms.iter().zip(force).map(|(arm, f)| arm.cross(turn * f)).sum();
-        let turning = firm * torque;
+        let turning = mean.firm * torque;
         let filled = turn * self.fill;
         for (i, &row) in self.vertices.iter().enumerate() {
             system.push(row, turning.cross(turn * kind.gradients[i]) - turn * force[i]);
+        }
+        let bending = |i: usize, j: usize| filled * kind.stiffness[i][j] * turn.transpose();
+        if let Some(law) = &kind.law {
+            let deformation = Deformation::of(mean.f, self.turn);
+            return self.strain(kind).add(law, &deformation, system, bending);
+        }
+        for (i, &row) in self.vertices.iter().enumerate() {
             for (j, &column) in self.vertices.iter().enumerate().filter(|(_, column)| row >= **column) {
-                system.stiffen(row, column, filled * kind.stiffness[i][j] * turn.transpose());
+                system.stiffen(row, column, bending(i, j));
             }
         }
     }
 
-    /// Elastic energy, J.
-    pub fn energy_j(&self, kind: &HexahedronKind, positions: &[DVec3]) -> f64 {
+    /// Elastic energy, J; `mean` is the result of [`Self::follow`].
+    pub fn energy_j(&self, kind: &HexahedronKind, positions: &[DVec3], mean: &MeanDeformation) -> f64 {
         let Bent { by, force, .. } = self.bent(kind, positions);
-        0.5 * by.iter().zip(force).map(|(u, f)| u.dot(f)).sum::<f64>()
+        let bending = 0.5 * by.iter().zip(force).map(|(u, f)| u.dot(f)).sum::<f64>();
+        let stretching = kind.law.as_ref().map_or(0.0, |law| {
+            let stretches = Deformation::of(mean.f, self.turn).stretches;
+            law.respond(stretches).energy * kind.volume_m3 * self.fill
+        });
+        bending + stretching
     }
+}
+
+/// The mean deformation of a cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MeanDeformation {
+    f: DMat3,
+    /// What maps a change of F to a further rotation.
+    firm: DMat3,
 }

@@ -9,14 +9,18 @@ mod anchor_springs;
 mod bar;
 mod bending;
 mod body;
+mod deformation;
 mod fe_mesh;
 mod gradients;
 mod grid;
 mod hexahedron;
+mod material;
 mod member;
 mod membrane;
+mod meshed;
 mod publish;
 mod remesh;
+mod shell_bending;
 mod skin;
 mod spec;
 mod step;
@@ -24,7 +28,8 @@ mod step_doubling;
 mod system;
 #[cfg(test)]
 mod tests;
+mod tetrahedron;
 
 pub use body::SoftBody;
 pub use grid::Side;
-pub use spec::{SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+pub use spec::{MaterialLaw, RegionMatter, SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};

@@ -1,9 +1,10 @@
 //! Specification of a soft body: its properties and initial state, the numbers a scene gives, and their checks.
 
 use super::grid::Side;
+use super::material::Lame;
 use glam::{DQuat, DVec3};
 use metachron_core::ResolutionRange;
-use metachron_geometry::{Triangles, cage_counts, is_closed};
+use metachron_geometry::{Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed};
 use std::sync::Arc;
 
 /// A soft body before it is built.
@@ -44,6 +45,32 @@ pub struct SoftMatter {
     pub damping_per_s: f64,
     /// Stiffness-proportional damping of Rayleigh, s, 0 … 10: stresses lag behind strains by this time.
     pub damping_s: f64,
+    /// How stress follows from strain; sheets and ropes have laws of their own.
+    pub law: MaterialLaw,
+}
+
+/// How the stress of a solid follows from its strain. Near rest all are the law of Hooke with the same E and ν.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum MaterialLaw {
+    /// Linear in strains that turn with the body: cheapest, for strains of some 20 %.
+    #[default]
+    Corotational,
+    /// Stable Neo-Hookean (SGK18): rubber-like, and it comes back from inside out.
+    NeoHookean,
+    /// The law of Ogden (Ogd72) of one term: with a large exponent it stiffens as tissue does.
+    Ogden {
+        /// The exponent, 1 … 20 or −20 … −1; 2 is Neo-Hookean.
+        exponent: f64,
+    },
+}
+
+/// The material of a region of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RegionMatter {
+    /// The number of the region in the mesh.
+    pub region: i64,
+    /// Its material. The damping of a body is that of all of it.
+    pub matter: SoftMatter,
 }
 
 /// The shapes of soft bodies in their own axes.
@@ -81,6 +108,20 @@ pub enum SoftShape {
         eps_m: f64,
         /// The finest and the coarsest one that it may take, metres.
         range_m: (f64, f64),
+    },
+    /// Tetrahedra as a mesh gives them, linear in each.
+    Tetrahedra {
+        /// The mesh in the body's own axes.
+        mesh: Arc<Tetrahedra>,
+        /// Regions of another material than the body's.
+        regions: Vec<RegionMatter>,
+    },
+    /// A sheet of a triangle mesh, of whatever shape at rest.
+    Shell {
+        /// The mesh in the body's own axes, metres; it may be open.
+        surface: Arc<Triangles>,
+        /// Thickness, metres.
+        thickness_m: f64,
     },
     /// A rope along a path.
     Rope {
@@ -128,6 +169,21 @@ pub enum SoftError {
         /// What is wrong with it.
         why: &'static str,
     },
+    /// Tetrahedra that make no solid.
+    #[error("the mesh cannot be a solid: {0}")]
+    BadTetrahedra(#[from] TetrahedraFault),
+    /// A surface that makes no sheet.
+    #[error("the surface of the sheet {why}")]
+    BadSheet {
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// The law of Ogden with this exponent pushes back less the more it is compressed.
+    #[error("the exponent {exponent} of Ogden needs a larger Poisson's ratio: λ + 2 μ/exponent must be positive")]
+    Unstable {
+        /// The exponent.
+        exponent: f64,
+    },
     /// A cage has more vertices than a step can take.
     #[error(
         "a cage of cells of {eps_m} m has more than the {VERTICES_MAX} vertices that are supported: use a larger ε"
@@ -154,8 +210,8 @@ impl SoftShape {
     #[must_use]
     pub const fn model(&self) -> &'static str {
         match self {
-            Self::Sheet { .. } => "sheet",
-            Self::Box { .. } | Self::Ball { .. } | Self::Embedded { .. } => "solid",
+            Self::Sheet { .. } | Self::Shell { .. } => "sheet",
+            Self::Box { .. } | Self::Ball { .. } | Self::Embedded { .. } | Self::Tetrahedra { .. } => "solid",
             Self::Rope { .. } => "rope",
         }
     }
@@ -178,6 +234,8 @@ impl SoftShape {
                 let along = cage_counts(surface, *eps_m).map(|count| count as u64 + 1);
                 along.into_iter().fold(1, u64::saturating_mul)
             }
+            Self::Tetrahedra { mesh, .. } => mesh.points.len() as u64,
+            Self::Shell { surface, .. } => surface.points.len() as u64,
             Self::Rope { segments, .. } => along(*segments),
         }
     }
@@ -205,6 +263,14 @@ impl SoftShape {
                     length(what, value)?;
                 }
                 return check_surface(surface);
+            }
+            Self::Tetrahedra { mesh, regions } => {
+                mesh.check()?;
+                regions.iter().try_for_each(|region| region.matter.check())?;
+            }
+            Self::Shell { surface, thickness_m } => {
+                length("the thickness", *thickness_m)?;
+                check_sheet(surface)?;
             }
             Self::Rope { path_m, radius_m, segments } => {
                 length("the radius", *radius_m)?;
@@ -239,17 +305,36 @@ fn check_surface(surface: &Triangles) -> Result<(), SoftError> {
     if volume_m3 > 0.0 { Ok(()) } else { no("encloses no volume") }
 }
 
-impl SoftSpec {
-    /// The resolutions that it may take; none where its division never changes.
-    pub(super) fn resolutions(&self) -> Option<ResolutionRange> {
-        let SoftShape::Embedded { range_m, .. } = &self.shape else { return None };
-        (range_m.0 < range_m.1).then_some(ResolutionRange { eps_m: *range_m, n: (0, metachron_core::N_MAX) })
+/// Whether a surface can be a sheet: triangles with areas, at most two at an edge, every point in one of them.
+fn check_sheet(surface: &Triangles) -> Result<(), SoftError> {
+    let no = |why| Err(SoftError::BadSheet { why });
+    let Triangles { points, triangles } = surface;
+    points.iter().try_for_each(|point| vector("a point of the surface", *point))?;
+    if triangles.is_empty() || triangles.iter().flatten().any(|corner| *corner as usize >= points.len()) {
+        return no("has no triangles, or corners that do not exist");
     }
+    let flat = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+        (b - a).cross(c - a).length() <= 1e-9 * longest
+    };
+    if triangles.iter().any(flat) {
+        return no("has a triangle without an area");
+    }
+    let mut used = vec![false; points.len()];
+    triangles.iter().flatten().for_each(|corner| used[*corner as usize] = true);
+    if used.contains(&false) {
+        return no("has a point that no triangle has");
+    }
+    if branch(points, triangles, |_| 0).is_some() {
+        return no("is not manifold: more than two triangles share an edge");
+    }
+    Ok(())
+}
 
-    /// Whether every number is in its range.
-    pub(super) fn check(&self) -> Result<(), SoftError> {
-        let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s, damping_s } = self.matter;
-        self.shape.check()?;
+impl SoftMatter {
+    fn check(&self) -> Result<(), SoftError> {
+        let Self { young_pa, poisson, density_kg_m3, damping_per_s, damping_s, law } = *self;
         number("Young's modulus", young_pa, (1.0, 1e11), "between 1 and 1e11 Pa")?;
         number(
             "Poisson's ratio",
@@ -260,6 +345,24 @@ impl SoftSpec {
         number("the density", density_kg_m3, (1.0, 1e5), "between 1 and 1e5 kg/m³")?;
         number("the damping", damping_per_s, (0.0, 1e4), "between 0 and 1e4 per second")?;
         number("the damping of strains", damping_s, (0.0, 10.0), "between 0 and 10 s")?;
+        let MaterialLaw::Ogden { exponent } = law else { return Ok(()) };
+        number("the exponent of Ogden", exponent.abs(), (1.0, 20.0), "between 1 and 20, or −20 and −1")?;
+        let Lame { mu, lambda } = Lame::of(self);
+        if lambda + 2.0 * mu / exponent > 0.0 { Ok(()) } else { Err(SoftError::Unstable { exponent }) }
+    }
+}
+
+impl SoftSpec {
+    /// The resolutions that it may take; none where its division never changes.
+    pub(super) fn resolutions(&self) -> Option<ResolutionRange> {
+        let SoftShape::Embedded { range_m, .. } = &self.shape else { return None };
+        (range_m.0 < range_m.1).then_some(ResolutionRange { eps_m: *range_m, n: (0, metachron_core::N_MAX) })
+    }
+
+    /// Whether every number is in its range.
+    pub(super) fn check(&self) -> Result<(), SoftError> {
+        self.shape.check()?;
+        self.matter.check()?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;

@@ -3,17 +3,26 @@
 mod embedded;
 mod error;
 mod large;
+mod materials;
 mod promises;
 mod skins;
 mod statics;
 
-use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
+use metachron_geometry::{Tetrahedra, Triangles};
+use std::sync::Arc;
 
-const MATTER: SoftMatter =
-    SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0, damping_s: 0.0 };
+const MATTER: SoftMatter = SoftMatter {
+    young_pa: 1e5,
+    poisson: 0.3,
+    density_kg_m3: 1000.0,
+    damping_per_s: 0.0,
+    damping_s: 0.0,
+    law: MaterialLaw::Corotational,
+};
 const SHEET: SoftShape = SoftShape::Sheet { size_m: [0.3, 0.2], thickness_m: 0.002, segments: [6, 4] };
 const G: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
@@ -41,8 +50,70 @@ fn rope() -> SoftShape {
     SoftShape::Rope { path_m: vec![DVec3::ZERO, DVec3::X], radius_m: 0.005, segments: 20 }
 }
 
-fn all() -> [SoftShape; 4] {
-    [SHEET, solid(), SoftShape::Ball { radius_m: 0.1, segments: 4 }, rope()]
+/// A box of so many cells along each side, each of six tetrahedra about a diagonal.
+fn tetrahedra(size_m: DVec3, cells: [u32; 3]) -> Tetrahedra {
+    let along = cells.map(|count| count + 1);
+    let number = |[i, j, k]: [u32; 3]| (k * along[1] + j) * along[0] + i;
+    let places = |ends: [u32; 3]| {
+        let [x, y, z] = ends;
+        (0..z).flat_map(move |k| (0..y).flat_map(move |j| (0..x).map(move |i| [i, j, k])))
+    };
+    let share =
+        |place: [u32; 3]| DVec3::from_array([0, 1, 2].map(|axis| f64::from(place[axis]) / f64::from(cells[axis])));
+    let points = places(along).map(|place| share(place) * size_m).collect();
+    let mut corners = vec![];
+    for place in places(cells) {
+        for [first, second, third] in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+            let mut at = place;
+            let mut path = [number(at); 4];
+            for (step, axis) in [first, second, third].into_iter().enumerate() {
+                at[axis] += 1;
+                path[step + 1] = number(at);
+            }
+            if (second + 3 - first) % 3 == 2 {
+                path.swap(1, 2);
+            }
+            corners.push(path);
+        }
+    }
+    Tetrahedra { points, corners, regions: vec![] }
+}
+
+fn tetrahedral() -> SoftShape {
+    let mut mesh = tetrahedra(DVec3::new(0.2, 0.1, 0.1), [4, 2, 2]);
+    mesh.regions = (0..mesh.corners.len() as i64).map(|at| at / 48).collect();
+    let stiff = RegionMatter { region: 1, matter: SoftMatter { young_pa: 3e5, density_kg_m3: 2000.0, ..MATTER } };
+    SoftShape::Tetrahedra { mesh: Arc::new(mesh), regions: vec![stiff] }
+}
+
+/// A quarter of a cylinder along y with irregular points.
+fn shell() -> SoftShape {
+    let (along, around) = (5, 6);
+    let point = |(i, j): (u32, u32)| {
+        let inner = f64::from(u8::from(i > 0 && i < along && j > 0 && j < around));
+        let shift = 0.1 * inner * libm::sin(f64::from(7 * i + 3 * j));
+        let turn = (f64::from(j) + shift) / f64::from(around) * std::f64::consts::FRAC_PI_2;
+        DVec3::new(0.1 * libm::sin(turn), 0.04 * (f64::from(i) + shift), 0.1 * libm::cos(turn))
+    };
+    let pairs = |ends: (u32, u32)| (0..ends.0).flat_map(move |i| (0..ends.1).map(move |j| (i, j)));
+    let points = pairs((along + 1, around + 1)).map(point).collect();
+    let triangles = pairs((along, around)).flat_map(|(i, j)| {
+        let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| (i + x) * (around + 1) + j + y);
+        [[a, b, c], [a, c, d]]
+    });
+    let surface = Triangles { points, triangles: triangles.collect() };
+    SoftShape::Shell { surface: Arc::new(surface), thickness_m: 0.002 }
+}
+
+/// Free bodies of every kind of element and law.
+fn all() -> Vec<SoftSpec> {
+    let shapes = [SHEET, solid(), SoftShape::Ball { radius_m: 0.1, segments: 4 }, rope(), tetrahedral(), shell()];
+    let of = |law, shape| SoftSpec { matter: SoftMatter { law, ..MATTER }, ..spec(shape) };
+    let mut all: Vec<SoftSpec> = shapes.map(spec).into();
+    all.push(of(MaterialLaw::NeoHookean, solid()));
+    all.push(of(MaterialLaw::NeoHookean, tetrahedral()));
+    all.push(of(MaterialLaw::Ogden { exponent: 6.0 }, solid()));
+    all
 }
 
 fn dt(seconds: f64) -> SimSpan {
@@ -66,8 +137,8 @@ fn state(body: &SoftBody) -> SoftState {
 }
 
 /// A body that was stretched and sheared at once by velocities of its own, without momentum.
-fn shaken(shape: SoftShape) -> SoftBody {
-    let mut body = SoftBody::new(spec(shape)).unwrap();
+fn shaken(spec: SoftSpec) -> SoftBody {
+    let mut body = SoftBody::new(spec).unwrap();
     for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
         *v = DVec3::new(x.y - 3.0 * x.x, 2.0 * x.z + x.x, x.x * x.y * 20.0) + DVec3::splat(0.3);
     }
@@ -76,8 +147,8 @@ fn shaken(shape: SoftShape) -> SoftBody {
 
 #[test]
 fn a_body_at_rest_without_loads_stays_as_it_was() {
-    for shape in all() {
-        let mut body = SoftBody::new(SoftSpec { rotation: DQuat::from_rotation_y(0.4), ..spec(shape) }).unwrap();
+    for spec in all() {
+        let mut body = SoftBody::new(SoftSpec { rotation: DQuat::from_rotation_y(0.4), ..spec }).unwrap();
         let before = state(&body);
         run(&mut body, 0.01, 50);
         for (now, was) in state(&body).positions.iter().zip(&before.positions) {
@@ -89,8 +160,8 @@ fn a_body_at_rest_without_loads_stays_as_it_was() {
 
 #[test]
 fn a_free_body_falls_and_keeps_its_shape() {
-    for shape in all() {
-        let mut body = SoftBody::new(SoftSpec { gravity: G, velocity: DVec3::X, ..spec(shape) }).unwrap();
+    for spec in all() {
+        let mut body = SoftBody::new(SoftSpec { gravity: G, velocity: DVec3::X, ..spec }).unwrap();
         let before = state(&body);
         run(&mut body, 0.005, 100);
         // the last velocity moves each step: half a step's fall beyond the parabola
@@ -103,8 +174,8 @@ fn a_free_body_falls_and_keeps_its_shape() {
 
 #[test]
 fn momentum_is_kept_and_energy_never_rises_while_it_shakes() {
-    for shape in all() {
-        let mut body = shaken(shape);
+    for spec in all() {
+        let mut body = shaken(spec);
         let (linear, angular) = body.momentum();
         let mut energy_j = body.energy_j();
         for _ in 0..200 {
@@ -122,8 +193,8 @@ fn momentum_is_kept_and_energy_never_rises_while_it_shakes() {
 
 #[test]
 fn the_forces_of_a_bent_body_have_no_sum_and_no_torque() {
-    for shape in all() {
-        let mut body = shaken(shape);
+    for spec in all() {
+        let mut body = shaken(spec);
         run(&mut body, 0.005, 5);
         let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);
@@ -137,8 +208,8 @@ fn the_forces_of_a_bent_body_have_no_sum_and_no_torque() {
 
 #[test]
 fn forces_are_minus_the_slope_of_the_energy() {
-    for shape in all() {
-        let mut body = shaken(shape);
+    for spec in all() {
+        let mut body = shaken(spec);
         run(&mut body, 0.005, 5);
         let SoftBody { mesh, system, positions, .. } = &mut body;
         system.begin(0.01);

@@ -6,7 +6,7 @@ use metachron_contact::{Agent, AnchorSpring, Law};
 use metachron_core::{Anchor, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_models::soft::{SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
 
 /// The column: its edges, metres.
 const SIZE_M: DVec3 = DVec3::new(0.06, 0.06, 0.06);
@@ -68,7 +68,14 @@ fn press(young_pa: f64, rate_hz: f64, due: bool, tamper: Option<Tamper>) -> Felt
 fn column(young_pa: f64) -> SoftBody {
     let spec = SoftSpec {
         shape: SoftShape::Box { size_m: SIZE_M, segments: [2, 2, 4] },
-        matter: SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.2, damping_s: 0.0 },
+        matter: SoftMatter {
+            young_pa,
+            poisson: 0.3,
+            density_kg_m3: 1000.0,
+            damping_per_s: 0.2,
+            damping_s: 0.0,
+            law: MaterialLaw::Corotational,
+        },
         position: DVec3::new(-0.5 * SIZE_M.x, -0.5 * SIZE_M.y, 0.0),
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

@@ -5,10 +5,17 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 
 pub fn matter(young_pa: f64) -> SoftMatter {
-    SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0, damping_s: 0.0 }
+    SoftMatter {
+        young_pa,
+        poisson: 0.3,
+        density_kg_m3: 1000.0,
+        damping_per_s: 0.0,
+        damping_s: 0.0,
+        law: MaterialLaw::Corotational,
+    }
 }
 
 fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {

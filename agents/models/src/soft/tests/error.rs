@@ -17,9 +17,9 @@ fn apart(a: &SoftBody, b: &SoftBody) -> f64 {
 
 #[test]
 fn the_error_of_falling_is_that_of_the_closed_form() {
-    for shape in all() {
+    for spec in all() {
         for dt_s in [1e-3, 5e-3, 2e-2] {
-            let mut body = SoftBody::new(SoftSpec { gravity: G, ..spec(shape.clone()) }).unwrap();
+            let mut body = SoftBody::new(SoftSpec { gravity: G, ..spec.clone() }).unwrap();
             body.steps = FIRST;
             run(&mut body, dt_s, (DRIFT_S / dt_s).round() as u32);
             // x = g t (t + h)/2: half a step's speed too far
@@ -62,8 +62,8 @@ fn the_error_of_a_swing_is_estimated_within_a_factor_of_three_but_for_immediate_
 
 #[test]
 fn one_step_in_twenty_four_is_repeated_for_its_error() {
-    for shape in all() {
-        let mut body = shaken(shape);
+    for spec in all() {
+        let mut body = shaken(spec);
         let (mut work, mut plain) = (0.0, 0.0);
         for _ in 0..960 {
             let report = body.step(dt(1e-3), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();

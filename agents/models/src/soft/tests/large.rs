@@ -9,8 +9,14 @@ fn cube(cells: u32) -> SoftShape {
     SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] }
 }
 
-const ORGAN: SoftMatter =
-    SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 2.0, damping_s: 0.0 };
+const ORGAN: SoftMatter = SoftMatter {
+    young_pa: 12e3,
+    poisson: 0.4,
+    density_kg_m3: 1050.0,
+    damping_per_s: 2.0,
+    damping_s: 0.0,
+    law: MaterialLaw::Corotational,
+};
 
 #[test]
 fn gradients_give_the_velocities_of_a_factor() {

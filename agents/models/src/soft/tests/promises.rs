@@ -8,9 +8,9 @@ use metachron_core::Anchor;
 
 #[test]
 fn every_conformance_check_of_an_agent_passes() {
-    for shape in all() {
+    for spec in all() {
         let make = || {
-            let made = SoftBody::new(SoftSpec { gravity: G, ..spec(shape.clone()) }).unwrap();
+            let made = SoftBody::new(SoftSpec { gravity: G, ..spec.clone() }).unwrap();
             Box::new(made) as Box<dyn Agent>
         };
         let fall = |agent: &dyn Agent, t: f64| fall_deviation(agent, G, t);
@@ -32,6 +32,6 @@ fn every_conformance_check_of_an_agent_passes() {
             allocations: Some((&count, 0.0)),
             ..Suite::new(&make, dt(0.005))
         };
-        assert_eq!(check(&suite), [], "{shape:?}");
+        assert_eq!(check(&suite), [], "{:?}", spec.shape);
     }
 }

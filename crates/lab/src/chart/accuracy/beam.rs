@@ -7,7 +7,7 @@ use super::sheet::soft;
 use glam::DVec3;
 use metachron_models::rod::Integrator;
 use metachron_models::soft::Side;
-use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct SolidBeam;
@@ -16,8 +16,14 @@ pub(in super::super) struct SolidBeam;
 const HEIGHTS: [(&str, f64); 2] = [("h = L/10", 0.1), ("h = L/20", 0.05)];
 const LENGTH_M: f64 = 0.4;
 /// So stiff that the sag is below 0.2 % of the length: beam theory is one of small angles.
-const MATTER: SoftMatter =
-    SoftMatter { young_pa: 1e9, poisson: 0.0, density_kg_m3: 1000.0, damping_per_s: 20.0, damping_s: 0.0 };
+const MATTER: SoftMatter = SoftMatter {
+    young_pa: 1e9,
+    poisson: 0.0,
+    density_kg_m3: 1000.0,
+    damping_per_s: 20.0,
+    damping_s: 0.0,
+    law: MaterialLaw::Corotational,
+};
 const SECONDS: f64 = 4.0;
 
 impl Benchmark for SolidBeam {

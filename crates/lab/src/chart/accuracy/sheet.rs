@@ -6,7 +6,7 @@ use super::play::Play;
 use glam::{DQuat, DVec3};
 use metachron_models::rod::Integrator;
 use metachron_models::soft::Side;
-use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct Sheet;
@@ -34,8 +34,14 @@ impl Benchmark for Sheet {
         let (_, young_pa) = MODULI.into_iter().find(|(name, _)| *name == case.case)?;
         let segments = [case.segments, (case.segments / 4).max(1)];
         let shape = SoftShape::Sheet { size_m: [SPAN_M, WIDTH_M], thickness_m: THICKNESS_M, segments };
-        let matter =
-            SoftMatter { young_pa, poisson: 0.0, density_kg_m3: DENSITY_KG_M3, damping_per_s: 20.0, damping_s: 0.0 };
+        let matter = SoftMatter {
+            young_pa,
+            poisson: 0.0,
+            density_kg_m3: DENSITY_KG_M3,
+            damping_per_s: 20.0,
+            damping_s: 0.0,
+            law: MaterialLaw::Corotational,
+        };
         let mut play = Play::soft(SoftSpec { held: vec![Side::Left, Side::Right], ..soft(shape, matter) }, case)?;
         let sound = play.run(SECONDS, &[]);
         let error = (-play.lowest_m() - sag_m(young_pa)).abs() / SPAN_M;

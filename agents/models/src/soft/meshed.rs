@@ -1,0 +1,93 @@
+//! Division of a soft body as a mesh gives it: tetrahedra of a solid, triangles of a sheet.
+//!
+//! In: a mesh and its materials. Out: a [`FeMesh`]. Never here: the elements themselves, files.
+
+use super::fe_mesh::{FeMesh, edges_of};
+use super::grid::Side;
+use super::material::Law;
+use super::membrane::Membrane;
+use super::shell_bending::{ShellBending, ShellMatter};
+use super::spec::{RegionMatter, SoftMatter, SoftSpec};
+use super::tetrahedron::Tetrahedron;
+use glam::{DVec2, DVec3};
+use metachron_geometry::{Aabb, Tetrahedra, Triangles};
+use std::collections::HashMap;
+
+impl FeMesh {
+    /// The tetrahedra of a mesh.
+    pub fn tetrahedral(mesh: &Tetrahedra, regions: &[RegionMatter], spec: &SoftSpec) -> Self {
+        let mut division = Self::of_points(&mesh.points);
+        let matters: Vec<SoftMatter> =
+            std::iter::once(spec.matter).chain(regions.iter().map(|region| region.matter)).collect();
+        division.laws = matters.iter().map(Law::of).collect();
+        for (at, corners) in mesh.corners.iter().enumerate() {
+            let of_region = |number: &i64| regions.iter().position(|region| region.region == *number);
+            let material = mesh.regions.get(at).and_then(of_region).map_or(0, |region| region + 1);
+            let element = Tetrahedron::new(*corners, corners.map(|corner| mesh.points[corner as usize]), material);
+            let quarter = 0.25 * element.volume_m3 * matters[material].density_kg_m3;
+            corners.iter().for_each(|corner| division.mass_kg[*corner as usize] += quarter);
+            division.tetrahedra.push(element);
+        }
+        division.triangles = mesh.boundary();
+        let pairs = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, d, b], [c, d, a]];
+        let inner: Vec<[u32; 3]> = mesh.corners.iter().flat_map(|corners| pairs(*corners)).collect();
+        division.edges = edges_of(&division.triangles);
+        division.stretched = edges_of(&inner);
+        division.hold(&spec.held);
+        division
+    }
+
+    /// A sheet of the triangles of a mesh.
+    pub fn shell(surface: &Triangles, thickness_m: f64, spec: &SoftSpec) -> Self {
+        let mut division = Self::of_points(&surface.points);
+        division.radius_m = 0.5 * thickness_m;
+        division.triangles.clone_from(&surface.triangles);
+        let bent = ShellMatter::new(&spec.matter, thickness_m);
+        // the corner across each side of a triangle, in the direction of the neighbour
+        let mut across: HashMap<[u32; 2], u32> = HashMap::with_capacity(3 * surface.triangles.len());
+        for [a, b, c] in &surface.triangles {
+            across.extend([([*b, *a], *c), ([*c, *b], *a), ([*a, *c], *b)]);
+        }
+        for corners in &surface.triangles {
+            let [a, b, c] = *corners;
+            let element = Membrane::new(*corners, flattened(&surface.points, *corners), thickness_m, &spec.matter);
+            let third = element.volume_m3() * spec.matter.density_kg_m3 / 3.0;
+            corners.iter().for_each(|corner| division.mass_kg[*corner as usize] += third);
+            division.membranes.push(element);
+            let over = [[b, c], [c, a], [a, b]].map(|side| across.get(&side).copied());
+            division.shells.push(ShellBending::new(*corners, over, &surface.points, &bent));
+        }
+        division.edges = edges_of(&division.triangles);
+        division.hold(&spec.held);
+        division
+    }
+
+    fn of_points(points: &[DVec3]) -> Self {
+        let mut division = Self::default();
+        division.rest = points.to_vec();
+        division.mass_kg = vec![0.0; points.len()];
+        division.held = vec![false; points.len()];
+        division
+    }
+
+    /// Holds the vertices at sides of the box around it: those nearer to it than half a mean edge.
+    fn hold(&mut self, sides: &[Side]) {
+        let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
+        let near_m = 0.5 * lengths.sum::<f64>() / self.edges.len().max(1) as f64;
+        let Aabb { low, high } = Aabb::of(&self.rest);
+        for side in sides {
+            let (axis, last) = side.place();
+            let from = if last { high[axis] } else { low[axis] };
+            let at_side = |point: &DVec3| (point[axis] - from).abs() <= near_m;
+            self.held.iter_mut().zip(&self.rest).for_each(|(held, point)| *held |= at_side(point));
+        }
+    }
+}
+
+/// The corners of a triangle in its own plane.
+fn flattened(points: &[DVec3], corners: [u32; 3]) -> [DVec2; 3] {
+    let [a, b, c] = corners.map(|corner| points[corner as usize]);
+    let along = (b - a).normalize();
+    let across = ((c - a) - along * (c - a).dot(along)).normalize();
+    [a, b, c].map(|point| DVec2::new((point - a).dot(along), (point - a).dot(across)))
+}
