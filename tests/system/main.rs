@@ -19,6 +19,7 @@ mod scenes;
 mod scenes_apart;
 mod scenes_coupled;
 mod scenes_crowded;
+mod scenes_meshes;
 mod scenes_soft;
 mod shares;
 mod sight;

@@ -256,7 +256,15 @@ impl SurfaceScratch {
         compute_normals(surface, &mut self.normals);
         let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals, index: None };
         match other {
-            Piece::Strand(strand) => query.strand(strand, into),
+            Piece::Strand(strand) => {
+                let mut query = query;
+                let [index, _] = &mut self.indices;
+                if strand.count() > 1 && query.is_many() {
+                    index.fill(surface, region.grown(2.0 * strand.widest_m));
+                    query.index = Some(&*index);
+                }
+                query.strand(strand, into);
+            }
             Piece::Block(block) => {
                 let Some(field) = block.field else { return };
                 match field.half_extents_m() {
@@ -371,49 +379,53 @@ impl SurfaceQuery<'_> {
                 into.extend(self.strand_contact(key, point, strand, nearest));
             }
         }
-        for edge in self.surface.edges_in(self.region) {
-            for span in 0..strand.spans() {
-                let (share, at) = near_segments(strand.ends(span).map(|ball| ball.centre), edge.ends);
-                if !(LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
-                    continue;
-                }
-                let here = StrandPoint { span, share };
-                let (point, ball) = (edge.at(at), ball_at(strand, here));
-                let way = ball.centre - point.position;
-                let outside = edge
-                    .vertices
-                    .iter()
-                    .all(|vertex| self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0));
-                if outside && edge.feature().is_nearest(self.surface, way) {
-                    let key = TouchKey::new(TouchKind::Edge, [edge.number, span as u32]);
-                    into.extend(self.strand_contact(key, point, strand, here));
-                }
-            }
+        let within_m = self.reach_m + self.surface.form.radius_m;
+        for span in 0..strand.spans() {
+            let [a, b] = strand.ends(span);
+            let around = Aabb::of(&[a.centre, b.centre]).grown(within_m + a.radius_m.max(b.radius_m));
+            self.each_edge(around, |edge| into.extend(self.edge_beside(&edge, strand, span)));
         }
         for node in 0..strand.count() {
             self.node_over(strand, node, into);
         }
     }
 
+    /// An edge beside a span of a strand.
+    fn edge_beside(&self, edge: &Edge, strand: &Strand<'_>, span: usize) -> Option<Touch> {
+        let (share, at) = near_segments(strand.ends(span).map(|ball| ball.centre), edge.ends);
+        if !(LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
+            return None;
+        }
+        let here = StrandPoint { span, share };
+        let (point, ball) = (edge.at(at), ball_at(strand, here));
+        let way = ball.centre - point.position;
+        let faces = |vertex: &u32| self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0);
+        let outside = edge.vertices.iter().all(faces);
+        let key = TouchKey::new(TouchKind::Edge, [edge.number, span as u32]);
+        let is_nearest = outside && edge.feature().is_nearest(self.surface, way);
+        is_nearest.then(|| self.strand_contact(key, point, strand, here)).flatten()
+    }
+
     /// A node of a strand over each triangle, or over the line between two.
     fn node_over(&self, strand: &Strand<'_>, node: usize, into: &mut Vec<Touch>) {
         let Ball { centre, radius_m } = strand.ball(node);
         let within_m = (radius_m + self.reach_m + self.surface.form.radius_m).max(2.0 * radius_m);
-        let key = |triangle: &Triangle| TouchKey::new(TouchKind::Triangle, [triangle.number, node as u32]);
-        let (mut is_over, mut beside) = (false, None::<(f64, TouchKey, SkinPoint)>);
-        for triangle in self.surface.triangles_in(Aabb::about(centre, within_m)) {
+        let key = |triangle: u32| TouchKey::new(TouchKind::Triangle, [triangle, node as u32]);
+        // of two lines as near as each other that of the lesser triangle, in whatever order they are visited
+        let (mut is_over, mut beside) = (false, None::<(f64, u32, SkinPoint)>);
+        self.each_triangle(Aabb::about(centre, within_m), |triangle| {
             if let Some(point) = triangle.inside(centre) {
                 is_over = true;
-                into.extend(self.strand_contact(key(&triangle), point, strand, strand.node(node)));
+                into.extend(self.strand_contact(key(triangle.number), point, strand, strand.node(node)));
             } else if let Some(point) = triangle.under(centre) {
-                let distance_m = point.position.distance(centre);
-                if beside.is_none_or(|(least_m, ..)| distance_m < least_m) {
-                    beside = Some((distance_m, key(&triangle), point));
+                let (distance_m, number) = (point.position.distance(centre), triangle.number);
+                if beside.is_none_or(|(least_m, first, _)| (distance_m, number) < (least_m, first)) {
+                    beside = Some((distance_m, number, point));
                 }
             }
-        }
-        if let (false, Some((_, key, point))) = (is_over, beside) {
-            into.extend(self.strand_contact(key, point, strand, strand.node(node)));
+        });
+        if let (false, Some((_, number, point))) = (is_over, beside) {
+            into.extend(self.strand_contact(key(number), point, strand, strand.node(node)));
         }
     }
 
@@ -474,10 +486,12 @@ impl SurfaceQuery<'_> {
 
     /// Whether a point is in front of a triangle that is nearer than `within_m`.
     fn is_before(&self, point: DVec3, within_m: f64) -> bool {
-        self.surface.triangles_in(Aabb::about(point, within_m)).any(|Triangle { corners: [a, b, c], .. }| {
+        let mut is_before = false;
+        self.each_triangle(Aabb::about(point, within_m), |Triangle { corners: [a, b, c], .. }| {
             let way = point - near_triangle(point, [a, b, c]);
-            way.length() < within_m * (1.0 - LEAN_SHARE) && (b - a).cross(c - a).dot(way) > 0.0
-        })
+            is_before |= way.length() < within_m * (1.0 - LEAN_SHARE) && (b - a).cross(c - a).dot(way) > 0.0;
+        });
+        is_before
     }
 
     /// The normal of the triangle of a spot; `None` for a vertex or an edge.

@@ -1,6 +1,6 @@
 //! Laws of isotropic elastic materials, in terms of their principal stretches.
 //!
-//! In: three stretches. Out: the energy of a volume and its derivatives. Never here: elements. Theory: docs/theory/soft.md, eq. 24–27.
+//! In: three stretches. Out: the energy of a volume and its derivatives. Never here: elements. Theory: docs/theory/soft.md, eq. 24–26.
 
 use super::spec::{MaterialLaw, SoftMatter};
 

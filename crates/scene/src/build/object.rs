@@ -411,7 +411,7 @@ fn member(
             (Spec::Tube(built.spec), start, range, built.picture)
         }
         ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &model_context)?), unit, flat, flat),
-        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &model_context)), unit, flat, flat),
+        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &model_context)?), unit, flat, flat),
         ModelFile::Solid(file) => {
             let built = soft::solid(c, file, &model_context)?;
             let range = ResolutionRange { eps_m: built.eps_m.unwrap_or(flat.eps_m), n: levels };

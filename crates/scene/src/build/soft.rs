@@ -4,6 +4,7 @@ use super::mesh::{self, Mesh};
 use super::object::ModelContext;
 use super::rigid::rotation;
 use super::scenery::{SurfaceSource, generator, surface_source};
+use super::soft_mesh;
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
@@ -12,12 +13,12 @@ use metachron_core::{Anchor, Body};
 use metachron_geometry::{Aabb, Triangles, branch, generate_surface, open_edge, pieces, welded};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
-use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
-const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
-const POISSON: Allowed = allowed(0.0..=0.499, "");
-const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
+pub(super) const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
+pub(super) const POISSON: Allowed = allowed(0.0..=0.499, "");
+pub(super) const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 /// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
 const SKIN_LATTICE_MAX: u64 = 1_000_000;
@@ -36,14 +37,13 @@ struct Shared {
     velocity_m_s: Option<Point>,
     friction: Option<f64>,
     held: Vec<Side>,
+    law: MaterialLaw,
 }
 
-/// Reads a sheet.
-pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> SoftSpec {
+/// Reads a sheet; `None` where its shape is missing or cannot be used.
+pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<SoftSpec> {
     let place = context.place;
-    let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), file.size_m[i], &LENGTH));
-    let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), file.segments[i]));
-    let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    let shape = if file.file.is_some() { soft_mesh::shell(c, file, context) } else { flat_sheet(c, place, file) }?;
     let side = |side: &SheetSide| match side {
         SheetSide::Left => Side::Left,
         SheetSide::Right => Side::Right,
@@ -60,10 +60,32 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held: file.hold.iter().flatten().map(side).collect(),
+        law: MaterialLaw::default(),
     };
-    let half = DVec3::new(0.5 * size_m[0], 0.5 * size_m[1], 0.0);
+    let half = if let SoftShape::Sheet { size_m: [x, y], .. } = shape {
+        DVec3::new(0.5 * x, 0.5 * y, 0.0)
+    } else {
+        DVec3::ZERO
+    };
     let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    spec(c, context, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
+    Some(spec(c, context, shape, pose, shared))
+}
+
+/// The shape of a flat sheet; `None` where its dimensions are missing, which is reported.
+fn flat_sheet(c: &mut Checker<'_, '_>, place: &Place, file: &SheetFile) -> Option<SoftShape> {
+    if file.scale.is_some() {
+        c.wrong(place, "scale", "has no `file` that it belongs to", "expected no such key here");
+    }
+    let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    for (key, is_missing) in [("size_m", file.size_m.is_none()), ("segments", file.segments.is_none())] {
+        if is_missing {
+            c.wrong(place, key, "is missing", format!("a sheet needs it, or `file`: expected `{key}` in this table"));
+        }
+    }
+    let (size_m, cells) = (file.size_m?, file.segments?);
+    let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size_m[i], &LENGTH));
+    let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i]));
+    Some(SoftShape::Sheet { size_m, thickness_m, segments })
 }
 
 /// A solid and the resolutions that it may take; none where its division never changes.
@@ -100,10 +122,22 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held,
+        law: soft_mesh::law(c, place, file.law, file.exponent),
     };
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
     let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    Some(BuiltSolid { spec: spec(c, context, shape, pose, shared), eps_m })
+    let mut spec = spec(c, context, shape, pose, shared);
+    let matter = spec.matter;
+    match (&mut spec.shape, &file.regions) {
+        (SoftShape::Tetrahedra { mesh, regions }, Some(files)) => {
+            *regions = soft_mesh::regions(c, place, files, mesh, &matter);
+        }
+        (_, Some(_)) => {
+            c.wrong(place, "regions", "do not belong to this shape", "expected them with a mesh of tetrahedra alone");
+        }
+        _ => {}
+    }
+    Some(BuiltSolid { spec, eps_m })
 }
 
 /// Reports keys that belong to another shape, and those that are missing.
@@ -131,11 +165,9 @@ fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
             c.wrong(place, key, format_args!("does not belong to a {name}"), "expected no such key here");
         }
     }
-    for (key, is_missing) in [
-        ("size_m", is_box && file.size_m.is_none()),
-        ("radius_m", is_ball && file.radius_m.is_none()),
-        ("eps_m", is_mesh && file.eps_m.is_none()),
-    ] {
+    for (key, is_missing) in
+        [("size_m", is_box && file.size_m.is_none()), ("radius_m", is_ball && file.radius_m.is_none())]
+    {
         if is_missing {
             c.wrong(place, key, "is missing", format!("a {name} needs it: expected `{key}` in this table"));
         }
@@ -156,6 +188,13 @@ fn solid_shape(
 ) -> Option<SoftShape> {
     let place = context.place;
     if file.shape == SoftShapeKind::Mesh {
+        if let Some(shape) = soft_mesh::tetrahedra_of(c, file, context) {
+            return shape;
+        }
+        if eps_m.is_none() {
+            let expected = "a mesh of triangles needs it: expected `eps_m` in this table";
+            c.wrong(place, "eps_m", "is missing", expected);
+        }
         let (surface, range_m) = (closed_surface(c, file, context)?, eps_m?);
         return Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m });
     }
@@ -246,10 +285,16 @@ fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Trian
     if volume_m3 < 1e-9 * size_m.powi(3) {
         return Err(format!("it encloses {volume_m3:.1e} m³, which is nothing for its length of {size_m:.3} m"));
     }
+    too_large(size_m, scale_is_missing)?;
+    Ok(surface)
+}
+
+/// Refuses what is so long without a scale that it must be in millimetres.
+pub(super) fn too_large(size_m: f64, scale_is_missing: bool) -> Result<(), String> {
     if scale_is_missing && size_m > LARGE_M {
         return Err(format!("it is {size_m:.1} m long: if its unit is the millimetre, set `scale = 0.001`"));
     }
-    Ok(surface)
+    Ok(())
 }
 
 /// Reads a rope.
@@ -271,6 +316,7 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelCont
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held: file.hold.iter().flatten().map(end).collect(),
+        law: MaterialLaw::default(),
     };
     let radius_m = c.number(place, "radius_m", file.radius_m, &LENGTH);
     let segments = segments(c, place, "segments", file.segments);
@@ -310,6 +356,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
         damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING_RATE).unwrap_or(0.0),
         damping_s: c.optional(place, "damping_s", shared.damping_s, &allowed(0.0..=10.0, "s")).unwrap_or(0.0),
+        law: shared.law,
     };
     SoftSpec {
         shape,
@@ -336,7 +383,7 @@ pub(super) fn nearest(spec: &SoftSpec, at: DVec3) -> Option<Anchor> {
     let half = match spec.shape {
         SoftShape::Sheet { size_m: [x, y], .. } => DVec3::new(0.5 * x, 0.5 * y, 0.0),
         SoftShape::Box { size_m, .. } => 0.5 * size_m,
-        SoftShape::Ball { .. } | SoftShape::Embedded { .. } | SoftShape::Rope { .. } => DVec3::ZERO,
+        _ => DVec3::ZERO,
     };
     let there = spec.position + spec.rotation * (at + half);
     let Body::Soft(start) = SoftBody::new(spec.clone()).ok()?.start() else { return None };

@@ -24,7 +24,7 @@ pub use scene::{
     TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
-pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
+pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tool::{KeyframeFile, ToolFile};
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile, Wall};

@@ -5,14 +5,19 @@ use super::{GeneratorKind, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A soft sheet, flat at rest, that stretches and bends.
+/// A soft sheet that stretches and bends: flat, or of the shape of a mesh.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SheetFile {
-    /// Length along its x and y axes, metres, each 1e-6 … 1e4.
-    pub size_m: [f64; 2],
-    /// Cells along x and y; at most 10,000 vertices in all.
-    pub segments: [u32; 2],
+    /// Length along its x and y axes, metres, each 1e-6 … 1e4. Needed without `file`.
+    pub size_m: Option<[f64; 2]>,
+    /// Cells along x and y; at most 10,000 vertices in all. Needed without `file`.
+    pub segments: Option<[u32; 2]>,
+    /// A surface as a file of triangles, STL, binary glTF (.glb, +y up) or OBJ, its path relative to the scene file: at rest the sheet has its
+    /// shape and its vertices. It may be open.
+    pub file: Option<String>,
+    /// Factor that converts the file's coordinates to metres, 1e-6 … 1e6. Default 1.
+    pub scale: Option<f64>,
     /// Thickness, metres, 1e-6 … 1e4.
     pub thickness_m: f64,
     /// Young's modulus, Pa, 1 … 1e11.
@@ -58,7 +63,8 @@ pub struct SolidFile {
     /// controllers choose while it runs. At most 10,000 vertices at the finest.
     pub eps_m: Option<OneOrRange<f64>>,
     /// A closed surface as a file of triangles, STL (binary or text, +z up), binary glTF (.glb, +y up) or OBJ (+z up), its path relative to
-    /// the scene file. One piece, triangles counter-clockwise seen from outside.
+    /// the scene file: one piece, triangles counter-clockwise seen from outside, with `eps_m`. Or a mesh of tetrahedra, gmsh (.msh 2.2 or 4.1,
+    /// text), legacy VTK (.vtk) or VTK's XML (.vtu), which is taken as it is.
     pub file: Option<String>,
     /// A generated closed surface, about a metre large; not with `file`.
     pub generate: Option<GeneratorKind>,
@@ -71,9 +77,15 @@ pub struct SolidFile {
     pub scale: Option<f64>,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.499. Default 0.4.
+    /// Poisson's ratio, 0 … 0.499. Default 0.4. Tetrahedra lock near 0.5: above 0.45 a cage (`eps_m`) bends more truly.
     #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson: Option<f64>,
+    /// How stress follows from strain. Default `corotational`.
+    pub law: Option<LawKind>,
+    /// The exponent of `law = "ogden"`, 1 … 20 or -20 … -1: tissue stiffens with large ones.
+    pub exponent: Option<f64>,
+    /// Regions of a mesh of tetrahedra that are of another material.
+    pub regions: Option<Vec<RegionFile>>,
     /// Density, kg/m³, 1 … 1e5. Default 1050.
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
@@ -124,6 +136,37 @@ pub struct RopeFile {
     pub self_contact: Option<bool>,
 }
 
+/// How the stress of a solid follows from its strain; near rest all are the law of Hooke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LawKind {
+    /// Linear in strains that turn with the body.
+    Corotational,
+    /// Stable Neo-Hookean: rubber-like under large strains.
+    NeoHookean,
+    /// The law of Ogden of one term, with `exponent`.
+    Ogden,
+}
+
+/// A region of a mesh of tetrahedra.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionFile {
+    /// Its number: of gmsh the physical group, of VTK the cell data `region`.
+    pub region: i64,
+    /// Young's modulus, Pa, 1 … 1e11.
+    pub young_pa: f64,
+    /// Poisson's ratio, 0 … 0.499. Default: that of the solid.
+    #[schemars(range(min = 0.0, max = 0.499))]
+    pub poisson: Option<f64>,
+    /// Density, kg/m³, 1 … 1e5. Default: that of the solid.
+    pub density_kg_m3: Option<f64>,
+    /// How stress follows from strain. Default: as in the solid.
+    pub law: Option<LawKind>,
+    /// The exponent of `law = "ogden"`.
+    pub exponent: Option<f64>,
+}
+
 /// The shape of a soft solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -132,7 +175,7 @@ pub enum SoftShapeKind {
     Box,
     /// A ball.
     Ball,
-    /// What a closed surface encloses.
+    /// What a closed surface encloses, or tetrahedra.
     Mesh,
 }
 

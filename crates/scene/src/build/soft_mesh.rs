@@ -1,0 +1,163 @@
+//! Reads what soft bodies take from files as it is: solids of tetrahedra, sheets of open surfaces; and their materials.
+//!
+//! In: the bytes of a file. Out: shapes of soft bodies, every fault reported with its key. Never here: closed surfaces in cages ([`super::soft`]).
+
+use super::mesh;
+use super::object::ModelContext;
+use super::soft::{DENSITY, POISSON, YOUNG, too_large};
+use super::{LENGTH, SCALE, tetrahedra};
+use crate::check::{Checker, Place, allowed};
+use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
+use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, pieces, welded};
+use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
+use std::sync::Arc;
+
+/// The law that the keys of a scene name; those that do not belong together are reported.
+pub(super) fn law(c: &mut Checker<'_, '_>, place: &Place, kind: Option<LawKind>, exponent: Option<f64>) -> MaterialLaw {
+    match (kind, exponent) {
+        (Some(LawKind::Ogden), Some(exponent)) => {
+            let size = c.number(place, "exponent", exponent.abs(), &allowed(1.0..=20.0, "or its negative"));
+            MaterialLaw::Ogden { exponent: size.copysign(exponent) }
+        }
+        (Some(LawKind::Ogden), None) => {
+            c.wrong(place, "exponent", "is missing", "the law `ogden` needs it: expected 1 to 20, or -20 to -1");
+            MaterialLaw::default()
+        }
+        (_, Some(_)) => {
+            c.wrong(
+                place,
+                "exponent",
+                "has no material that it belongs to",
+                "expected `material = \"ogden\"` beside it",
+            );
+            MaterialLaw::default()
+        }
+        (Some(LawKind::NeoHookean), None) => MaterialLaw::NeoHookean,
+        (Some(LawKind::Corotational) | None, None) => MaterialLaw::Corotational,
+    }
+}
+
+/// The tetrahedra of the file of a solid, where it is such a file; `Some(None)` where it cannot be used, which is reported.
+pub(super) fn tetrahedra_of(
+    c: &mut Checker<'_, '_>,
+    file: &SolidFile,
+    context: &ModelContext<'_>,
+) -> Option<Option<SoftShape>> {
+    let bytes = context.source.sibling(file.file.as_deref()?).ok()?;
+    if !tetrahedra::is_volume(&bytes) {
+        return None;
+    }
+    let (place, name) = (context.place, file.file.as_deref().unwrap_or_default());
+    if file.eps_m.is_some() {
+        let what = format!("does not belong to {name}: a mesh of tetrahedra is taken as it is");
+        c.wrong(place, "eps_m", what, "expected no such key, or a closed surface of triangles as the file");
+    }
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let read = tetrahedra::read(&bytes).and_then(|mesh| solid(mesh, scale, file.scale.is_none()));
+    Some(match read {
+        Ok(mesh) => Some(SoftShape::Tetrahedra { mesh: Arc::new(mesh), regions: Vec::new() }),
+        Err(why) => {
+            c.wrong(place, "file", format!("cannot be used: {name}: {why}"), "expected one solid of tetrahedra");
+            None
+        }
+    })
+}
+
+/// The mesh in metres, where it is one solid.
+fn solid(mut mesh: Tetrahedra, scale: f64, scale_is_missing: bool) -> Result<Tetrahedra, String> {
+    mesh.points.iter_mut().for_each(|point| *point *= scale);
+    mesh.check().map_err(|fault| fault.to_string())?;
+    let count = mesh.points.len();
+    if count as u64 > VERTICES_MAX {
+        return Err(format!("it has {count} points, more than {VERTICES_MAX}"));
+    }
+    let Aabb { low, high } = Aabb::of(&mesh.points);
+    mesh::within(low.abs().max(high.abs()).max_element() / scale, scale)?;
+    too_large((high - low).max_element(), scale_is_missing)?;
+    Ok(mesh)
+}
+
+/// The materials of the regions of a solid of tetrahedra with the material `matter`.
+pub(super) fn regions(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    files: &[RegionFile],
+    mesh: &Tetrahedra,
+    matter: &SoftMatter,
+) -> Vec<RegionMatter> {
+    let mut regions: Vec<RegionMatter> = vec![];
+    for (at, file) in files.iter().enumerate() {
+        let here = place.entry("regions", at);
+        let region = file.region;
+        if !mesh.regions.contains(&region) {
+            let mut known: Vec<String> = mesh.regions.iter().map(i64::to_string).collect();
+            known.sort();
+            known.dedup();
+            known.truncate(10);
+            let expected = if known.is_empty() {
+                "the mesh has no regions".to_owned()
+            } else {
+                format!("expected one of the regions of the mesh: {}", known.join(", "))
+            };
+            c.wrong(&here, "region", format!("is {region}, which no tetrahedron has"), expected);
+        }
+        if regions.iter().any(|known| known.region == region) {
+            c.wrong(&here, "region", format!("is {region}, which has a material already"), "expected each region once");
+        }
+        let own = law(c, &here, file.law, file.exponent);
+        let law = if file.law.is_some() { own } else { matter.law };
+        let matter = SoftMatter {
+            young_pa: c.number(&here, "young_pa", file.young_pa, &YOUNG),
+            poisson: c.optional(&here, "poisson", file.poisson, &POISSON).unwrap_or(matter.poisson),
+            density_kg_m3: c
+                .optional(&here, "density_kg_m3", file.density_kg_m3, &DENSITY)
+                .unwrap_or(matter.density_kg_m3),
+            law,
+            ..*matter
+        };
+        regions.push(RegionMatter { region, matter });
+    }
+    regions
+}
+
+/// The shape of a sheet that is a mesh; `None` where it cannot be used, which is reported.
+pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<SoftShape> {
+    let (place, name) = (context.place, file.file.as_deref()?);
+    for (key, is_given) in [("size_m", file.size_m.is_some()), ("segments", file.segments.is_some())] {
+        if is_given {
+            c.wrong(place, key, "contradicts `file`", "expected one of them: a mesh is taken as it is");
+        }
+    }
+    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    let read = context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
+    match read.and_then(|mesh| sheet(&mesh, scale, file.scale.is_none())) {
+        Ok(surface) => Some(SoftShape::Shell { surface: Arc::new(surface), thickness_m }),
+        Err(why) => {
+            let expected = "expected one surface of triangles, open or closed: STL, .glb or OBJ";
+            c.wrong(place, "file", format!("cannot be used: {name}: {why}"), expected);
+            None
+        }
+    }
+}
+
+/// The surface of a mesh in metres, where it can be a sheet of one piece.
+fn sheet(mesh: &mesh::Mesh, scale: f64, scale_is_missing: bool) -> Result<Triangles, String> {
+    let points = mesh.points.iter().map(|point| *point * scale).collect();
+    let surface = welded(&Triangles { points, triangles: mesh.triangles.clone() });
+    if let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) {
+        let (number, sharing) = (found.triangle + 1, found.sharing);
+        return Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"));
+    }
+    let found = pieces(&surface);
+    if found > 1 {
+        return Err(format!("it has {found} separate pieces, and a sheet is one: make each an object"));
+    }
+    let count = surface.points.len();
+    if count as u64 > VERTICES_MAX {
+        return Err(format!("it has {count} points, more than {VERTICES_MAX}"));
+    }
+    let Aabb { low, high } = Aabb::of(&surface.points);
+    too_large((high - low).max_element(), scale_is_missing)?;
+    Ok(surface)
+}

@@ -1,0 +1,66 @@
+//! Cells of VTK: which are taken, which are left out, which cannot be used; and the numbers of regions.
+//!
+//! In: connectivity, kinds, cell data. Out: tetrahedra. Never here: how a file writes them.
+
+use super::points;
+use metachron_geometry::Tetrahedra;
+
+/// Cells of VTK by name: what has no volume is left out, and any other cell is not computed with.
+const TETRAHEDRON: u64 = 10;
+const WITHOUT_VOLUME: [u64; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23];
+const QUADRATIC_TETRAHEDRON: u64 = 24;
+/// Names of cell data that say a region, in the order in which they are looked for.
+const REGIONS: [&str; 5] = ["region", "gmsh:physical", "medit:ref", "material", "CellEntityIds"];
+
+/// Numbers for each cell.
+pub(super) struct CellData {
+    pub name: String,
+    pub values: Vec<f64>,
+}
+
+/// An unstructured grid.
+#[derive(Default)]
+pub(super) struct Grid {
+    pub coordinates: Vec<f64>,
+    /// Points of all cells, one after the other.
+    pub connectivity: Vec<u64>,
+    /// Where the points of each cell begin, and where the last ones end.
+    pub offsets: Vec<u64>,
+    /// The kind of each cell.
+    pub kinds: Vec<u64>,
+    pub data: Vec<CellData>,
+}
+
+impl Grid {
+    /// The tetrahedra among the cells.
+    pub fn tetrahedra(&self) -> Result<Tetrahedra, String> {
+        if self.offsets.len() != self.kinds.len() + 1 {
+            let (cells, kinds) = (self.offsets.len().saturating_sub(1), self.kinds.len());
+            return Err(format!("it has {cells} cells, and says of {kinds} what they are"));
+        }
+        let numbers = REGIONS.iter().find_map(|name| self.data.iter().find(|data| data.name == *name));
+        let mut mesh = Tetrahedra { points: points(&self.coordinates), ..Tetrahedra::default() };
+        for (cell, (&kind, ends)) in self.kinds.iter().zip(self.offsets.windows(2)).enumerate() {
+            if WITHOUT_VOLUME.contains(&kind) {
+                continue;
+            }
+            if kind == QUADRATIC_TETRAHEDRON {
+                return Err(format!("cell {} is a tetrahedron of second order: expected first order", cell + 1));
+            }
+            if kind != TETRAHEDRON {
+                return Err(format!("cell {} is of VTK's kind {kind}: expected tetrahedra (10)", cell + 1));
+            }
+            let corners = self.connectivity.get(ends[0] as usize..ends[1] as usize).unwrap_or_default();
+            let corners: [u64; 4] =
+                corners.try_into().map_err(|_| format!("cell {} is a tetrahedron without four points", cell + 1))?;
+            // a number too large for a point is no point of the mesh either
+            mesh.corners.push(corners.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX)));
+            if let Some(numbers) = numbers {
+                let number = numbers.values.get(cell).copied();
+                let number = number.filter(|number| number.is_finite());
+                mesh.regions.push(number.ok_or_else(|| format!("cell {} has no number of a region", cell + 1))? as i64);
+            }
+        }
+        Ok(mesh)
+    }
+}
