@@ -263,6 +263,7 @@ fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
             SoftMatter { young_pa: 2e4, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.0, damping_s: 0.0 };
         let spec = SoftSpec {
             shape,
+            nodes: None,
             matter,
             position: DVec3::Z,
             rotation: DQuat::from_rotation_x(0.3),

@@ -9,10 +9,12 @@ mod anchor_springs;
 mod bar;
 mod bending;
 mod body;
+mod carrier;
 mod fe_mesh;
 mod gradients;
 mod grid;
 mod hexahedron;
+mod lattice;
 mod member;
 mod membrane;
 mod publish;
@@ -27,4 +29,4 @@ mod tests;
 
 pub use body::SoftBody;
 pub use grid::Side;
-pub use spec::{SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+pub use spec::{NodeSpacing, SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};

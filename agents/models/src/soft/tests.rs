@@ -5,6 +5,7 @@ mod error;
 mod large;
 mod promises;
 mod skins;
+mod spaced;
 mod statics;
 
 use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
@@ -21,6 +22,7 @@ const G: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 fn spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
+        nodes: None,
         matter: MATTER,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

@@ -68,6 +68,7 @@ fn press(young_pa: f64, rate_hz: f64, due: bool, tamper: Option<Tamper>) -> Felt
 fn column(young_pa: f64) -> SoftBody {
     let spec = SoftSpec {
         shape: SoftShape::Box { size_m: SIZE_M, segments: [2, 2, 4] },
+        nodes: None,
         matter: SoftMatter { young_pa, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.2, damping_s: 0.0 },
         position: DVec3::new(-0.5 * SIZE_M.x, -0.5 * SIZE_M.y, 0.0),
         rotation: DQuat::IDENTITY,
