@@ -32,13 +32,14 @@ impl Spec {
         }
     }
 
-    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 2 of a sheet, 3 of a solid's cage.
+    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 2.5 of a sheet, between 2 of its elements
+    /// and 3 of its factor, 3 of a solid's cage.
     #[must_use]
     pub const fn work_power(&self) -> f64 {
         match self {
             Self::Soft(soft) => match soft.shape {
                 SoftShape::Rope { .. } => 1.0,
-                SoftShape::Sheet { .. } => 2.0,
+                SoftShape::Sheet { .. } => 2.5,
                 SoftShape::Box { .. } | SoftShape::Ball { .. } | SoftShape::Embedded { .. } => 3.0,
             },
             Self::Tube(_) | Self::Synthetic(_) | Self::Rigid(_) | Self::Tool(_) => 1.0,

@@ -1,7 +1,7 @@
 //! Transfers the state of a soft body with a skin from one cage or lattice to another.
 //!
 //! In: a body and another ε. Out: the same body on other nodes: the same mass and linear momentum to rounding, angular momentum and shape
-//! to O(ε²), no more energy. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–22.
+//! to O(ε²), no more energy. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21, 24.
 
 use super::body::SoftBody;
 use super::carrier::Carrier;
@@ -75,7 +75,7 @@ impl SoftBody {
         Kept { energy_j: self.energy_j(), momentum: self.linear_momentum(), centre, whole, inertia }
     }
 
-    /// Where the present carrier has the nodes of another one, and how fast (eq. 19, 22).
+    /// Where the present carrier has the nodes of another one, and how fast (eq. 19, 24).
     fn at_nodes(&self, carrier: &Carrier, mesh: &FeMesh) -> (Vec<DVec3>, Vec<DVec3>) {
         let rotation = self.spec.rotation.normalize();
         let spread = |at_m: DVec3, list: &[DVec3]| {

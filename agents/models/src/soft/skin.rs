@@ -1,7 +1,7 @@
 //! The skin of a soft body: a surface or a line that moves with the nodes that carry it, and stays the same when they change.
 //!
 //! In: points, what carries them, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
-//! steps. Theory: docs/theory/soft.md, eq. 18, 22.
+//! steps. Theory: docs/theory/soft.md, eq. 18, 24.
 
 use super::carrier::{Carrier, SkinPoints, into_body};
 use glam::DVec3;

@@ -212,3 +212,13 @@ fn spacings_that_cannot_be_are_refused_with_the_reason() {
     let none = fails(SoftSpec { nodes: nodes((f64::NAN, 0.1)), ..spec(fine_rope()) });
     assert!(none.to_string().contains("ε is NaN"), "{none}");
 }
+
+#[test]
+fn the_work_of_a_step_falls_by_the_power_that_the_rate_control_is_told() {
+    for (shape, length_m, power) in [(fine_sheet(), 0.3, 2.5), (fine_rope(), 1.0, 1.0)] {
+        let work = |cells: f64| SoftBody::new(spaced(shape.clone(), length_m / cells)).unwrap().work();
+        let found = [(8.0, 16.0), (16.0, 32.0)].map(|(coarse, fine): (f64, f64)| (work(fine) / work(coarse)).log2());
+        // a sheet's elements grow with the power 2, the products of its factor with 3
+        assert!(found.iter().all(|found| (found - power).abs() < 0.6), "{found:?}, {power} told");
+    }
+}
