@@ -58,6 +58,40 @@ fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
 }
 
 #[test]
+fn a_sheet_or_a_rope_with_an_eps_has_the_lattice_of_its_finest_as_its_skin() {
+    let sheet = SHEET.replace("segments = [4, 2]", "eps_m = [0.01, 0.05]");
+    let rope = ROPE.replace("segments = 10", "eps_m = 0.03").replace("\"s\"", "\"r\"");
+    let scene =
+        read(&format!("[[object]]\n{sheet}young_pa = 1e5\n[[object]]\n{rope}path_m = [[0, 0, 1], [0.1, 0, 1]]\n"))
+            .unwrap();
+    let [Spec::Soft(sheet), Spec::Soft(rope)] = [&scene.agents[0].spec, &scene.agents[1].spec] else { panic!() };
+    assert!(matches!(sheet.shape, SoftShape::Sheet { segments: [20, 10], .. }), "{:?}", sheet.shape);
+    assert!(matches!(rope.shape, SoftShape::Rope { segments: 4, .. }), "{:?}", rope.shape);
+    assert_eq!(sheet.spacing().unwrap().range_m, (0.01, 0.05));
+    assert_eq!(scene.agents[0].simulation.eps_m, (0.01, 0.05));
+    assert_eq!(rope.spacing().unwrap().range_m, (0.03, 0.03));
+}
+
+#[test]
+fn an_eps_that_a_sheet_or_a_rope_cannot_have_is_told_with_its_line() {
+    let sheet = |key: &str| format!("{}young_pa = 1e5", SHEET.replace("segments = [4, 2]", key));
+    let rope = |key: &str| format!("{}path_m = [[0, 0, 0], [1, 0, 0]]", ROPE.replace("segments = 10", key));
+    for (object, line, words) in [
+        (sheet("eps_m = 0.01\nsegments = [4, 2]"), 5, "`segments` of `s` contradicts `eps_m`; expected one of them"),
+        (sheet(""), 1, "`segments` of `s` is missing; expected `segments` or `eps_m`"),
+        (sheet("eps_m = [0.0005, 0.05]"), 4, "`eps_m` of `s` is too fine for its size; expected a larger finest ε"),
+        (sheet("eps_m = [0.05, 0.01]"), 4, "`eps_m` of `s` runs from 0.05 down to 0.01"),
+        (sheet("eps_m = -1"), 4, "`eps_m` of `s` has the value -1"),
+        (rope("eps_m = 0.0004"), 5, "at most 10000 vertices, 2047 cells along an axis"),
+        (rope("eps_m = 0.1\nsegments = 10"), 6, "`segments` of `s` contradicts `eps_m`"),
+    ] {
+        let (at, said) = refusal(&object);
+        assert!(said.contains(words), "{words:?} is not said: {said}");
+        assert!(at == line || line == 1, "line {at} of {object}");
+    }
+}
+
+#[test]
 fn a_coupling_by_a_law_that_soft_bodies_do_not_know_is_refused() {
     let ball =
         "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
@@ -72,6 +106,9 @@ fn the_gut_hangs_from_its_mesentery_and_the_grasper_feels_it() {
     for name in ["gut", "mesentery"] {
         assert_eq!(agent(&report, name)["parked"], false, "{name}");
     }
+    // the spacing is one of the range of the sheet
+    let eps_m = number(agent(&report, "mesentery"), "/eps_m");
+    assert!((0.01..=0.04).contains(&eps_m), "{eps_m}");
     // it hangs 11 to 15 cm under the wall at 22 cm, and is pulled 5 cm towards the grasper
     let gut = point(&report, "/probes/0/position_m");
     assert!(gut[2] > 0.04 && gut[2] < 0.11 && gut[1] < -0.01, "{gut:?}");

@@ -3,8 +3,18 @@
 use crate::play::{Folder, lockstep};
 use serde_json::Value;
 
-/// A soft tube that hangs from two pins; the camera looks at it, at `away` between 1 and 6 s, and at it again.
-fn hanging(away: &str) -> String {
+/// A soft tube that hangs from two pins.
+const HOSE: &str = "name = \"hose\"\nmodel = \"tube\"\npath_m = [[-0.4, 0, 0], [0, 0, -0.2], [0.4, 0, 0]]\n\
+    radius_m = 0.012\nwall_m = 0.003\nyoung_pa = 5.0e5\nself_contact = false\npin = [\"start\", \"end\"]\n";
+/// A rope along the same path, and a sheet, which hang from two of their sides.
+const ROPE: &str = "name = \"rope\"\nmodel = \"rope\"\npath_m = [[-0.4, 0, 0], [0, 0, -0.2], [0.4, 0, 0]]\n\
+    radius_m = 0.005\nyoung_pa = 1.0e6\nhold = [\"start\", \"end\"]\n";
+const SHEET: &str = "name = \"sheet\"\nmodel = \"sheet\"\nsize_m = [0.8, 0.1]\nthickness_m = 0.002\n\
+    young_pa = 2.0e5\nhold = [\"left\", \"right\"]\n";
+
+/// An object that the camera looks at, at `away` between 1 and 6 s, and at it again.
+fn hanging(object: &str, away: &str) -> String {
+    let name = object.split('"').nth(1).expect("an object has a name");
     format!(
         "[target]\nframe_hz = 30.0\n[camera]\n\
          keyframe = [\n\
@@ -12,15 +22,14 @@ fn hanging(away: &str) -> String {
            {{ at_s = 1.1, {away} }},\n{{ at_s = 6, {away} }},\n\
            {{ at_s = 6.1, eye_m = [0, -1.5, 0], look_at_m = [0, 0, 0] }},\n{{ at_s = 10, eye_m = [0, -1.5, 0], look_at_m = [0, 0, 0] }},\n\
          ]\n\
-         [[object]]\nname = \"hose\"\nmodel = \"tube\"\npath_m = [[-0.4, 0, 0], [0, 0, -0.2], [0.4, 0, 0]]\n\
-         radius_m = 0.012\nwall_m = 0.003\nyoung_pa = 5.0e5\ndensity_kg_m3 = 1050.0\nself_contact = false\nsleep = false\n\
-         damping_per_s = 8.0\npin = [\"start\", \"end\"]\nrate_hz = 100.0\neps_m = [0.01, 0.1]\nn = [0, 2]\n\
-         [[probe]]\nobject = \"hose\"\nat = 0.5\nevery_ms = 10.0\n"
+         [[object]]\n{object}density_kg_m3 = 1050.0\nsleep = false\ndamping_per_s = 8.0\nrate_hz = 100.0\neps_m = [0.01, 0.1]\n\
+         n = [0, 2]\n\
+         [[probe]]\nobject = \"{name}\"\nat = 0.5\nevery_ms = 10.0\n"
     )
 }
 
-fn play(away: &str, seconds: &str) -> Value {
-    let folder = Folder::with(&hanging(away));
+fn play(object: &str, away: &str, seconds: &str) -> Value {
+    let folder = Folder::with(&hanging(object, away));
     lockstep(folder.scene(), &["--seconds", seconds])
 }
 
@@ -41,9 +50,9 @@ const FAR: &str = "eye_m = [0, -60, 0], look_at_m = [0, 0, 0]";
 
 #[test]
 fn out_of_sight_a_tube_is_at_its_coarsest_and_it_comes_back_as_fine_as_before_without_a_jump() {
-    assert_eq!(eps_m(&play(BEHIND, "1.5")), 0.01, "a glance aside changes nothing");
-    assert_eq!(eps_m(&play(BEHIND, "5")), 0.1);
-    let back = play(BEHIND, "9");
+    assert_eq!(eps_m(&play(HOSE, BEHIND, "1.5")), 0.01, "a glance aside changes nothing");
+    assert_eq!(eps_m(&play(HOSE, BEHIND, "5")), 0.1);
+    let back = play(HOSE, BEHIND, "9");
     assert_eq!(eps_m(&back), 0.01);
     // from a tenth of a metre to a hundredth and back: the middle moves by less than the finer of the two
     assert!(leap_m(&back, 0.9) < 0.01, "{}", leap_m(&back, 0.9));
@@ -53,6 +62,29 @@ fn out_of_sight_a_tube_is_at_its_coarsest_and_it_comes_back_as_fine_as_before_wi
 fn far_away_a_tube_is_as_fine_as_a_pixel_is_wide() {
     // 720 rows over 40 degrees, 60 m away less the radius of the ball around it
     let pixel_m = |depth_m: f64| depth_m * 2.0 * (20.0_f64).to_radians().tan() / 720.0;
-    let eps_m = eps_m(&play(FAR, "5"));
+    let eps_m = eps_m(&play(HOSE, FAR, "5"));
     assert!(eps_m < pixel_m(60.0) && eps_m > pixel_m(59.0), "{eps_m}, {}", pixel_m(60.0));
+}
+
+#[test]
+fn out_of_sight_a_rope_and_a_sheet_are_at_their_coarsest_and_come_back_without_a_jump() {
+    for object in [ROPE, SHEET] {
+        assert_eq!(eps_m(&play(object, BEHIND, "5")), 0.1);
+        let back = play(object, BEHIND, "9");
+        assert!((eps_m(&back) - 0.01).abs() < 1e-3, "{}", eps_m(&back));
+        assert!(leap_m(&back, 0.9) < 0.01, "{}", leap_m(&back, 0.9));
+    }
+}
+
+#[test]
+fn a_rope_and_a_sheet_are_as_coarse_as_a_tolerance_allows() {
+    for object in [ROPE, SHEET] {
+        let [tight, loose] = [1e-3, 1e-2].map(|tolerance_m: f64| {
+            let held = format!("{object}tolerance_m = {tolerance_m}\ndt_ms = [1, 10]\n");
+            let report = play(&held, "eye_m = [0, -1.5, 0], look_at_m = [0, 0, 0]", "4");
+            (eps_m(&report), report["agents"][0]["residual_m"].as_f64().expect("an error of its own"))
+        });
+        assert!(tight.0 < 0.7 * loose.0, "{tight:?} {loose:?}");
+        assert!(tight.1 < 1e-3 && loose.1 < 1e-2, "{tight:?} {loose:?}");
+    }
 }

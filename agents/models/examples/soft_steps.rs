@@ -39,6 +39,7 @@ fn main() {
 fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
     let spec = SoftSpec {
         shape,
+        nodes: None,
         matter,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

@@ -269,6 +269,7 @@ fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
         };
         let spec = SoftSpec {
             shape,
+            nodes: None,
             matter,
             position: DVec3::Z,
             rotation: DQuat::from_rotation_x(0.3),

@@ -11,7 +11,7 @@ use super::picture::{
     resolution_colour,
 };
 use super::scene_view::{Appearance, Form, Material, SceneView, Track};
-use super::skin::{ROPE_LEVEL, SkinOptions, SkinScratch, curve_of_rope, drawn_radius_m};
+use super::skin::{ShownSkin, SkinOptions, SkinScratch, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use metachron_core::{AgentId, Anchor, Body, Resolution};
@@ -135,10 +135,7 @@ impl SceneView {
         let tracks = &self.tracks;
         let tubes = scratch.shown.iter().filter(|&&number| long(&tracks[number].actor.form));
         let drawn = tubes.map(|&number| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
-        let level_of = |n: u8, number: usize| {
-            if matches!(tracks[number].actor.form, Form::Rope { .. }) { ROPE_LEVEL } else { n }
-        };
-        scratch.tubes.extend(drawn.map(|(at, number)| (level_of(at.resolution.n, number), number)));
+        scratch.tubes.extend(drawn.map(|(at, number)| (at.resolution.n, number)));
         scratch.tubes.sort_unstable();
         for &(n, number) in &scratch.tubes {
             let track = &mut self.tracks[number];
@@ -188,9 +185,14 @@ impl SceneView {
             let number = picture.instances.len() as u32;
             picture.instances.push(instance(DVec3::ZERO, DQuat::IDENTITY, size, paint));
             let Picture { skins, origin, style, .. } = picture;
-            let options =
-                SkinOptions { origin: *origin, instance: number, shading: at.shading, edges: style.wireframe };
-            skins.add(form, soft, options, room);
+            let options = SkinOptions {
+                origin: *origin,
+                instance: number,
+                shading: at.shading,
+                edges: style.wireframe,
+                n: at.resolution.n,
+            };
+            skins.add(ShownSkin { form, edges: &track.edges, soft }, options, room);
         }
     }
 

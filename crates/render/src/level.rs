@@ -23,7 +23,7 @@ pub enum Shading {
 /// The level at which an actor is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
-    /// (ε, n) of a tube; only n for a single mesh with levels.
+    /// (ε, n) of a tube; only n for a single mesh with levels, a rope or the skin of a soft body.
     pub resolution: Resolution,
     /// Number of triangles, for forms that take any number. An actor with 0 is left out of the picture, with its shadow.
     pub triangles: u32,

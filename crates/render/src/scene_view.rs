@@ -6,6 +6,7 @@
 use super::lod_transition::Geomorph;
 use super::picture::Picture;
 use super::pose;
+use super::tessellation::SkinEdges;
 use super::texturing::Painting;
 use super::view::{Camera, Size};
 use super::visibility::Visibility;
@@ -135,6 +136,8 @@ pub(super) struct Track {
     pub geomorph: Option<Geomorph>,
     /// The displayed curve of a rope.
     pub rope: CurveState,
+    /// The edges of the skin of a sheet or soft solid.
+    pub edges: SkinEdges,
     /// Texture of scenery.
     pub painting: Option<Painting>,
 }
@@ -250,6 +253,10 @@ impl Track {
             }
             _ => Body::Nothing,
         };
+        let edges = match &actor.form {
+            Form::Skin(form) => SkinEdges::of(&form.triangles),
+            _ => SkinEdges::default(),
+        };
         let mut track = Self {
             actor,
             body,
@@ -267,6 +274,7 @@ impl Track {
             cut_m: None,
             geomorph: None,
             rope: CurveState::default(),
+            edges,
             painting: None,
         };
         track.bounds = track.find_bounds();

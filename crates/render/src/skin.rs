@@ -1,16 +1,15 @@
 //! Soft bodies in the picture: moving skins of triangles, and ropes as tubes.
 //!
-//! In: the displayed vertices and their connectivity. Out: corners with normals for one mesh of the frame, smooth except at the sharp edges
-//! of solids; a framed curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
+//! In: the displayed vertices, their connectivity, a level. Out: corners with normals for one mesh of the frame, smooth except at the sharp
+//! edges of solids; a framed curve. Never here: the choice of levels, the GPU. Nothing is allocated once sizes settle.
 
 use super::level::Shading;
 use super::picture::MeshCorner;
+use super::tessellation::{CoarseSkin, FineSkin, SkinEdges, SkinPoint, skin_divisions};
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceShape;
 
-/// Level of the patches of a rope.
-pub const ROPE_LEVEL: u8 = 2;
 /// Least drawn thickness of a sheet, as a fraction of its edges: below, the depths of its two faces cannot be told apart.
 const THIN_SHARE: f64 = 0.01;
 
@@ -53,6 +52,17 @@ pub(super) struct SkinOptions {
     pub shading: Shading,
     /// Whether its edges are drawn.
     pub edges: bool,
+    /// Level of its patches.
+    pub n: u8,
+}
+
+/// A skin as it is displayed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ShownSkin<'a> {
+    pub form: &'a SurfaceShape,
+    /// The edges of its triangles.
+    pub edges: &'a SkinEdges,
+    pub soft: &'a SoftState,
 }
 
 /// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others are stored after all vertices.
@@ -80,8 +90,7 @@ struct Face {
 pub(super) struct SkinScratch {
     normals: Vec<DVec3>,
     faces: Faces,
-    /// The sides of a sheet's triangles; after `find_rim` only its border edges, which belong to one triangle.
-    rim: Vec<[u32; 2]>,
+    fine: FineSkin,
 }
 
 impl Skins {
@@ -94,36 +103,24 @@ impl Skins {
     }
 
     /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
-    pub(super) fn add(
-        &mut self,
-        form: &SurfaceShape,
-        soft: &SoftState,
-        options: SkinOptions,
-        scratch: &mut SkinScratch,
-    ) {
-        let SkinOptions { origin, instance, shading, edges } = options;
+    pub(super) fn add(&mut self, skin: ShownSkin<'_>, options: SkinOptions, scratch: &mut SkinScratch) {
+        let SkinOptions { origin, instance, shading, edges, n } = options;
+        let form = skin.form;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
-        let corner = |x: &DVec3, n: DVec3| MeshCorner {
-            core: (*x - origin).as_vec3().to_array(),
+        scratch.divide(skin, skin_divisions(n));
+        let FineSkin { points, triangles, rim, .. } = &scratch.fine;
+        let corner = |x: DVec3, n: DVec3| MeshCorner {
+            core: (x - origin).as_vec3().to_array(),
             normal: n.as_vec3().to_array(),
             uv: [0.0; 2],
         };
-        if form.closed {
-            scratch.faces.find(form, soft);
-            let normal = |face: &Face| face.sum.normalize_or(DVec3::Z);
-            let faces = scratch.faces.all.iter();
-            self.corners.extend(faces.map(|face| corner(&soft.positions[face.vertex as usize], normal(face))));
-            self.triangles.extend(scratch.faces.triangles.iter().map(|t| t.map(|face| first + face)));
-        } else {
-            scratch.find_normals(form, soft);
-            let both = || soft.positions.iter().zip(&scratch.normals);
-            self.corners.extend(both().map(|(x, n)| corner(x, *n)));
-            self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
-            let back = first + soft.positions.len() as u32;
-            self.corners.extend(both().map(|(x, n)| corner(x, -*n)));
-            self.triangles.extend(form.triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
-            scratch.find_rim(form);
-            for &[a, b] in &scratch.rim {
+        self.corners.extend(points.iter().map(|point| corner(point.position, point.normal)));
+        self.triangles.extend(triangles.iter().map(|t| t.map(|point| first + point)));
+        if !form.closed {
+            let back = first + points.len() as u32;
+            self.corners.extend(points.iter().map(|point| corner(point.position, -point.normal)));
+            self.triangles.extend(triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
+            for &[a, b] in rim {
                 self.triangles.extend([[first + b, first + a, back + a], [first + b, back + a, back + b]]);
             }
         }
@@ -185,23 +182,24 @@ impl SkinScratch {
         self.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(DVec3::Z));
     }
 
-    /// Finds the sides of triangles without a neighbour, each in the direction of its triangle.
-    fn find_rim(&mut self, form: &SurfaceShape) {
-        self.rim.clear();
-        self.rim.extend(form.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
-        self.rim.sort_unstable_by_key(|[a, b]| [*a.min(b), *a.max(b)]);
-        let same = |one: &[u32; 2], two: &[u32; 2]| one[0] == two[1] && one[1] == two[0];
-        let mut kept = 0;
-        let mut at = 0;
-        while at < self.rim.len() {
-            if at + 1 < self.rim.len() && same(&self.rim[at], &self.rim[at + 1]) {
-                at += 2;
-            } else {
-                self.rim[kept] = self.rim[at];
-                (kept, at) = (kept + 1, at + 1);
-            }
+    /// Divides every side of a skin into `parts`, its front where it is open.
+    fn divide(&mut self, skin: ShownSkin<'_>, parts: u32) {
+        let ShownSkin { form, edges, soft } = skin;
+        self.fine.points.clear();
+        let vertices = &form.triangles;
+        if form.closed {
+            self.faces.find(form, soft);
+            self.fine.points.extend(self.faces.all.iter().map(|face| SkinPoint {
+                position: soft.positions[face.vertex as usize],
+                normal: face.sum.normalize_or(DVec3::Z),
+            }));
+            self.fine.divide(CoarseSkin { edges, vertices, corners: &self.faces.triangles }, parts);
+        } else {
+            self.find_normals(form, soft);
+            let both = soft.positions.iter().zip(&self.normals);
+            self.fine.points.extend(both.map(|(position, normal)| SkinPoint { position: *position, normal: *normal }));
+            self.fine.divide(CoarseSkin { edges, vertices, corners: vertices }, parts);
         }
-        self.rim.truncate(kept);
     }
 }
 
@@ -253,8 +251,9 @@ mod tests {
     fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
         let (form, soft) = square();
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false };
-        skins.add(&form, &soft, options, &mut scratch);
+        let options = SkinOptions { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false, n: 0 };
+        let shown = ShownSkin { form: &form, edges: &SkinEdges::of(&form.triangles), soft: &soft };
+        skins.add(shown, options, &mut scratch);
         assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
         let thick = |i: u32| {
             let MeshCorner { core, normal, .. } = skins.corners[i as usize];
@@ -291,8 +290,9 @@ mod tests {
     fn a_solid_is_smooth_within_its_sides_and_sharp_at_its_edges() {
         let (form, soft) = cube(0.3);
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false };
-        skins.add(&form, &soft, options, &mut scratch);
+        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false, n: 0 };
+        let shown = ShownSkin { form: &form, edges: &SkinEdges::of(&form.triangles), soft: &soft };
+        skins.add(shown, options, &mut scratch);
         assert_eq!(skins.corners.len(), 24, "three sides meet at each of eight vertices");
         for triangle in &skins.triangles {
             let corners = triangle.map(|corner| &skins.corners[corner as usize]);
@@ -302,8 +302,137 @@ mod tests {
         }
         // no data of the previous body is left in the scratch storage
         skins.clear();
-        skins.add(&form, &soft, options, &mut scratch);
+        skins.add(shown, options, &mut scratch);
         assert_eq!((skins.corners.len(), skins.triangles.len()), (24, 12));
+    }
+
+    /// Whether every side of a triangle is that of another one the other way round, by the places of its ends.
+    fn is_without_gaps(skins: &Skins, radius_m: f32) -> bool {
+        let at = |corner: u32| {
+            let MeshCorner { core, normal, .. } = skins.corners[corner as usize];
+            (glam::Vec3::from(core) + glam::Vec3::from(normal) * radius_m).to_array().map(f32::to_bits)
+        };
+        let sides = skins.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut balance = std::collections::BTreeMap::new();
+        for [a, b] in sides.map(|side| side.map(at)) {
+            *balance.entry([a.min(b), a.max(b)]).or_insert(0) += if a < b { 1 } else { -1 };
+        }
+        balance.values().all(|count| *count == 0)
+    }
+
+    fn at_level(form: &SurfaceShape, soft: &SoftState, n: u8) -> Skins {
+        let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
+        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false, n };
+        let shown = ShownSkin { form, edges: &SkinEdges::of(&form.triangles), soft };
+        skins.add(shown, options, &mut scratch);
+        skins
+    }
+
+    fn volume(skins: &Skins) -> f64 {
+        let at = |corner: u32| glam::Vec3::from(skins.corners[corner as usize].core).as_dvec3();
+        let sixths = skins.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(at);
+            a.dot(b.cross(c)) / 6.0
+        });
+        sixths.sum()
+    }
+
+    #[test]
+    fn a_level_divides_every_triangle_into_about_as_many_as_a_tube_s_patch() {
+        let (form, soft) = cube(0.3);
+        for n in 0..=6 {
+            let parts = skin_divisions(n);
+            let triangles = at_level(&form, &soft, n).triangles.len() as u32;
+            assert_eq!(triangles, 12 * parts * parts);
+            assert!((f64::from(parts * parts) / f64::from(1 << n)).log2().abs() <= 1.0);
+        }
+        // a sheet has its two faces, and two triangles for each part of its rim
+        let (form, soft) = square();
+        assert_eq!(at_level(&form, &soft, 3).triangles.len(), 2 * 2 * 9 + 4 * 2 * 3);
+    }
+
+    #[test]
+    fn a_box_of_flat_sides_stays_one_and_no_level_opens_a_gap() {
+        let (form, soft) = cube(0.3);
+        for n in 0..=7 {
+            let skins = at_level(&form, &soft, n);
+            assert!(is_without_gaps(&skins, 0.0), "level {n}");
+            // 1 m² under a slope of tan 0.3
+            let exact = 1.0 + 0.5 * 0.3_f64.tan();
+            assert!((volume(&skins) - exact).abs() < 1e-6, "level {n}: {}", volume(&skins));
+        }
+        // a corner that is pulled out bends all three sides and their sharp edges
+        let (form, mut soft) = cube(0.0);
+        soft.positions[7] += DVec3::splat(0.4);
+        assert!((0..=7).all(|n| is_without_gaps(&at_level(&form, &soft, n), 0.0)));
+    }
+
+    /// An octahedron whose sides were halved `times` times, on the unit ball.
+    fn ball(times: u32) -> (SurfaceShape, SoftState) {
+        let mut positions = vec![DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::NEG_Z];
+        let mut triangles =
+            vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+        for _ in 0..times {
+            let mut known = std::collections::BTreeMap::new();
+            let mut halved = vec![];
+            for [a, b, c] in triangles {
+                let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[a, b]: [u32; 2]| {
+                    *known.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                        positions.push((positions[a as usize] + positions[b as usize]).normalize());
+                        positions.len() as u32 - 1
+                    })
+                });
+                halved.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+            }
+            triangles = halved;
+        }
+        let (form, _) = cube(0.0);
+        let form =
+            SurfaceShape { vertices: (0..positions.len() as u32).collect(), triangles: triangles.into(), ..form };
+        (form, SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions })
+    }
+
+    #[test]
+    fn a_coarse_ball_is_rounded_and_has_the_normals_of_a_ball() {
+        let exact = 4.0 / 3.0 * std::f64::consts::PI;
+        for times in [2, 3] {
+            let (form, soft) = ball(times);
+            let [flat, round] = [0, 6].map(|n| at_level(&form, &soft, n));
+            assert!(is_without_gaps(&round, 0.0));
+            let [before, after] = [&flat, &round].map(|skins| (volume(skins) / exact - 1.0).abs());
+            // corners of a halved octahedron have four neighbours or six: their mean normals are not quite those of the ball
+            assert!(after < before / 8.0, "{before} {after}");
+            for corner in &round.corners {
+                let [at, normal] = [corner.core, corner.normal].map(|v| glam::Vec3::from(v).as_dvec3());
+                assert!(normal.dot(at.normalize()) > 0.99, "{at} {normal}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_rolled_sheet_is_drawn_round_and_both_of_its_faces_and_its_rim_close_it() {
+        // a quarter of a cylinder of 1 m, in six strips
+        let (around, along) = (6_u32, 4_u32);
+        let at = |i: u32, j: u32| i * (along + 1) + j;
+        let positions = (0..=around).flat_map(|i| {
+            let (sin, cos) = (std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(around)).sin_cos();
+            (0..=along).map(move |j| DVec3::new(cos, sin, f64::from(j) * 0.3))
+        });
+        let positions: Vec<DVec3> = positions.collect();
+        let quads =
+            (0..around).flat_map(|i| (0..along).map(move |j| [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]));
+        let triangles: Vec<[u32; 3]> = quads.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let (form, _) = square();
+        let form =
+            SurfaceShape { triangles: triangles.into(), vertices: (0..positions.len() as u32).collect(), ..form };
+        let soft = SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions };
+        let skins = at_level(&form, &soft, 4);
+        assert!(is_without_gaps(&skins, 0.01));
+        // a chord of 15 degrees sags by 8.6 mm; at the border the normals are those of half a strip
+        let inner = skins.corners.iter().map(|corner| corner.core.map(f64::from));
+        let inner = inner.filter(|[x, y, z]| x.min(*y) > 0.3 && (0.3..=0.9).contains(z));
+        let worst = inner.map(|[x, y, _]| (x.hypot(y) - 1.0).abs()).fold(0.0, f64::max);
+        assert!(worst < 5e-4, "{worst}");
     }
 
     #[test]

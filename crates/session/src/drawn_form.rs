@@ -6,7 +6,7 @@ use metachron_contact::Agent;
 use metachron_geometry::{Primitive, ShapeKind, Solid, ToolShape, patch};
 use metachron_lod::control::PRIMITIVE_LEVELS;
 use metachron_models::soft::{SoftBody, SoftShape, SoftSpec};
-use metachron_render::{Form, ROPE_LEVEL};
+use metachron_render::{Form, skin_divisions};
 use metachron_world::Spec;
 use std::collections::BTreeSet;
 
@@ -41,28 +41,30 @@ pub(super) fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
         match spec {
             Spec::Rigid(body) => solid_triangles(&body.solid, n),
             Spec::Tool(_) => of_tool(n),
-            Spec::Soft(body) => soft_triangles(&body.shape),
+            Spec::Soft(body) => soft_triangles(&body.shape, n),
             Spec::Tube(_) | Spec::Synthetic(_) => 0,
         }
     })
 }
 
-/// Triangles drawn for a soft body: a sheet has two faces and a rim, a rope is drawn as a tube.
-fn soft_triangles(shape: &SoftShape) -> u32 {
+/// Triangles drawn for a soft body at level `n`: a sheet has two faces and a rim, a rope is drawn as a tube.
+fn soft_triangles(shape: &SoftShape, n: u8) -> u32 {
+    let parts = skin_divisions(n);
+    let each = parts * parts;
     match shape {
-        SoftShape::Embedded { surface, .. } => surface.triangles.len() as u32,
-        SoftShape::Tetrahedra { mesh, .. } => mesh.boundary().len() as u32,
+        SoftShape::Embedded { surface, .. } => surface.triangles.len() as u32 * each,
+        SoftShape::Tetrahedra { mesh, .. } => mesh.boundary().len() as u32 * each,
         // both faces, and two for each edge of the rim
         SoftShape::Shell { surface, .. } => {
             let sides = || surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
             let known: BTreeSet<[u32; 2]> = sides().collect();
-            let rim = sides().filter(|[a, b]| !known.contains(&[*b, *a])).count();
-            2 * (surface.triangles.len() + rim) as u32
+            let rim = sides().filter(|[a, b]| !known.contains(&[*b, *a])).count() as u32;
+            2 * (surface.triangles.len() as u32 * each + rim * parts)
         }
-        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
-        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
-        SoftShape::Ball { segments: n, .. } => 12 * n * n,
-        SoftShape::Rope { segments, .. } => segments * patch::triangles(ROPE_LEVEL),
+        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y * each + 4 * (x + y) * parts,
+        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x) * each,
+        SoftShape::Ball { segments: n, .. } => 12 * n * n * each,
+        SoftShape::Rope { segments, .. } => segments * patch::triangles(n),
     }
 }
 

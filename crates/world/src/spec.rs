@@ -9,7 +9,7 @@ use metachron_contact::Agent;
 use metachron_core::{Body, CurveState, ResolutionRange, Snapshot};
 use metachron_geometry::{Aabb, cage_counts};
 use metachron_models::rod::{Integrator, Tube, TubeSpec};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, NodeSpacing, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
 
 /// How an agent is divided into elements, and how its steps are integrated.
@@ -27,15 +27,23 @@ impl Spec {
     pub const fn adapts_spacing(&self) -> bool {
         match self {
             Self::Tube(_) | Self::Synthetic(_) => true,
-            Self::Soft(soft) => matches!(soft.shape, SoftShape::Embedded { .. }),
+            Self::Soft(soft) => soft.nodes.is_some() || matches!(soft.shape, SoftShape::Embedded { .. }),
             Self::Rigid(_) | Self::Tool(_) => false,
         }
     }
 
-    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 3 of a solid's cage.
+    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 2.5 of a sheet, between 2 of its elements
+    /// and 3 of its factor, 3 of a solid's cage.
     #[must_use]
     pub const fn work_power(&self) -> f64 {
-        if matches!(self, Self::Soft(_)) { 3.0 } else { 1.0 }
+        match self {
+            Self::Soft(soft) => match soft.shape {
+                SoftShape::Rope { .. } => 1.0,
+                SoftShape::Sheet { .. } => 2.5,
+                SoftShape::Box { .. } | SoftShape::Ball { .. } | SoftShape::Embedded { .. } => 3.0,
+            },
+            Self::Tube(_) | Self::Synthetic(_) | Self::Rigid(_) | Self::Tool(_) => 1.0,
+        }
     }
 
     /// True where the body bends.
@@ -93,9 +101,7 @@ impl Member {
     pub fn division(&self) -> Division {
         match &self.spec {
             Spec::Tube(tube) => Division { elements: self.segments(tube), integrator: Some(tube.integrator) },
-            Spec::Soft(soft) => {
-                Division { elements: cells(&soft.shape).into_iter().max().unwrap_or(0), integrator: None }
-            }
+            Spec::Soft(soft) => Division { elements: cells(soft).into_iter().max().unwrap_or(0), integrator: None },
             Spec::Rigid(_) | Spec::Tool(_) | Spec::Synthetic(_) => Division { elements: 0, integrator: None },
         }
     }
@@ -113,8 +119,8 @@ impl Member {
                 (self.simulation, self.start) = (range, tube.resolution);
             }
             Spec::Soft(soft) if elements > 0 => {
-                set_cells(&mut soft.shape, elements);
-                if let SoftShape::Embedded { eps_m, range_m, .. } = soft.shape {
+                set_cells(soft, elements);
+                if let Some(NodeSpacing { eps_m, range_m }) = soft.spacing() {
                     (self.simulation.eps_m, self.start.eps_m) = (range_m, eps_m);
                 }
             }
@@ -125,7 +131,7 @@ impl Member {
     /// Cells of a soft body along each of its axes; empty for other models.
     #[must_use]
     pub fn cells(&self) -> Vec<u32> {
-        if let Spec::Soft(soft) = &self.spec { cells(&soft.shape) } else { Vec::new() }
+        if let Spec::Soft(soft) = &self.spec { cells(soft) } else { Vec::new() }
     }
 
     /// Replaces a tube by a rope where the tube has nothing that a rope lacks; `false`, and no change, where it is attached or shaped as
@@ -155,6 +161,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
     let held = [Side::Left, Side::Right].into_iter().zip([0, 1]);
     let spec = SoftSpec {
         shape: SoftShape::Rope { path_m: centre_line(tube)?, radius_m, segments },
+        nodes: None,
         matter: SoftMatter {
             young_pa: tube.section.ea_n / area_m2,
             poisson: 0.3,
@@ -192,8 +199,10 @@ fn velocity_integral(curve: &CurveState) -> DVec3 {
     pairs.map(|(arc, velocity)| 0.5 * (arc[1] - arc[0]) * (velocity[0] + velocity[1])).sum()
 }
 
-fn cells(shape: &SoftShape) -> Vec<u32> {
-    match shape {
+/// Cells of a soft body along each of its axes, of one whose ε may change those at the start.
+fn cells(soft: &SoftSpec) -> Vec<u32> {
+    let divided = soft.nodes.and_then(|nodes| soft.shape.divided_by(nodes.eps_m));
+    match divided.as_ref().unwrap_or(&soft.shape) {
         SoftShape::Sheet { segments, .. } => segments.to_vec(),
         SoftShape::Box { segments, .. } => segments.to_vec(),
         SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
@@ -202,18 +211,25 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
     }
 }
 
-/// Divides a body into `most` cells along its most divided axis, and in proportion along the others.
-fn set_cells(shape: &mut SoftShape, most: u32) {
-    let greatest = cells(shape).into_iter().max().unwrap_or(1).max(1);
+/// Divides a body into `most` cells along its most divided axis, and in proportion along the others; a skin of its own stays.
+fn set_cells(soft: &mut SoftSpec, most: u32) {
+    let greatest = cells(soft).into_iter().max().unwrap_or(1).max(1);
     let scaled = |count: u32| (f64::from(count * most) / f64::from(greatest)).round().max(1.0) as u32;
-    match shape {
-        SoftShape::Sheet { segments, .. } => *segments = segments.map(scaled),
-        SoftShape::Box { segments, .. } => *segments = segments.map(scaled),
-        SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => *segments = scaled(*segments),
-        SoftShape::Embedded { surface, eps_m, range_m } => {
+    let fixed = |extent_m: f64| {
+        let eps_m = extent_m / f64::from(most.max(1));
+        NodeSpacing { eps_m, range_m: (eps_m, eps_m) }
+    };
+    match (&mut soft.shape, &mut soft.nodes) {
+        (SoftShape::Sheet { size_m, .. }, Some(nodes)) => *nodes = fixed(size_m[0].max(size_m[1])),
+        (SoftShape::Rope { path_m, .. }, Some(nodes)) => {
+            *nodes = fixed(path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
+        }
+        (SoftShape::Sheet { segments, .. }, None) => *segments = segments.map(scaled),
+        (SoftShape::Box { segments, .. }, _) => *segments = segments.map(scaled),
+        (SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. }, _) => *segments = scaled(*segments),
+        (SoftShape::Embedded { surface, eps_m, range_m }, _) => {
             let Aabb { low, high } = Aabb::of(&surface.points);
-            *eps_m = (high - low).max_element() / f64::from(most.max(1));
-            *range_m = (*eps_m, *eps_m);
+            NodeSpacing { eps_m: *eps_m, range_m: *range_m } = fixed((high - low).max_element());
         }
         // a mesh is taken as it is
         SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => {}

@@ -4,10 +4,11 @@
 //! Theory: docs/theory/soft.md.
 
 use super::anchor_springs::VertexSpring;
-use super::fe_mesh::{FeMesh, closed_surface};
+use super::carrier::{Carrier, SkinPoints};
+use super::fe_mesh::FeMesh;
 use super::member::Unknowns;
 use super::skin::Skin;
-use super::spec::{SoftError, SoftShape, SoftSpec, VERTICES_MAX};
+use super::spec::{SoftError, SoftSpec};
 use super::step_doubling::Doubling;
 use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
@@ -15,7 +16,7 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
-use metachron_geometry::{Aabb, Cage, Carried, CollisionShape, ShapeKind};
+use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
 
 /// A sheet, solid or rope with its own clock.
@@ -55,25 +56,21 @@ impl SoftBody {
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
         let mut skin = None;
-        let mut mesh = match &spec.shape {
-            SoftShape::Embedded { surface, eps_m, range_m } => {
-                let fitting =
-                    |eps_m: f64| Cage::new(surface, eps_m, VERTICES_MAX as usize).ok_or(SoftError::FineCage { eps_m });
-                fitting(range_m.0)?;
-                let cage = fitting(*eps_m)?;
-                let mesh = FeMesh::caged(&cage, &spec);
-                skin = Some(Skin::new(surface.clone(), cage));
-                mesh
-            }
-            _ => FeMesh::new(&spec),
+        let (mut mesh, surface) = if let Some(spacing) = spec.spacing() {
+            let fitting = |eps_m: f64| Carrier::new(&spec, eps_m).ok_or(SoftError::FineCage { eps_m });
+            fitting(spacing.range_m.0)?;
+            let (carrier, points) = (fitting(spacing.eps_m)?, SkinPoints::of(&spec));
+            let of_carrier = (carrier.mesh(&spec), points.surface.clone());
+            skin = Some(Skin::new(points, carrier));
+            of_carrier
+        } else {
+            let mesh = FeMesh::new(&spec.shape, &spec);
+            let surface = mesh.surface();
+            (mesh, surface)
         };
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let surface = match &spec.shape {
-            SoftShape::Embedded { surface, .. } => closed_surface(surface),
-            _ => mesh.surface(),
-        };
         let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let system = mesh.system(&positions);
         let mut body = Self {
@@ -223,7 +220,7 @@ impl Agent for SoftBody {
         self.present_resolution()
     }
 
-    /// An embedded solid is divided anew; the division of any other soft body is fixed by its scene.
+    /// A body with a skin of its own is divided anew; the division of any other is fixed by its scene.
     fn set_resolution(&mut self, wanted: Resolution) {
         self.divide_anew(wanted);
     }

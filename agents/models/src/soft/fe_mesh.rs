@@ -77,9 +77,9 @@ impl FeMesh {
         mesh
     }
 
-    /// Divides the body of `spec` into a lattice.
-    pub fn new(spec: &SoftSpec) -> Self {
-        let grid = Grid::of(&spec.shape);
+    /// Divides the body of `spec` into the lattice of `shape`: its own, or the same with other segments.
+    pub fn new(shape: &SoftShape, spec: &SoftSpec) -> Self {
+        let grid = Grid::of(shape);
         let count = grid.count();
         let mut mesh = Self {
             rest: vec![DVec3::ZERO; count],
@@ -90,7 +90,7 @@ impl FeMesh {
         for side in &spec.held {
             grid.on(*side).for_each(|vertex| mesh.held[vertex as usize] = true);
         }
-        match &spec.shape {
+        match shape {
             SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.matter),
             SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
             SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
@@ -332,6 +332,11 @@ impl FeMesh {
             closed: self.is_solid(),
             fans: VoronoiRegions::of(&self.edges, &self.triangles).into(),
         }
+    }
+
+    /// The radius of a rope, or half the thickness of a sheet, metres; 0 of a solid.
+    pub const fn radius_m(&self) -> f64 {
+        self.radius_m
     }
 
     /// Number of elements.

@@ -1,22 +1,21 @@
-//! Transfers the state of an embedded solid from one cage to another.
+//! Transfers the state of a soft body with a skin from one cage or lattice to another.
 //!
-//! In: a body and another ε. Out: the same body in another cage: the same mass and linear momentum to rounding, angular momentum and shape
-//! to O(ε²), no more energy. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21.
+//! In: a body and another ε. Out: the same body on other nodes: the same mass and linear momentum to rounding, angular momentum and shape
+//! to O(ε²), no more energy. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21, 24.
 
 use super::body::SoftBody;
+use super::carrier::Carrier;
 use super::fe_mesh::FeMesh;
-use super::spec::{SoftShape, VERTICES_MAX};
 use super::system::Purpose;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::Resolution;
-use metachron_geometry::{Cage, cage_counts};
 
 /// Spans of the steps from rest that give up elastic energy, seconds: the first, and how many, each twice as long as the one before.
 const RELAX_S: f64 = 1e-3;
 const RELAX_STEPS: u32 = 10;
 
-/// What a change of cage keeps.
+/// What a change of nodes keeps.
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     energy_j: f64,
@@ -28,36 +27,34 @@ struct Kept {
 }
 
 impl SoftBody {
-    /// The resolution of its cage; `None` of a lattice.
+    /// The resolution of what carries its skin; `None` where its vertices are its skin.
     pub(super) fn present_resolution(&self) -> Option<Resolution> {
         let skin = self.skin.as_ref()?;
-        Some(Resolution { eps_m: skin.cage.cell_m().max_element(), n: self.level })
+        Some(Resolution { eps_m: skin.carrier.cell_m(), n: self.level })
     }
 
     /// Divides the body anew by cells of at most the ε wanted, where that makes other cells than it has.
     pub(super) fn divide_anew(&mut self, wanted: Resolution) {
-        let (Some(range), SoftShape::Embedded { surface, .. }) = (self.spec.resolutions(), &self.spec.shape) else {
-            return;
-        };
+        let (Some(range), Some(skin)) = (self.spec.resolutions(), &self.skin) else { return };
         let wanted = range.clamp(wanted);
         self.level = wanted.n;
-        let counts = self.skin.as_ref().map(|skin| skin.cage.counts());
-        if counts == Some(cage_counts(surface, wanted.eps_m)) {
+        if skin.carrier.is_as_wanted(&self.spec, wanted.eps_m) {
             return;
         }
-        if let Some(cage) = Cage::new(surface, wanted.eps_m, VERTICES_MAX as usize) {
-            self.move_into(cage);
+        if let Some(carrier) = Carrier::new(&self.spec, wanted.eps_m) {
+            self.move_onto(carrier);
         }
     }
 
-    /// Moves the state into `cage`; what it would do to energy is undone by rest and, at last, by slower deformation.
-    fn move_into(&mut self, cage: Cage) {
+    /// Moves the state onto `carrier`; what it would do to energy is undone by rest and, at last, by slower deformation.
+    fn move_onto(&mut self, carrier: Carrier) {
         let before = self.kept();
-        let mesh = FeMesh::caged(&cage, &self.spec);
-        let (positions, velocities) = self.at_nodes(&cage, &mesh);
-        let turns = self.turns_at(&cage);
+        let mesh = carrier.mesh(&self.spec);
+        let (positions, velocities) = self.at_nodes(&carrier, &mesh);
         let Some(skin) = &mut self.skin else { return };
-        skin.set_cage(cage);
+        let turns: Vec<DQuat> = self.mesh.turns().collect();
+        let turns = skin.carrier.turns_at(&turns, &carrier);
+        skin.set_carrier(carrier);
         self.mesh = mesh;
         self.mesh.set_turns(&turns);
         (self.positions, self.velocities) = (positions, velocities);
@@ -78,43 +75,20 @@ impl SoftBody {
         Kept { energy_j: self.energy_j(), momentum: self.linear_momentum(), centre, whole, inertia }
     }
 
-    /// Where the present cage carries the nodes of another one, and how fast (eq. 19).
-    fn at_nodes(&self, cage: &Cage, mesh: &FeMesh) -> (Vec<DVec3>, Vec<DVec3>) {
+    /// Where the present carrier has the nodes of another one, and how fast (eq. 19, 24).
+    fn at_nodes(&self, carrier: &Carrier, mesh: &FeMesh) -> (Vec<DVec3>, Vec<DVec3>) {
         let rotation = self.spec.rotation.normalize();
-        let of = |(node, held): (&DVec3, &bool)| {
-            if *held {
-                return (self.spec.position + rotation * *node, DVec3::ZERO);
-            }
-            let spread = |list: &[DVec3]| self.spread(*node, list);
-            (spread(&self.positions), spread(&self.velocities))
+        let spread = |at_m: DVec3, list: &[DVec3]| {
+            self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.carrier.spread(at_m, list))
         };
-        cage.nodes_m().iter().zip(&mesh.held).map(of).unzip()
-    }
-
-    /// What the nodes of the present cage have, at a point at rest: trilinear in cells, linear beyond them.
-    fn spread(&self, at_m: DVec3, list: &[DVec3]) -> DVec3 {
-        let Some(skin) = &self.skin else { return DVec3::ZERO };
-        let (cell, share) = skin.cage.locate(at_m);
-        let inner = share.clamp(DVec3::ZERO, DVec3::ONE);
-        let beyond = share - inner;
-        let along = |axis: usize, bits: usize| if bits >> axis & 1 == 1 { inner[axis] } else { 1.0 - inner[axis] };
-        let mut sum = DVec3::ZERO;
-        for (bits, node) in cell.corners.iter().enumerate() {
-            let [x, y, z] = [0, 1, 2].map(|axis| along(axis, bits));
-            let slope = |axis: usize| if bits >> axis & 1 == 1 { beyond[axis] } else { -beyond[axis] };
-            let weight = x * y * z + slope(0) * y * z + x * slope(1) * z + x * y * slope(2);
-            sum += list[*node as usize] * weight;
-        }
-        sum
-    }
-
-    /// The rotations of the present cells at the middles of those of another cage.
-    fn turns_at(&self, cage: &Cage) -> Vec<DQuat> {
-        let Some(skin) = &self.skin else { return vec![] };
-        let turns: Vec<DQuat> = self.mesh.turns().collect();
-        let middle =
-            |corners: &[u32; 8]| 0.5 * (cage.nodes_m()[corners[0] as usize] + cage.nodes_m()[corners[7] as usize]);
-        cage.cells().iter().map(|cell| turns[skin.cage.cell_at(middle(&cell.corners))]).collect()
+        let nodes = carrier.nodes_m().iter().zip(&mesh.rest).zip(&mesh.held);
+        let of = |((material_m, rest), held): ((&DVec3, &DVec3), &bool)| {
+            if *held {
+                return (self.spec.position + rotation * *rest, DVec3::ZERO);
+            }
+            (spread(*material_m, &self.positions), spread(*material_m, &self.velocities))
+        };
+        nodes.map(of).unzip()
     }
 
     /// Moves the nodes that are not held so that linear momentum is what it was, and the centre of mass and angular momentum too where none is
@@ -183,11 +157,13 @@ impl SoftBody {
         solved
     }
 
-    /// Slows what moves beside the motion of the whole, and then what moves beside its centre, until there is no more energy than `most_j`
-    /// (eq. 21).
+    /// Slows what moves beside the motion of the whole, and then what moves beside its centre, until there is no more energy than `most_j`;
+    /// where nodes are held, beside the mean of the others, and then all of it (eq. 21).
     fn slow(&mut self, most_j: f64) {
-        let whole = self.kept().whole;
-        for beside in [whole, RigidMotion { spin: DVec3::ZERO, ..whole }] {
+        let held = self.mesh.held.contains(&true);
+        let whole = if held { self.mean_motion() } else { self.kept().whole };
+        let centre = RigidMotion { spin: DVec3::ZERO, ..whole };
+        for beside in [whole, if held { RigidMotion::default() } else { centre }] {
             let above_j = self.energy_j() - most_j;
             if above_j <= 0.0 {
                 return;
@@ -204,13 +180,21 @@ impl SoftBody {
         }
     }
 
+    /// The mean velocity of the nodes that are not held, as a motion of all of them.
+    fn mean_motion(&self) -> RigidMotion {
+        let moving: f64 = self.moving().map(|(_, mass)| mass).sum();
+        RigidMotion { velocity: self.linear_momentum() / moving, ..RigidMotion::default() }
+    }
+
     /// The motion of the whole about its centre of mass with the same linear and angular momentum, and its inertia, kg·m²; none of what is
     /// held.
     fn rigid_motion(&self, centre: DVec3) -> (RigidMotion, DMat3) {
         if self.mesh.held.contains(&true) {
             return (RigidMotion::default(), DMat3::IDENTITY);
         }
-        let (mut angular, mut inertia) = (DVec3::ZERO, DMat3::ZERO);
+        // a straight rope has no inertia about its line but that of its sections
+        let of_sections = self.mass_kg() * self.mesh.radius_m() * self.mesh.radius_m();
+        let (mut angular, mut inertia) = (DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(of_sections)));
         for ((m, x), v) in self.mesh.mass_kg.iter().zip(&self.positions).zip(&self.velocities) {
             let arm = *x - centre;
             angular += arm.cross(*v) * *m;

@@ -1,20 +1,21 @@
-//! The skin of an embedded solid: a surface that moves with the nodes of a cage.
+//! The skin of a soft body: a surface or a line that moves with the nodes that carry it, and stays the same when they change.
 //!
-//! In: a surface, a cage, where its nodes are. Out: where the surface is, and which nodes carry a point of it. Never here: elements, steps.
-//! Theory: docs/theory/soft.md, eq. 18.
+//! In: points, what carries them, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
+//! steps. Theory: docs/theory/soft.md, eq. 18, 24.
 
+use super::carrier::{Carrier, SkinPoints, into_body};
 use glam::DVec3;
-use metachron_geometry::{Cage, Carried, Triangles};
-use std::sync::Arc;
+use metachron_geometry::Carried;
 
-/// A surface in its cage.
+/// A skin on what carries it.
 pub(super) struct Skin {
-    surface: Arc<Triangles>,
-    pub cage: Cage,
-    /// The mean direction into the body at each point at rest; of length 1, or none.
+    /// Positions at rest, material coordinates and directions into the body of the points.
+    rest: Vec<DVec3>,
+    material: Vec<DVec3>,
     inward: Vec<DVec3>,
+    pub carrier: Carrier,
     carried: Vec<Carried>,
-    /// For each node the point of the surface that it carries most of.
+    /// For each node the point of the skin that it carries most of.
     nearest: Vec<u32>,
     /// Positions of the points, metres.
     pub positions: Vec<DVec3>,
@@ -23,32 +24,27 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// The skin of `surface` in `cage`, at rest at its own place.
-    pub fn new(surface: Arc<Triangles>, cage: Cage) -> Self {
-        let positions = surface.points.clone();
-        let velocities = vec![DVec3::ZERO; positions.len()];
-        let mut inward = vec![DVec3::ZERO; positions.len()];
-        for corners in &surface.triangles {
-            let into = into_body(corners.map(|corner| positions[corner as usize]));
-            corners.iter().for_each(|corner| inward[*corner as usize] += into);
-        }
-        inward.iter_mut().for_each(|into| *into = into.normalize_or_zero());
-        let mut skin = Self { surface, cage, inward, carried: vec![], nearest: vec![], positions, velocities };
+    /// A skin on `carrier`, at rest at its own place.
+    pub fn new(points: SkinPoints, carrier: Carrier) -> Self {
+        let SkinPoints { rest, material, inward, .. } = points;
+        let (positions, velocities) = (rest.clone(), vec![DVec3::ZERO; rest.len()]);
+        let mut skin =
+            Self { rest, material, inward, carrier, carried: vec![], nearest: vec![], positions, velocities };
         skin.bind();
         skin
     }
 
-    /// Puts the surface into another cage.
-    pub fn set_cage(&mut self, cage: Cage) {
-        self.cage = cage;
+    /// Puts the skin on another carrier.
+    pub fn set_carrier(&mut self, carrier: Carrier) {
+        self.carrier = carrier;
         self.bind();
     }
 
     fn bind(&mut self) {
         self.carried.clear();
-        let points = self.surface.points.iter().zip(&self.inward);
-        self.carried.extend(points.map(|(point, inward)| self.cage.carry(*point, *inward)));
-        let mut most = vec![(0, 0.0); self.cage.nodes_m().len()];
+        let points = self.material.iter().zip(&self.inward);
+        self.carried.extend(points.map(|(point, inward)| self.carrier.carry(*point, *inward)));
+        let mut most = vec![(0, 0.0); self.carrier.nodes_m().len()];
         for (point, carried) in (0..).zip(&self.carried) {
             for (node, weight) in carried.terms() {
                 if weight > most[node].1 {
@@ -59,7 +55,7 @@ impl Skin {
         self.nearest = most.into_iter().map(|(point, _)| point).collect();
     }
 
-    /// Moves the surface to where these nodes carry it.
+    /// Moves the skin to where these nodes carry it.
     pub fn follow(&mut self, positions: &[DVec3], velocities: &[DVec3]) {
         for (at, carried) in self.carried.iter().enumerate() {
             self.positions[at] = carried.mean(positions);
@@ -67,33 +63,26 @@ impl Skin {
         }
     }
 
-    /// The points of the surface at rest, in the body's own axes.
+    /// The points of the skin at rest, in the body's own axes.
     pub fn rest(&self) -> &[DVec3] {
-        &self.surface.points
+        &self.rest
     }
 
-    /// What carries each point of the surface.
+    /// What carries each point of the skin.
     pub fn carried(&self) -> &[Carried] {
         &self.carried
     }
 
-    /// What carries the point of the surface with these shares of three of its points.
+    /// What carries the point of the skin with these shares of three of its points.
     pub fn carried_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Carried {
-        let points = vertices.map(|vertex| self.surface.points[vertex as usize]);
-        let at = points.into_iter().zip(shares).map(|(point, share)| point * share).sum();
-        let of_vertices = || vertices.into_iter().zip(shares).map(|(v, share)| self.inward[v as usize] * share).sum();
+        let mean = |of: &[DVec3]| vertices.into_iter().zip(shares).map(|(v, share)| of[v as usize] * share).sum();
         // a place on an edge has two vertices alone
-        let inward = into_body(points).try_normalize().unwrap_or_else(of_vertices);
-        self.cage.carry(at, inward)
+        let inward = into_body(vertices.map(|vertex| self.rest[vertex as usize])).try_normalize();
+        self.carrier.carry(mean(&self.material), inward.unwrap_or_else(|| mean(&self.inward)))
     }
 
-    /// The point of the surface that stands for a node.
+    /// The point of the skin that stands for a node.
     pub fn point_of(&self, node: usize) -> u32 {
         self.nearest[node]
     }
-}
-
-/// The direction into the body at a triangle, by twice its area.
-fn into_body([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (c - a).cross(b - a)
 }

@@ -12,6 +12,9 @@ use std::sync::Arc;
 pub struct SoftSpec {
     /// Its shape at rest, and how finely it is divided.
     pub shape: SoftShape,
+    /// The spacing of the nodes of a sheet or rope whose ε may change: its skin is then the lattice that its shape names, which moves with
+    /// coarser nodes. `None`: the vertices of the shape's lattice are the nodes.
+    pub nodes: Option<NodeSpacing>,
     /// Its material.
     pub matter: SoftMatter,
     /// Position of its first corner, or of a ball's centre, at the start, metres.
@@ -71,6 +74,15 @@ pub struct RegionMatter {
     pub region: i64,
     /// Its material. The damping of a body is that of all of it.
     pub matter: SoftMatter,
+}
+
+/// How far apart the nodes are that carry a skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeSpacing {
+    /// Largest length of a cell at the start, metres, 1e-6 … 1e4.
+    pub eps_m: f64,
+    /// The finest and the coarsest one that it may take, metres.
+    pub range_m: (f64, f64),
 }
 
 /// The shapes of soft bodies in their own axes.
@@ -184,6 +196,12 @@ pub enum SoftError {
         /// The exponent.
         exponent: f64,
     },
+    /// A shape whose cells cannot change has an ε.
+    #[error("a lattice of a {model} has no spacing of nodes beside its segments: only sheets and ropes have")]
+    NoSpacing {
+        /// The model.
+        model: &'static str,
+    },
     /// A cage has more vertices than a step can take.
     #[error(
         "a cage of cells of {eps_m} m has more than the {VERTICES_MAX} vertices that are supported: use a larger ε"
@@ -259,9 +277,7 @@ impl SoftShape {
             }
             // how many vertices a cage has is known when it is made
             Self::Embedded { surface, eps_m, range_m } => {
-                for (what, value) in [("ε", *eps_m), ("the finest ε", range_m.0), ("the coarsest ε", range_m.1)] {
-                    length(what, value)?;
-                }
+                NodeSpacing { eps_m: *eps_m, range_m: *range_m }.check()?;
                 return check_surface(surface);
             }
             Self::Tetrahedra { mesh, regions } => {
@@ -284,6 +300,13 @@ impl SoftShape {
         }
         let vertices = self.vertices();
         if vertices > VERTICES_MAX { Err(SoftError::TooFine { vertices }) } else { Ok(()) }
+    }
+}
+
+impl NodeSpacing {
+    fn check(&self) -> Result<(), SoftError> {
+        let all = [("ε", self.eps_m), ("the finest ε", self.range_m.0), ("the coarsest ε", self.range_m.1)];
+        all.into_iter().try_for_each(|(what, value)| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m"))
     }
 }
 
@@ -355,13 +378,27 @@ impl SoftMatter {
 impl SoftSpec {
     /// The resolutions that it may take; none where its division never changes.
     pub(super) fn resolutions(&self) -> Option<ResolutionRange> {
-        let SoftShape::Embedded { range_m, .. } = &self.shape else { return None };
-        (range_m.0 < range_m.1).then_some(ResolutionRange { eps_m: *range_m, n: (0, metachron_core::N_MAX) })
+        let range_m = self.spacing()?.range_m;
+        (range_m.0 < range_m.1).then_some(ResolutionRange { eps_m: range_m, n: (0, metachron_core::N_MAX) })
+    }
+
+    /// The spacing of the nodes that carry its skin; `None` where its vertices are its skin.
+    #[must_use]
+    pub fn spacing(&self) -> Option<NodeSpacing> {
+        match self.shape {
+            SoftShape::Embedded { eps_m, range_m, .. } => Some(NodeSpacing { eps_m, range_m }),
+            _ => self.nodes,
+        }
     }
 
     /// Whether every number is in its range.
     pub(super) fn check(&self) -> Result<(), SoftError> {
         self.shape.check()?;
+        if let Some(nodes) = &self.nodes {
+            nodes.check()?;
+            let finest = self.shape.divided_by(nodes.eps_m.min(nodes.range_m.0));
+            finest.ok_or(SoftError::NoSpacing { model: self.shape.model() })?.check()?;
+        }
         self.matter.check()?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
         vector("the position", self.position)?;

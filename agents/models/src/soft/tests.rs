@@ -6,6 +6,7 @@ mod large;
 mod materials;
 mod promises;
 mod skins;
+mod spaced;
 mod statics;
 
 use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
@@ -30,6 +31,7 @@ const G: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 fn spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
+        nodes: None,
         matter: MATTER,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

@@ -1,6 +1,6 @@
 //! A tetrahedron of a solid: four vertices, one strain.
 //!
-//! In: corners at rest and now. Out: forces and stiffness. Never here: material laws. Theory: docs/theory/soft.md, section 7.
+//! In: corners at rest and now. Out: forces and stiffness. Never here: material laws. Theory: docs/theory/soft.md, section 9.
 
 use super::deformation::{ConstantStrain, Deformation, follow_turn};
 use super::material::{Law, Material};

@@ -68,6 +68,7 @@ fn press(young_pa: f64, rate_hz: f64, due: bool, tamper: Option<Tamper>) -> Felt
 fn column(young_pa: f64) -> SoftBody {
     let spec = SoftSpec {
         shape: SoftShape::Box { size_m: SIZE_M, segments: [2, 2, 4] },
+        nodes: None,
         matter: SoftMatter {
             young_pa,
             poisson: 0.3,

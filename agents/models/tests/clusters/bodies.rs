@@ -21,6 +21,7 @@ pub fn matter(young_pa: f64) -> SoftMatter {
 fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
     SoftSpec {
         shape,
+        nodes: None,
         matter: matter(young_pa),
         position,
         rotation: DQuat::IDENTITY,

@@ -17,6 +17,7 @@ mod scenes;
 mod sets;
 mod shapes;
 mod slope;
+mod spaced;
 mod stacks;
 mod steps;
 mod table;

@@ -68,12 +68,21 @@ fn put_dt(table: &mut Table, now: &Setting, need: &Setting) -> usize {
 fn put(table: &mut Table, member: &Member, now: &Setting, need: &Setting) -> usize {
     let mut changes = 0;
     if need.pieces != now.pieces {
-        changes += set(table, "segments", segments(member));
+        changes += match spacing_m(member) {
+            Some(eps_m) => set(table, "eps_m", eps_m.into()),
+            None => set(table, "segments", segments(member)),
+        };
     }
     if need.method != now.method {
         changes += set(table, "integrator", Integrator::ALL[need.method].name().into());
     }
     changes
+}
+
+/// The spacing of a soft body that has an ε instead of segments, metres, rounded up: a shorter one may make one more cell.
+fn spacing_m(member: &Member) -> Option<f64> {
+    let Spec::Soft(soft) = &member.spec else { return None };
+    soft.spacing().map(|nodes| rounded((nodes.eps_m * 1e6).ceil() * 1e-6))
 }
 
 /// The division of a body, in the form of its table.

@@ -82,7 +82,8 @@ pub(super) fn tolerance(
     }
     if pace.dt_range.0 == pace.dt_range.1 && range.eps_m.0 == range.eps_m.1 {
         let what = "cannot be held: step and spacing are both fixed";
-        let expected = "expected `dt_ms = [least, greatest]`, or for a tube or a solid `eps_m = [finest, coarsest]`";
+        let expected =
+            "expected `dt_ms = [least, greatest]`, or for a tube or a soft body `eps_m = [finest, coarsest]`";
         c.wrong(place, "tolerance_m", what, expected);
     }
     Some(tolerance_m)

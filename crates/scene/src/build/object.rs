@@ -411,13 +411,16 @@ fn member(
             (Spec::Tube(built.spec), start, range, built.picture)
         }
         ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &model_context)?), unit, flat, flat),
-        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &model_context)?), unit, flat, flat),
-        ModelFile::Solid(file) => {
-            let built = soft::solid(c, file, &model_context)?;
+        ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_) => {
+            let built = match model {
+                ModelFile::Sheet(file) => soft::sheet(c, file, &model_context)?,
+                ModelFile::Solid(file) => soft::solid(c, file, &model_context)?,
+                ModelFile::Rope(file) => soft::rope(c, file, &model_context),
+                _ => return None,
+            };
             let range = ResolutionRange { eps_m: built.eps_m.unwrap_or(flat.eps_m), n: levels };
             (Spec::Soft(built.spec), Resolution { eps_m: range.eps_m.0, n: levels.1 }, range, flat)
         }
-        ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &model_context)), unit, flat, flat),
         ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
             let (spec, range) = synthetic::build(c, file, &model_context);

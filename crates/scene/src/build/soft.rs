@@ -7,13 +7,13 @@ use super::scenery::{SurfaceSource, generator, surface_source};
 use super::soft_mesh;
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
+use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
 use metachron_geometry::{Aabb, Triangles, branch, generate_surface, open_edge, pieces, welded};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
-use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, NodeSpacing, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
 use std::sync::Arc;
 
 pub(super) const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
@@ -41,9 +41,11 @@ struct Shared {
 }
 
 /// Reads a sheet; `None` where its shape is missing or cannot be used.
-pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<SoftSpec> {
+pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<BuiltSoft> {
     let place = context.place;
-    let shape = if file.file.is_some() { soft_mesh::shell(c, file, context) } else { flat_sheet(c, place, file) }?;
+    let is_mesh = file.file.is_some();
+    let eps_m = if is_mesh { None } else { one_division(c, place, file.segments.is_some(), file.eps_m) };
+    let shape = if is_mesh { soft_mesh::shell(c, file, context) } else { flat_sheet(c, place, file) }?;
     let side = |side: &SheetSide| match side {
         SheetSide::Left => Side::Left,
         SheetSide::Right => Side::Right,
@@ -68,34 +70,34 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
         DVec3::ZERO
     };
     let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    Some(spec(c, context, shape, pose, shared))
+    let spec = spec(c, context, shape, pose, shared);
+    Some(divided(c, place, spec, eps_m))
 }
 
-/// The shape of a flat sheet; `None` where its dimensions are missing, which is reported.
+/// The shape of a flat sheet; `None` where its size is missing, which is reported.
 fn flat_sheet(c: &mut Checker<'_, '_>, place: &Place, file: &SheetFile) -> Option<SoftShape> {
     if file.scale.is_some() {
         c.wrong(place, "scale", "has no `file` that it belongs to", "expected no such key here");
     }
     let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
-    for (key, is_missing) in [("size_m", file.size_m.is_none()), ("segments", file.segments.is_none())] {
-        if is_missing {
-            c.wrong(place, key, "is missing", format!("a sheet needs it, or `file`: expected `{key}` in this table"));
-        }
-    }
-    let (size_m, cells) = (file.size_m?, file.segments?);
+    let Some(size_m) = file.size_m else {
+        c.wrong(place, "size_m", "is missing", "a sheet needs it, or `file`: expected `size_m` in this table");
+        return None;
+    };
     let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size_m[i], &LENGTH));
-    let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i]));
+    let given = file.segments.unwrap_or([1; 2]);
+    let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), given[i]));
     Some(SoftShape::Sheet { size_m, thickness_m, segments })
 }
 
-/// A solid and the resolutions that it may take; none where its division never changes.
-pub(super) struct BuiltSolid {
+/// A soft body and the spacings that it may take; none where its division never changes.
+pub(super) struct BuiltSoft {
     pub(super) spec: SoftSpec,
     pub(super) eps_m: Option<(f64, f64)>,
 }
 
 /// Reads a solid; `None` where its dimensions are missing.
-pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<BuiltSolid> {
+pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<BuiltSoft> {
     let place = context.place;
     check_solid_keys(c, place, file);
     let eps_m = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
@@ -137,7 +139,7 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
         }
         _ => {}
     }
-    Some(BuiltSolid { spec, eps_m })
+    Some(BuiltSoft { spec, eps_m })
 }
 
 /// Reports keys that belong to another shape, and those that are missing.
@@ -298,7 +300,7 @@ pub(super) fn too_large(size_m: f64, scale_is_missing: bool) -> Result<(), Strin
 }
 
 /// Reads a rope.
-pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelContext<'_>) -> SoftSpec {
+pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelContext<'_>) -> BuiltSoft {
     let place = context.place;
     if file.path_m.len() < 2 {
         c.wrong(place, "path_m", format_args!("has {} points", file.path_m.len()), "expected at least 2 points");
@@ -319,9 +321,44 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelCont
         law: MaterialLaw::default(),
     };
     let radius_m = c.number(place, "radius_m", file.radius_m, &LENGTH);
-    let segments = segments(c, place, "segments", file.segments);
+    let eps_m = one_division(c, place, file.segments.is_some(), file.eps_m);
+    let segments = segments(c, place, "segments", file.segments.unwrap_or(1));
     let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
-    spec(c, context, SoftShape::Rope { path_m, radius_m, segments }, pose, shared)
+    let spec = spec(c, context, SoftShape::Rope { path_m, radius_m, segments }, pose, shared);
+    divided(c, place, spec, eps_m)
+}
+
+/// The range of ε of a sheet or a rope; none of one with segments. It has either, or that is reported.
+fn one_division(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    has_segments: bool,
+    eps_m: Option<OneOrRange<f64>>,
+) -> Option<(f64, f64)> {
+    match (has_segments, eps_m) {
+        (true, Some(_)) => c.wrong(place, "segments", "contradicts `eps_m`", "expected one of them"),
+        (false, None) => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
+        _ => {}
+    }
+    eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH))
+}
+
+/// Gives a sheet or a rope with a range of ε the lattice of its finest as its skin, and nodes that start there.
+fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option<(f64, f64)>) -> BuiltSoft {
+    let Some(range_m) = eps_m else { return BuiltSoft { spec, eps_m } };
+    let most = |shape: &SoftShape| match *shape {
+        SoftShape::Sheet { segments: [x, y], .. } => f64::from(x.max(y)),
+        SoftShape::Rope { segments, .. } => f64::from(segments),
+        _ => 0.0,
+    };
+    let fits = |finest: &SoftShape| finest.vertices() <= VERTICES_MAX && SEGMENTS.contains(most(finest));
+    let Some(shape) = spec.shape.divided_by(range_m.0).filter(fits) else {
+        let expected = format!("expected a larger finest ε: at most {VERTICES_MAX} vertices, 2047 cells along an axis");
+        c.wrong(place, "eps_m", "is too fine for its size", expected);
+        return BuiltSoft { spec, eps_m };
+    };
+    let nodes = Some(NodeSpacing { eps_m: range_m.0, range_m });
+    BuiltSoft { spec: SoftSpec { shape, nodes, ..spec }, eps_m }
 }
 
 fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {
@@ -360,6 +397,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
     };
     SoftSpec {
         shape,
+        nodes: None,
         matter,
         position: pose.position,
         rotation: pose.rotation,

@@ -123,7 +123,9 @@ pub(super) fn regions(
 /// The shape of a sheet that is a mesh; `None` where it cannot be used, which is reported.
 pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<SoftShape> {
     let (place, name) = (context.place, file.file.as_deref()?);
-    for (key, is_given) in [("size_m", file.size_m.is_some()), ("segments", file.segments.is_some())] {
+    for (key, is_given) in
+        [("size_m", file.size_m.is_some()), ("segments", file.segments.is_some()), ("eps_m", file.eps_m.is_some())]
+    {
         if is_given {
             c.wrong(place, key, "contradicts `file`", "expected one of them: a mesh is taken as it is");
         }

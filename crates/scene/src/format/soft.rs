@@ -11,8 +11,11 @@ use serde::Deserialize;
 pub struct SheetFile {
     /// Length along its x and y axes, metres, each 1e-6 … 1e4. Needed without `file`.
     pub size_m: Option<[f64; 2]>,
-    /// Cells along x and y; at most 10,000 vertices in all. Needed without `file`.
+    /// Cells along x and y, which never change; at most 10,000 vertices in all. Either this, `eps_m` or `file`.
     pub segments: Option<[u32; 2]>,
+    /// Largest length ε of a cell, metres: one number, or `[finest, coarsest]`, of which the controllers choose while it runs. What it touches,
+    /// grasps and shows is the lattice of the finest. At most 10,000 vertices at the finest.
+    pub eps_m: Option<OneOrRange<f64>>,
     /// A surface as a file of triangles, STL, binary glTF (.glb, +y up) or OBJ, its path relative to the scene file: at rest the sheet has its
     /// shape and its vertices. It may be open.
     pub file: Option<String>,
@@ -115,8 +118,11 @@ pub struct RopeFile {
     pub path_m: Vec<Point>,
     /// Radius, metres, 1e-6 … 1e4.
     pub radius_m: f64,
-    /// Number of segments, 1 … 2047.
-    pub segments: u32,
+    /// Number of segments, 1 … 2047, which never changes. Either this or `eps_m`.
+    pub segments: Option<u32>,
+    /// Largest length ε of a segment, metres: one number, or `[finest, coarsest]`, of which the controllers choose while it runs. What it
+    /// touches, grasps and shows is the line of the finest. At most 2047 segments at the finest.
+    pub eps_m: Option<OneOrRange<f64>>,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
     /// Density, kg/m³, 1 … 1e5. Default 1050.

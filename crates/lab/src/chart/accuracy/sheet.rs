@@ -53,6 +53,7 @@ impl Benchmark for Sheet {
 pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
     SoftSpec {
         shape,
+        nodes: None,
         matter,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
