@@ -289,11 +289,29 @@ impl Cage {
         (cell, (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m)
     }
 
+    /// The cell that a point of the surface at rest belongs to, on the side of the unit vector `inward`.
+    #[must_use]
+    pub fn cell_under(&self, at_m: DVec3, inward: DVec3) -> usize {
+        self.cell_at(at_m + inward * (INWARD * self.cell_m.min_element()))
+    }
+
+    /// Takes cells away, not all of them; those that are left are numbered anew in the same order, nodes keep their numbers, and what was in a
+    /// cell that is gone belongs to the nearest one that is left.
+    pub fn remove(&mut self, is_gone: &[bool]) {
+        let mut left = 0..;
+        let number: Vec<u32> =
+            is_gone.iter().map(|gone| if *gone { NONE } else { left.next().unwrap_or(NONE) }).collect();
+        let mut gone = is_gone.iter();
+        self.cells.retain(|_| !gone.next().copied().unwrap_or_default());
+        self.cell_at.iter_mut().for_each(|cell| *cell = number[*cell as usize]);
+        self.spread_cells();
+    }
+
     /// How a point of the surface at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell
     /// (eq. 18). The cell is the one on the side of the unit vector `inward`: a surface may lie between two cells.
     #[must_use]
     pub fn carry(&self, at_m: DVec3, inward: DVec3) -> Carried {
-        let cell = &self.cells[self.cell_at(at_m + inward * (INWARD * self.cell_m.min_element()))];
+        let cell = &self.cells[self.cell_under(at_m, inward)];
         let share = (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m;
         let mut axes = [0, 1, 2];
         axes.sort_by(|a, b| share[*b].total_cmp(&share[*a]));

@@ -40,7 +40,11 @@ impl Spec {
             Self::Soft(soft) => match soft.shape {
                 SoftShape::Rope { .. } => 1.0,
                 SoftShape::Sheet { .. } => 2.5,
-                SoftShape::Box { .. } | SoftShape::Ball { .. } | SoftShape::Embedded { .. } => 3.0,
+                SoftShape::Shell { .. } => 2.5,
+                SoftShape::Box { .. }
+                | SoftShape::Ball { .. }
+                | SoftShape::Embedded { .. }
+                | SoftShape::Tetrahedra { .. } => 3.0,
             },
             Self::Tube(_) | Self::Synthetic(_) | Self::Rigid(_) | Self::Tool(_) => 1.0,
         }
@@ -232,7 +236,7 @@ fn set_cells(soft: &mut SoftSpec, most: u32) {
             NodeSpacing { eps_m: *eps_m, range_m: *range_m } = fixed((high - low).max_element());
         }
         // a mesh is taken as it is
-        SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => {}
+        (SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. }, _) => {}
     }
 }
 

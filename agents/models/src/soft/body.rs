@@ -26,6 +26,8 @@ pub struct SoftBody {
     pub(super) system: System,
     /// What others see of it, where that is not its vertices.
     pub(super) skin: Option<Skin>,
+    /// Whether cells of it were removed.
+    pub(super) is_cut: bool,
     /// The level n that was asked for: its picture's.
     pub(super) level: u8,
     pub(super) positions: Vec<DVec3>,
@@ -76,6 +78,7 @@ impl SoftBody {
         let mut body = Self {
             system,
             skin,
+            is_cut: false,
             level: 0,
             impulses: vec![],
             free: positions.clone(),

@@ -32,10 +32,10 @@ pub(super) struct FeMesh {
     pub(super) tetrahedra: Vec<Tetrahedron>,
     /// The materials of the tetrahedra.
     pub(super) laws: Vec<Law>,
-    hexahedra: Vec<Hexahedron>,
+    pub(super) hexahedra: Vec<Hexahedron>,
     kinds: Vec<HexahedronKind>,
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
-    rows: Vec<([u32; 3], f64)>,
+    pub(super) rows: Vec<([u32; 3], f64)>,
     pub(super) triangles: Vec<[u32; 3]>,
     /// The edges of its skin; of a cage those of its cells.
     pub(super) edges: Vec<[u32; 2]>,
@@ -61,10 +61,15 @@ impl FeMesh {
         let place = |bits: usize| DVec3::from_array([0, 1, 2].map(|axis| (bits >> axis & 1) as f64));
         mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.matter));
         for CageCell { corners, fill, volumes_m3 } in cage.cells() {
-            for (node, volume) in corners.iter().zip(volumes_m3) {
-                mesh.mass_kg[*node as usize] += volume * spec.matter.density_kg_m3;
-            }
-            mesh.hexahedra.push(Hexahedron { vertices: *corners, kind: 0, fill: *fill, turn: DQuat::IDENTITY });
+            let mass_kg = volumes_m3.map(|volume| volume * spec.matter.density_kg_m3);
+            corners.iter().zip(mass_kg).for_each(|(node, mass)| mesh.mass_kg[*node as usize] += mass);
+            mesh.hexahedra.push(Hexahedron {
+                vertices: *corners,
+                kind: 0,
+                fill: *fill,
+                mass_kg,
+                turn: DQuat::IDENTITY,
+            });
             let of_axis = |axis: usize| {
                 (0..8).filter(move |bits| bits >> axis & 1 == 0).map(move |bits| [bits, bits | 1 << axis])
             };
@@ -184,10 +189,9 @@ impl FeMesh {
             let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
             let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
             let kind = self.kind_of(corners, matter);
-            for (vertex, volume) in vertices.iter().zip(self.kinds[kind].volumes_m3) {
-                self.mass_kg[*vertex as usize] += volume * matter.density_kg_m3;
-            }
-            self.hexahedra.push(Hexahedron { vertices, kind, fill: 1.0, turn: DQuat::IDENTITY });
+            let mass_kg = self.kinds[kind].volumes_m3.map(|volume| volume * matter.density_kg_m3);
+            vertices.iter().zip(mass_kg).for_each(|(vertex, mass)| self.mass_kg[*vertex as usize] += mass);
+            self.hexahedra.push(Hexahedron { vertices, kind, fill: 1.0, mass_kg, turn: DQuat::IDENTITY });
         }
         self.skin(grid);
         self.list_edges();

@@ -35,6 +35,8 @@ pub(super) struct Hexahedron {
     pub kind: usize,
     /// The share of its volume that is matter, 0 … 1: less in cells that a surface cuts.
     pub fill: f64,
+    /// The mass that it gives each corner, kg.
+    pub mass_kg: [f64; 8],
     /// Rotation from rest.
     pub turn: DQuat,
 }

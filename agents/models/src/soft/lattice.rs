@@ -23,7 +23,7 @@ impl SoftShape {
                 Some(Self::Sheet { size_m, thickness_m, segments: [along, across] })
             }
             Self::Rope { path_m, radius_m, .. } => Some(Self::Rope { path_m, radius_m, segments: along }),
-            Self::Box { .. } | Self::Ball { .. } | Self::Embedded { .. } => None,
+            _ => None,
         }
     }
 }
@@ -42,7 +42,7 @@ fn extent_m(shape: &SoftShape) -> Option<DVec2> {
         SoftShape::Rope { path_m, .. } => {
             Some(DVec2::new(path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum(), 0.0))
         }
-        SoftShape::Box { .. } | SoftShape::Ball { .. } | SoftShape::Embedded { .. } => None,
+        _ => None,
     }
 }
 

@@ -23,9 +23,9 @@ impl FeMesh {
         for (at, corners) in mesh.corners.iter().enumerate() {
             let of_region = |number: &i64| regions.iter().position(|region| region.region == *number);
             let material = mesh.regions.get(at).and_then(of_region).map_or(0, |region| region + 1);
-            let element = Tetrahedron::new(*corners, corners.map(|corner| mesh.points[corner as usize]), material);
-            let quarter = 0.25 * element.volume_m3 * matters[material].density_kg_m3;
-            corners.iter().for_each(|corner| division.mass_kg[*corner as usize] += quarter);
+            let places = corners.map(|corner| mesh.points[corner as usize]);
+            let element = Tetrahedron::new(*corners, places, material, matters[material].density_kg_m3);
+            corners.iter().zip(element.mass_kg).for_each(|(corner, mass)| division.mass_kg[*corner as usize] += mass);
             division.tetrahedra.push(element);
         }
         division.triangles = mesh.boundary();

@@ -22,6 +22,7 @@ mod membrane;
 mod meshed;
 mod publish;
 mod remesh;
+mod removal;
 mod shell_bending;
 mod skin;
 mod spec;
@@ -34,4 +35,5 @@ mod tetrahedron;
 
 pub use body::SoftBody;
 pub use grid::Side;
+pub use removal::RemovedCells;
 pub use spec::{MaterialLaw, NodeSpacing, RegionMatter, SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};

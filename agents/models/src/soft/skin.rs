@@ -55,6 +55,22 @@ impl Skin {
         self.nearest = most.into_iter().map(|(point, _)| point).collect();
     }
 
+    /// Takes cells away from its cage, and gives their points to those that are left; returns the triangles whose middles were in none of
+    /// these cells.
+    pub fn without_cells(&mut self, is_gone: &[bool], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+        let Carrier::Cage(cage) = &mut self.carrier else { return triangles.to_vec() };
+        let material = &self.material;
+        let is_kept = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|corner| material[corner as usize]);
+            let inward = into_body([a, b, c]).normalize_or_zero();
+            !is_gone[cage.cell_under((a + b + c) / 3.0, inward)]
+        };
+        let kept = triangles.iter().copied().filter(is_kept).collect();
+        cage.remove(is_gone);
+        self.bind();
+        kept
+    }
+
     /// Moves the skin to where these nodes carry it.
     pub fn follow(&mut self, positions: &[DVec3], velocities: &[DVec3]) {
         for (at, carried) in self.carried.iter().enumerate() {

@@ -202,6 +202,17 @@ pub enum SoftError {
         /// The model.
         model: &'static str,
     },
+    /// A number that no cell has.
+    #[error("there is no cell {cell}: the body has {cells}")]
+    NoCell {
+        /// The number.
+        cell: usize,
+        /// How many cells there are.
+        cells: usize,
+    },
+    /// All cells, or all of no cells, cannot be removed.
+    #[error("no cell would be left")]
+    AllCells,
     /// A cage has more vertices than a step can take.
     #[error(
         "a cage of cells of {eps_m} m has more than the {VERTICES_MAX} vertices that are supported: use a larger ε"

@@ -5,15 +5,16 @@ mod error;
 mod large;
 mod materials;
 mod promises;
+mod removal;
 mod skins;
 mod spaced;
 mod statics;
 
-use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use super::{MaterialLaw, RegionMatter, RemovedCells, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
-use metachron_geometry::{Tetrahedra, Triangles};
+use metachron_geometry::{ShapeKind, Tetrahedra, Triangles};
 use std::sync::Arc;
 
 const MATTER: SoftMatter = SoftMatter {

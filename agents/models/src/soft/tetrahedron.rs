@@ -15,6 +15,8 @@ pub(super) struct Tetrahedron {
     gradients: [DVec3; 4],
     /// Volume at rest, m³.
     pub volume_m3: f64,
+    /// The mass that it gives each corner, kg.
+    pub mass_kg: [f64; 4],
     /// Index of its material.
     pub material: usize,
     /// Rotation from rest.
@@ -22,13 +24,15 @@ pub(super) struct Tetrahedron {
 }
 
 impl Tetrahedron {
-    /// A tetrahedron with these corners at rest, metres; its volume must not vanish.
-    pub fn new(vertices: [u32; 4], corners: [DVec3; 4], material: usize) -> Self {
+    /// A tetrahedron with these corners at rest, metres, and this density, kg/m³; its volume must not vanish.
+    pub fn new(vertices: [u32; 4], corners: [DVec3; 4], material: usize, density: f64) -> Self {
         let [a, b, c, d] = corners;
         let sides = DMat3::from_cols(b - a, c - a, d - a);
         let shares = sides.inverse().transpose();
         let gradients = [-(shares.x_axis + shares.y_axis + shares.z_axis), shares.x_axis, shares.y_axis, shares.z_axis];
-        Self { vertices, gradients, volume_m3: sides.determinant() / 6.0, material, turn: DQuat::IDENTITY }
+        let volume_m3 = sides.determinant() / 6.0;
+        let mass_kg = [0.25 * volume_m3 * density; 4];
+        Self { vertices, gradients, volume_m3, mass_kg, material, turn: DQuat::IDENTITY }
     }
 
     const fn strain(&self) -> ConstantStrain<'_, 4> {

@@ -1,0 +1,103 @@
+//! Cells removed while a solid runs: what is left, and what went, are together what there was.
+
+use super::*;
+
+/// A ball in a cage, a box of cells and one of tetrahedra.
+fn solids() -> Vec<SoftShape> {
+    let surface = Arc::new(SoftShape::Ball { radius_m: 0.1, segments: 12 }.skin().unwrap());
+    let ball = SoftShape::Embedded { surface, eps_m: 0.04, range_m: (0.02, 0.08) };
+    vec![ball, SoftShape::Box { size_m: DVec3::new(0.2, 0.1, 0.1), segments: [6, 3, 3] }, tetrahedral()]
+}
+
+/// A column of ten cells nearest to a line through the middle along y.
+fn column(body: &SoftBody) -> Vec<usize> {
+    let middle = body.positions.iter().sum::<DVec3>() / body.positions.len() as f64;
+    let off = |cell: usize| {
+        let to = body.cell_middle(cell).unwrap() - middle - DVec3::new(0.03, 0.0, 0.03);
+        DVec3::new(to.x, 0.2 * to.y, to.z).length()
+    };
+    let mut all: Vec<usize> = (0..body.cells()).collect();
+    all.sort_by(|a, b| off(*a).total_cmp(&off(*b)));
+    all.truncate(10);
+    all
+}
+
+#[test]
+fn mass_and_momentum_are_what_is_left_and_what_went() {
+    for shape in solids() {
+        let mut body = shaken(spec(shape));
+        run(&mut body, 0.002, 5);
+        let (mass, momentum, cells, triangles) =
+            (body.mass_kg(), body.linear_momentum(), body.cells(), body.form().unwrap());
+        let gone = body.remove_cells(&column(&body)).unwrap();
+        assert_eq!(body.cells(), cells - 10);
+        assert!((body.mass_kg() + gone.mass_kg - mass).abs() < 1e-14 * mass, "{gone:?}");
+        assert!(
+            (body.linear_momentum() + gone.momentum - momentum).length() < 1e-13 * momentum.length().max(0.1),
+            "{gone:?}"
+        );
+        assert!(gone.mass_kg > 0.0, "{:?} {gone:?}", triangles.kind);
+        // it goes on as any other: momentum is kept, energy never rises
+        let (momentum, mut energy_j) = (body.linear_momentum(), body.energy_j());
+        for _ in 0..100 {
+            run(&mut body, 0.002, 1);
+            assert!(body.energy_j() <= energy_j * (1.0 + 1e-7), "{} {energy_j}", body.energy_j());
+            energy_j = body.energy_j();
+        }
+        assert!((body.linear_momentum() - momentum).length() < 1e-10 * momentum.length());
+        assert!(state(&body).positions.iter().all(|at| at.is_finite()));
+    }
+}
+
+#[test]
+fn a_bar_without_half_of_its_cells_hangs_as_much_longer_as_a_thinner_one() {
+    // eight layers along x, of 2 × 2 cells: without those at one side of y a bar of half the section and half the weight
+    let size_m = DVec3::new(0.4, 0.1, 0.1);
+    let matter = SoftMatter { poisson: 0.0, young_pa: 1e5, damping_per_s: 20.0, ..MATTER };
+    let longer = |shape: SoftShape, cut: bool| {
+        let spec = SoftSpec { matter, gravity: DVec3::X * 9.81, held: vec![Side::Left], ..spec(shape) };
+        let mut body = SoftBody::new(spec).unwrap();
+        if cut {
+            let upper: Vec<usize> =
+                (0..body.cells()).filter(|cell| body.cell_middle(*cell).unwrap().y > 0.05).collect();
+            body.remove_cells(&upper).unwrap();
+        }
+        run(&mut body, 0.02, 300);
+        state(&body).positions.iter().map(|at| at.x).fold(0.0, f64::max) - size_m.x
+    };
+    let whole = longer(SoftShape::Box { size_m, segments: [8, 2, 2] }, false);
+    let left = longer(SoftShape::Box { size_m, segments: [8, 2, 2] }, true);
+    let thin = longer(SoftShape::Box { size_m: DVec3::new(0.4, 0.05, 0.1), segments: [8, 1, 2] }, false);
+    assert!((left / thin - 1.0).abs() < 1e-9 && (left / whole - 1.0).abs() < 0.01, "{left} {thin} {whole}");
+}
+
+#[test]
+fn the_skin_loses_the_triangles_of_the_cells_and_closes_over_what_was_inside() {
+    let [ball, block, mesh] = <[SoftShape; 3]>::try_from(solids()).unwrap();
+    for (shape, is_closed) in [(ball, false), (block, true), (mesh, true)] {
+        let mut body = SoftBody::new(spec(shape)).unwrap();
+        // the cell farthest along x is at the skin
+        let along = |cell: &usize| body.cell_middle(*cell).unwrap().x;
+        let last = (0..body.cells()).max_by(|a, b| along(a).total_cmp(&along(b))).unwrap();
+        let gone = body.remove_cells(&[last]).unwrap();
+        let form = body.form().unwrap();
+        let ShapeKind::Surface(skin) = &form.kind else { panic!("a skin") };
+        let surface = Triangles { points: state(&body).positions, triangles: skin.triangles.to_vec() };
+        assert_eq!(metachron_geometry::is_closed(&surface), is_closed);
+        let volume = body.mass_kg() / MATTER.density_kg_m3;
+        if is_closed && body.spec.shape.model() == "solid" && body.mesh.laws.is_empty() {
+            assert!((surface.volume_m3() / volume - 1.0).abs() < 1e-12, "{} {volume}", surface.volume_m3());
+        }
+        assert!(is_closed || gone.triangles > 0);
+    }
+}
+
+#[test]
+fn a_number_without_a_cell_and_all_cells_are_refused_and_nothing_changes() {
+    let mut body = SoftBody::new(spec(solid())).unwrap();
+    let cells = body.cells();
+    let why = |result: Result<_, SoftError>| result.map(|_: RemovedCells| ()).unwrap_err().to_string();
+    assert_eq!(why(body.remove_cells(&[0, cells])), format!("there is no cell {cells}: the body has {cells}"));
+    assert_eq!(why(body.remove_cells(&(0..cells).collect::<Vec<_>>())), "no cell would be left");
+    assert_eq!(body.cells(), cells);
+}
