@@ -27,8 +27,8 @@ pub(super) fn law(c: &mut Checker<'_, '_>, place: &Place, kind: Option<LawKind>,
             c.wrong(
                 place,
                 "exponent",
-                "has no material that it belongs to",
-                "expected `material = \"ogden\"` beside it",
+                "has no law that it belongs to",
+                "expected `law = \"ogden\"` beside it",
             );
             MaterialLaw::default()
         }
