@@ -24,12 +24,7 @@ pub(super) fn law(c: &mut Checker<'_, '_>, place: &Place, kind: Option<LawKind>,
             MaterialLaw::default()
         }
         (_, Some(_)) => {
-            c.wrong(
-                place,
-                "exponent",
-                "has no law that it belongs to",
-                "expected `law = \"ogden\"` beside it",
-            );
+            c.wrong(place, "exponent", "has no law that it belongs to", "expected `law = \"ogden\"` beside it");
             MaterialLaw::default()
         }
         (Some(LawKind::NeoHookean), None) => MaterialLaw::NeoHookean,
