@@ -24,3 +24,4 @@ mod tearing;
 mod tools;
 mod tubes;
 mod walls;
+mod yielding;

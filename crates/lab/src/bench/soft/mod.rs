@@ -166,22 +166,36 @@ impl Subject for Soft {
             let here = rows.iter().filter(|row| row.test == test);
             here.map(|row| (row.nodes as f64, value(row))).filter(|(_, ms)| ms.is_finite()).collect()
         };
-        let [held, lying] = [HELD, LYING].map(|test| of(test, |row| row.ms_per_step_p50));
-        let lines = [("held", held), ("on the floor", lying), ("peer, held", of(HELD, |row| row.peer_ms_per_step))];
-        let all = || lines.iter().flat_map(|(_, points)| points);
+        let curve = |name: &str, points: Vec<(f64, f64)>| Curve { name: name.to_owned(), points };
+        let curves = [
+            curve("held", of(HELD, |row| row.ms_per_step_p50)),
+            curve("on the floor", of(LYING, |row| row.ms_per_step_p50)),
+            curve("peer, held", of(HELD, |row| row.peer_ms_per_step)),
+        ];
+        let all = || curves.iter().flat_map(|curve| &curve.points);
         let (low, high) = span(all().map(|(nodes, _)| *nodes), true);
         let (least, most) = span(all().map(|(_, ms)| *ms), true);
-        let layer = |((name, points), colour): (&(&str, Vec<(f64, f64)>), Colour)| {
-            let label = match exponent(points) {
-                Some(power) => format!("{name}: nodes^{power:.2}"),
-                None => (*name).to_owned(),
-            };
-            Layer { label, colour, mark: Mark::Line(points.clone()) }
-        };
-        let layers = lines.iter().zip(Colour::LINES).filter(|((_, points), _)| !points.is_empty()).map(layer);
+        let drawn = curves.into_iter().zip(Colour::LINES).filter(|(curve, _)| !curve.points.is_empty());
+        let layers = drawn.map(|(curve, colour)| curve.layer(colour));
         let (x, y) = (Axis::log("nodes", low, high), Axis::log("CPU time per step, ms", least, most));
         let panel = Panel { title: String::new(), x, y, layers: layers.collect() };
         Figure { title: "Cost of a soft cube's step".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+/// Milliseconds by numbers of nodes.
+struct Curve {
+    name: String,
+    points: Vec<(f64, f64)>,
+}
+
+impl Curve {
+    fn layer(self, colour: Colour) -> Layer {
+        let label = match exponent(&self.points) {
+            Some(power) => format!("{}: nodes^{power:.2}", self.name),
+            None => self.name,
+        };
+        Layer { label, colour, mark: Mark::Line(self.points) }
     }
 }
 

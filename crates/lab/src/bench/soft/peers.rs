@@ -76,11 +76,6 @@ impl Peers {
     pub(super) fn of(&self, test: &str, nodes: usize) -> Option<&PeerRow> {
         self.rows.iter().find(|row| row.test == test && row.nodes == nodes)
     }
-
-    /// Nodes and milliseconds of all runs of a test.
-    pub(super) fn points(&self, test: &str) -> Vec<(f64, f64)> {
-        self.rows.iter().filter(|row| row.test == test).map(|row| (row.nodes as f64, row.ms_a_step)).collect()
-    }
 }
 
 #[cfg(test)]
@@ -102,7 +97,6 @@ mod tests {
         let peers = read(&text).unwrap();
         assert_eq!(peers.of("cube", 729).map(|row| row.ms_a_step), Some(0.729));
         assert_eq!((peers.of("cube", 730), peers.of("sheet", 729)), (None, None));
-        assert_eq!(peers.points("cube"), [(343.0, 0.343), (729.0, 0.729)]);
     }
 
     #[test]
