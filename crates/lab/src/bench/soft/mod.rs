@@ -200,7 +200,7 @@ impl Curve {
 }
 
 fn limits(args: &BenchArgs) -> Limits {
-    let [settle_s, measure_s] = if args.quick { [1.5, 0.6] } else { [10.0, 4.0] };
+    let [settle_s, measure_s] = if args.quick { [1.0, 0.5] } else { [5.0, 3.0] };
     let bound = |steps, span_s| Bound { steps, span: Duration::from_secs_f64(span_s) };
     Limits { settle: bound(60, settle_s), measure: bound(60, args.seconds.unwrap_or(measure_s)) }
 }
@@ -257,7 +257,7 @@ impl Case {
                 let nodes = spec.shape.vertices() as usize;
                 let mut play = Play::new(vec![boxed(spec)?], &[bodies::floor()], FOLDING_STEP_S)?;
                 let steps = (FOLDING_S / FOLDING_STEP_S).round() as u32;
-                play.measured(Bound { steps, span: 3 * limits.settle.span })?;
+                play.measured(Bound { steps, span: 6 * limits.settle.span })?;
                 let mut play = play.in_steps_of(STEP_S);
                 Ok(row(test, nodes, &play.measured(limits.measure)?))
             }
