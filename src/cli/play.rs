@@ -3,7 +3,7 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
-use metachron_core::{AgentId, ClusterState, TornAttachment};
+use metachron_core::{AgentId, AttachmentEvent, ClusterState};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
@@ -298,10 +298,10 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
 
 fn event(scene: &Scene, event: &Event) -> EventReport {
     let name = |id: AgentId| scene.name_of(id).to_owned();
-    let TornAttachment { attachment, with, at, force_n } = event.torn;
+    let AttachmentEvent { attachment, kind, with, at, force_n } = event.what;
     EventReport {
         at_s: at.as_secs_f64(),
-        kind: "tore",
+        kind: kind.name(),
         attachment: attachment.to_string(),
         a: name(event.agent),
         b: with.map_or_else(|| "world".to_owned(), name),

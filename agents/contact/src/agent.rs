@@ -38,6 +38,13 @@ pub trait Agent: Send {
     /// Keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
     fn set_resolution(&mut self, wanted: Resolution);
 
+    /// Sets the pressure of what fills the agent, inside minus outside, Pa; `false`, and no change, for one that nothing fills and for a
+    /// pressure that it refuses.
+    fn set_pressure_pa(&mut self, pressure_pa: f64) -> bool {
+        let _ = pressure_pa;
+        false
+    }
+
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 

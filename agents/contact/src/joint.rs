@@ -25,6 +25,9 @@ pub struct Joint {
     /// The force above which it tears, N, > 0: the mean over a macro step of its cluster; what it gives against turns does not count.
     /// Infinite where it never does.
     pub tears_above_n: f64,
+    /// The force that it gives at most, N, > 0, below that at which it tears: what would take more moves the place at which it holds, a
+    /// rope's length or a spring's length at rest. What it gives against turns is not bounded. Infinite where it never yields.
+    pub yields_above_n: f64,
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes are in a's shape, of any length above zero.
@@ -109,11 +112,12 @@ pub enum JointError {
 pub const JOINT_GAP_MAX_M: f64 = 1e-3;
 
 impl Joint {
-    /// A joint of `kind` without collision between its bodies, anchored in both shapes' origins, that never tears.
+    /// A joint of `kind` without collision between its bodies, anchored in both shapes' origins, that neither tears nor yields.
     #[must_use]
     pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
         let (anchor_a_m, anchor_b_m, rest) = (DVec3::ZERO, DVec3::ZERO, DQuat::IDENTITY);
-        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide: false, tears_above_n: f64::INFINITY }
+        let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
+        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide: false, tears_above_n, yields_above_n }
     }
 
     /// The same joint with its zero at the initial rotations of the two shapes: rotations to the world's axes.
@@ -137,6 +141,12 @@ impl Joint {
         }
         if self.tears_above_n.is_nan() || self.tears_above_n <= 0.0 {
             let (what, value, wanted) = ("tearing force", self.tears_above_n, "above zero");
+            return Err(JointError::BadNumber { what, value, wanted });
+        }
+        if !(self.yields_above_n > 0.0
+            && (self.yields_above_n < self.tears_above_n || self.yields_above_n == f64::INFINITY))
+        {
+            let (what, value, wanted) = ("yield force", self.yields_above_n, "above zero and below the tearing force");
             return Err(JointError::BadNumber { what, value, wanted });
         }
         match self.kind {
@@ -231,6 +241,11 @@ mod tests {
             let joint = Joint { tears_above_n, ..rope(1.0) };
             assert!(matches!(joint.check(), Err(JointError::BadNumber { .. })), "{tears_above_n}");
         }
+        for yields_above_n in [0.0, -1.0, f64::NAN, 2.0, 3.0] {
+            let joint = Joint { yields_above_n, tears_above_n: 2.0, ..rope(1.0) };
+            assert!(matches!(joint.check(), Err(JointError::BadNumber { .. })), "{yields_above_n}");
+        }
+        assert_eq!(Joint { yields_above_n: 1.9, tears_above_n: 2.0, ..rope(1.0) }.check(), Ok(()));
         let to_itself = Joint { b: Some(AgentId(0)), ..rope(1.0) };
         assert_eq!(to_itself.check(), Err(JointError::SameBody));
         let hinge = |axis, range_rad| Joint { kind: JointKind::Revolute { axis, range_rad }, ..rope(1.0) };

@@ -51,4 +51,7 @@ pub struct Link {
     /// The force above which it tears, N, > 0: the mean over a macro step of its cluster. Infinite where it never does; an asynchronous
     /// link never does.
     pub tears_above_n: f64,
+    /// The force that it gives at most, N, > 0, below that at which it tears: what would take more moves the place at which it holds, or
+    /// lengthens it. Infinite where it never yields; an asynchronous link never does.
+    pub yields_above_n: f64,
 }

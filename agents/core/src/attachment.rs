@@ -1,6 +1,6 @@
-//! Attachments of a scene that have torn, as the agents publish them that they held.
+//! What happened to attachments of a scene, as the agents publish it that they hold.
 //!
-//! In: what tore, when, and by which force. Out: the same in snapshots and reports. Never here: forces.
+//! In: what yielded or tore, when, and by which force. Out: the same in snapshots and reports. Never here: forces.
 
 use crate::{AgentId, SimTime};
 use std::fmt;
@@ -27,15 +27,37 @@ impl fmt::Display for AttachmentId {
     }
 }
 
-/// An attachment that has torn.
+/// Something that happened to an attachment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TornAttachment {
+pub struct AttachmentEvent {
     /// Which one.
     pub attachment: AttachmentId,
+    /// What happened.
+    pub kind: AttachmentEventKind,
     /// The agent at its other end; `None` is the world.
     pub with: Option<AgentId>,
-    /// When it tore, in the scene's time: the end of the step over which it gave too much.
+    /// When it happened, in the scene's time: the end of the step over which it gave too much.
     pub at: SimTime,
     /// The force that it gave: its mean over that step, newtons.
     pub force_n: f64,
+}
+
+/// What can happen to an attachment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AttachmentEventKind {
+    /// It slipped for the first time.
+    Yielded,
+    /// It tore, for good.
+    Tore,
+}
+
+impl AttachmentEventKind {
+    /// The name as reports write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Yielded => "yielded",
+            Self::Tore => "tore",
+        }
+    }
 }

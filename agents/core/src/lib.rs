@@ -39,7 +39,7 @@ pub mod step_doubling;
 pub mod time;
 pub mod wave;
 
-pub use attachment::{AttachmentId, TornAttachment};
+pub use attachment::{AttachmentEvent, AttachmentEventKind, AttachmentId};
 pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
 };

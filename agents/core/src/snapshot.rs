@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{Ledger, LocalModel, PairState, TornAttachment};
+use crate::{AttachmentEvent, Ledger, LocalModel, PairState};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -50,8 +50,8 @@ pub struct Snapshot {
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
     pub bonds: Vec<AgentId>,
-    /// Attachments that have torn since the start; each is reported by one of its two agents.
-    pub torn: Vec<TornAttachment>,
+    /// What happened to its attachments since the start; each is reported by one of its two agents.
+    pub events: Vec<AttachmentEvent>,
 }
 
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
@@ -80,7 +80,7 @@ impl Snapshot {
         self.pairs.clear();
         self.cluster = None;
         self.bonds.clear();
-        self.torn.clear();
+        self.events.clear();
     }
 
     /// The scene time that it belongs to: its own time plus its delay.

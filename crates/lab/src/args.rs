@@ -11,6 +11,7 @@ Examples:
   metachron bench agents --quick                       a minute, into the folder bench/
   metachron bench agents --executor pool --agents 1000
   metachron bench pile --quick
+  metachron bench soft --peers docs/bench/soft-peers.json
   metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
 
 Compare CPU times: wall times include the load of other programs.";
@@ -156,6 +157,9 @@ pub struct BenchArgs {
     /// For agents: only cases of at most this many agents
     #[arg(long, value_name = "N")]
     pub agents: Option<usize>,
+    /// For soft: show another engine's rows beside ours, from the file that python/peers/soft.py writes
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub peers: Option<PathBuf>,
     /// How long each case runs; for pile: simulated seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
@@ -178,6 +182,8 @@ pub enum BenchSubject {
     Select,
     /// A thousand boxes as agents that step in clusters while they touch, compared with one rapier3d world of the same boxes
     Pile,
+    /// Steps of soft bodies: cubes of tissue by number of nodes, held, lying, loaded and shaken, a sheet, a tube whose wall gives
+    Soft,
     /// Pictures on this machine's adapter, by triangles, pixels and shading
     Render,
 }

@@ -341,6 +341,9 @@ impl AgentRunner {
             self.hands.clear();
             self.hands.extend(hand);
         }
+        if let Some(pressure_pa) = pending.pressure_pa {
+            self.agent.set_pressure_pa(pressure_pa);
+        }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.

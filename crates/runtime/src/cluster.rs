@@ -30,8 +30,8 @@ use metachron_contact::stepper::{
 use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
-    AgentId, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan, SimTime, Snapshot,
-    StepReport, TornAttachment, recycled,
+    AgentId, AttachmentEvent, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan,
+    SimTime, Snapshot, StepReport, recycled,
 };
 use std::sync::Arc;
 
@@ -48,8 +48,8 @@ pub(super) struct ClusterSeat {
     memory: ContactMemory,
     grips: Vec<Grip>,
     pairs: Vec<PairState>,
-    /// Attachments that have torn, of those that it tells of.
-    torn: Vec<TornAttachment>,
+    /// What happened to attachments, of those that it tells of.
+    events: Vec<AttachmentEvent>,
     /// Agents that belong into the same cluster, as it sees them.
     bonds: Vec<AgentId>,
     /// Of these the ones that rest: they are woken.
@@ -127,7 +127,7 @@ impl ClusterSeat {
             memory: ContactMemory::default(),
             grips: Vec::new(),
             pairs: Vec::new(),
-            torn: Vec::new(),
+            events: Vec::new(),
             bonds: Vec::new(),
             sleepers: Vec::new(),
             work: 0.0,
@@ -150,7 +150,7 @@ impl ClusterSeat {
     pub fn complete(&self, into: &mut Snapshot) {
         into.grips.clone_from(&self.grips);
         into.pairs.clone_from(&self.pairs);
-        into.torn.clone_from(&self.torn);
+        into.events.clone_from(&self.events);
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
         into.cluster = self.state;
@@ -288,7 +288,7 @@ impl AgentRunner {
                     doubling.compare(&list);
                 }
                 // what held until now may have kept them still
-                let calm = stepper.torn().is_empty() && list.iter().all(|one| one.member.is_calm());
+                let calm = stepper.held_fast() && list.iter().all(|one| one.member.is_calm());
                 Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
             })
         });
@@ -304,7 +304,7 @@ impl AgentRunner {
             self.note_errors(doubling, dt);
         }
         self.note_pairs(&stepper, dt);
-        self.note_torn(stepper.torn(), dt);
+        self.note_events(&stepper, dt);
         self.note_solves(&report, plan, dt);
         self.note_groups(time + dt);
         if let Some(seat) = &mut self.cluster {

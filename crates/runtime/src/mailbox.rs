@@ -20,6 +20,8 @@ pub enum Command {
     SetDt(SimSpan),
     /// The user spring pulls at the agent until the next such command; `None` releases it.
     Hand(Option<AnchorSpring>),
+    /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
+    SetPressure(f64),
     /// Wake up from rest.
     Wake,
 }
@@ -54,6 +56,8 @@ pub(super) struct PendingCommands {
     pub dt: Option<SimSpan>,
     /// The newest state of the user spring.
     pub hand: Option<Option<AnchorSpring>>,
+    /// The newest requested pressure, Pa.
+    pub pressure_pa: Option<f64>,
 }
 
 impl Mailbox {
@@ -74,6 +78,7 @@ impl Mailbox {
             Command::Retune(resolution) => pending.set_resolution = Some(resolution),
             Command::SetDt(dt) => pending.dt = Some(dt),
             Command::Hand(pull) => pending.hand = Some(pull),
+            Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
             Command::Wake => {}
         }
         self.full.store(true, Release);
@@ -101,6 +106,7 @@ impl Mailbox {
 fn is_sound(command: &Command) -> bool {
     match command {
         Command::Retune(wanted) => wanted.eps_m.is_finite(),
+        Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
         Command::SetDt(_) | Command::Hand(None) | Command::Wake => true,
         Command::Hand(Some(pull)) => {
             let anchor = match pull.anchor {

@@ -122,9 +122,19 @@ fn an_asynchronous_link_joins_no_clusters_and_keeps_its_length_in_a_fall() {
             ];
             let anchor = Anchor::Local(DVec3::ZERO);
             let (other, here, there, rest_m) = (AgentId(1), anchor, anchor, 0.1);
-            let (number, tears_above_n) = (0, f64::INFINITY);
-            spawns[0].attached =
-                vec![Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n }];
+            let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
+            spawns[0].attached = vec![Link {
+                other,
+                here,
+                there,
+                stiffness_n_m,
+                damping_n_s_m,
+                rest_m,
+                law,
+                number,
+                tears_above_n,
+                yields_above_n,
+            }];
             spawns[0].laws = vec![(AgentId(1), Law::Off)];
             let run = play(spawns, 0.3);
             let all = states(&run);

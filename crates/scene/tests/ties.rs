@@ -1,6 +1,6 @@
 //! Which agents collide, and the clusters in which they begin, as scene files ask for them.
 
-use metachron_core::{AgentId, AttachmentId, Body, SimSpan};
+use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, SimSpan};
 use metachron_scene::{SceneError, Source, load};
 use metachron_world::couplings::CouplingKind;
 use metachron_world::kinds::ExecutorKind;
@@ -136,6 +136,45 @@ fn a_tearing_force_outside_its_range_or_out_of_place_is_refused_where_it_stands(
 }
 
 #[test]
+fn the_yield_force_of_joints_and_couplings_is_read_and_is_below_the_tearing_force() {
+    let tie = |keys: &str| {
+        format!(
+            "joint = [{{ kind = \"spherical\", a = \"ball\", b = \"world\"{keys} }}]\ncoupling = [{{ kind = \"attach\", a = \"ball\", b = \"beam\", at_a = [0, 0, 0], at_b = [0, 0, 0], stiffness_n_m = 100{keys} }}]"
+        )
+    };
+    let read = |keys: &str| {
+        let scene = held(&tie(keys), "").unwrap();
+        let CouplingKind::Attach { yields_above_n, .. } = scene.couplings[0].kind else { panic!("an attachment") };
+        [scene.joints[0].yields_above_n, yields_above_n]
+    };
+    assert_eq!(read(", yields_above_n = 12.5, tears_above_n = 13"), [12.5; 2]);
+    assert_eq!(read(", tears_above_n = 13"), [f64::INFINITY; 2]);
+    for (keys, word) in [
+        (", yields_above_n = 13, tears_above_n = 13", "below `tears_above_n`, 13 N"),
+        (", yields_above_n = 0", "a number from 0.000001 to 1000000000 N"),
+    ] {
+        let problems = held(&tie(keys), "").unwrap_err().problems;
+        assert!(problems.len() == 2 && problems.iter().all(|problem| problem.expected.contains(word)), "{problems:#?}");
+    }
+    let contact = "coupling = [{ a = \"ball\", b = \"beam\", yields_above_n = 9 }]";
+    assert!(held(contact, "").unwrap_err().problems[0].message.contains("does not belong to contact"));
+}
+
+#[test]
+fn what_yields_slides_down_and_one_of_the_two_reports_it() {
+    let joints = "joint = [{ kind = \"fixed\", a = \"beam\", b = \"world\" }, { kind = \"fixed\", a = \"ball\", b = \"beam\", yields_above_n = 8.829 }]";
+    let world = World::start(&held(joints, "").unwrap(), ExecutorKind::Lockstep).unwrap();
+    world.advance(SimSpan::from_millis(500));
+    let [ball, beam] = [0, 1].map(|at| world.agents()[at].latest());
+    let [event] = ball.events[..] else { panic!("{:?}", ball.events) };
+    assert_eq!((event.kind, event.attachment), (AttachmentEventKind::Yielded, AttachmentId::Joint(1)));
+    assert!(beam.events.is_empty() && event.force_n == 8.829 && event.at.as_secs_f64() < 0.0168, "{event:?}");
+    let Body::Rigid(state) = &ball.body else { panic!("a rigid body") };
+    let time_s = ball.moment().as_secs_f64();
+    assert!((state.velocity.z / (-0.981 * time_s) - 1.0).abs() < 0.01, "{} m/s at {time_s} s", state.velocity);
+}
+
+#[test]
 fn what_a_joint_held_together_falls_and_parts_once_it_has_torn() {
     // the beam is fixed to the world, and the ball to the beam
     let joints = |between_n: &str| {
@@ -150,16 +189,16 @@ fn what_a_joint_held_together_falls_and_parts_once_it_has_torn() {
         (states.collect::<Vec<_>>(), world.hash())
     };
     let (holding, _) = play("10.8");
-    assert_eq!((holding[0].0.torn.len(), holding[1].1), (0, Some(AgentId(0))), "1.1 times its weight");
+    assert_eq!((holding[0].0.events.len(), holding[1].1), (0, Some(AgentId(0))), "1.1 times its weight");
     let (torn, hash) = play("8.8");
     // the joint's first body alone reports it, with its weight
-    let [event] = torn[0].0.torn[..] else { panic!("{:?}", torn[0].0.torn) };
+    let [event] = torn[0].0.events[..] else { panic!("{:?}", torn[0].0.events) };
     assert_eq!((event.attachment, event.with), (AttachmentId::Joint(1), Some(AgentId(1))));
     // joints hold to 5 µm: in a step of 1/240 s up to 0.3 N of 1 kg, and 1.2 mm/s afterwards
     assert!((event.force_n - 9.81).abs() < 0.3, "{} N", event.force_n);
     let at_s = event.at.as_secs_f64();
     assert!(at_s < 0.0168, "{at_s} s: a step of the slowest rate at most");
-    assert!(torn[1].0.torn.is_empty() && torn.iter().all(|(_, led_by)| led_by.is_none()), "they parted");
+    assert!(torn[1].0.events.is_empty() && torn.iter().all(|(_, led_by)| led_by.is_none()), "they parted");
     let Body::Rigid(ball) = &torn[0].0.body else { panic!("a rigid body") };
     let fallen_s = torn[0].0.moment().as_secs_f64() - at_s;
     let late_m = ball.position.z - (5.0 - 0.5 * 9.81 * fallen_s * fallen_s);
@@ -184,7 +223,7 @@ coupling = [{ kind = "attach", a = "beam", b = "tool", at_a = [0, 0, 0], at_b = 
         let world = World::start(&scene, executor).unwrap();
         world.advance(SimSpan::from_millis(1000));
         let [beam, tool] = [0, 1].map(|at| world.agents()[at].latest());
-        let [event] = beam.torn[..] else { panic!("{executor:?}: {:?}", beam.torn) };
+        let [event] = beam.events[..] else { panic!("{executor:?}: {:?}", beam.events) };
         assert_eq!((event.attachment, event.with), (AttachmentId::Coupling(0), Some(AgentId(1))), "{executor:?}");
         // a cluster that is late makes steps of up to 1/60 s
         let step_s = beam.cluster.unwrap().step_s.max(1.0 / 60.0);
@@ -192,7 +231,7 @@ coupling = [{ kind = "attach", a = "beam", b = "tool", at_a = [0, 0, 0], at_b = 
         // the tip is a little behind its path
         let at_s = event.at.as_secs_f64();
         assert!((0.5..0.5 + 2.0 * step_s).contains(&at_s), "{executor:?}: {at_s} s");
-        assert!(tool.torn.is_empty() && tool.grips.is_empty() && beam.grips.is_empty(), "{executor:?}");
+        assert!(tool.events.is_empty() && tool.grips.is_empty() && beam.grips.is_empty(), "{executor:?}");
         assert_eq!(world.agents()[1].led_by(), None, "{executor:?}: they parted");
     }
 }

@@ -69,3 +69,34 @@ fn what_a_wall_cannot_do_is_refused() {
     assert!(said(explicit).contains("has no steps for"), "{}", said(explicit));
     assert!(said("wall = \"giving\"").contains("gives"), "{}", said("wall = \"giving\""));
 }
+
+#[test]
+fn pressure_over_time_widens_the_pipe_by_lames_law() {
+    let per_pa_m = 0.009_f64.powi(2) * 0.01 * (2.0 - 0.45) / (1e5 * (0.01_f64.powi(2) - 0.009_f64.powi(2)));
+    let scene = scene("wall = \"gives\"\npressure_pa = [[0, 0], [0.3, 400]]").unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let pipe = world.object("pipe").unwrap();
+    for (wanted_pa, after_ms) in [(200.0, 150), (400.0, 1350)] {
+        world.advance(SimSpan::from_millis(after_ms));
+        let Body::Curve(curve) = &world.latest(pipe).body else { panic!("a tube is a curve") };
+        // the end, which the brick does not touch; a wall of soft tissue follows within milliseconds
+        let off = (curve.radii_m[0] - 0.01) / (wanted_pa * per_pa_m) - 1.0;
+        assert!(off.abs() < 0.05, "{off} of {wanted_pa} Pa");
+    }
+}
+
+#[test]
+fn a_pressure_out_of_range_or_out_of_order_is_refused_where_it_stands() {
+    for (value, words) in [
+        ("-1", &["pressure_pa", "0 to 10000000 Pa"][..]),
+        ("[]", &["pressure_pa", "has 0 entries"]),
+        ("[[0, 1], [2, 1e9]]", &["text: \"1e9\"", "0 to 10000000 Pa"]),
+        ("[[0, 1], [2, 1], [2, 3]]", &["is 2", "column: 33", "after the one before, 2 s"]),
+        ("[[-1, 1]]", &["text: \"-1\"", "0 to 1000000 s"]),
+        ("[0, 1]", &["[[0.0, 0.0], [1.0, 4000.0]]"]),
+        ("\"high\"", &["[[0.0, 0.0], [1.0, 4000.0]]"]),
+    ] {
+        let said = scene(&format!("pressure_pa = {value}")).map(|_| value).unwrap_err();
+        words.iter().for_each(|word| assert!(said.contains(word), "{value}: {word} is not in {said}"));
+    }
+}

@@ -1,40 +1,41 @@
-//! What happened once in a run: attachments that tore.
+//! What happened once in a run: attachments that yielded or tore.
 //!
 //! In: the last states of all agents, each of which has all that it tells of. Out: events in the order of time. Never here: forces, names.
 
-use metachron_core::{AgentId, Snapshot, TornAttachment};
+use metachron_core::{AgentId, AttachmentEvent, Snapshot};
 
-/// An attachment that tore in a run.
+/// What happened to an attachment in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// The agent that tells of it: of a joint the first body, of a coupling the one of lower number, of a tube's own attachment the tube.
     pub agent: AgentId,
-    /// What tore, when, and by which force.
-    pub torn: TornAttachment,
+    /// What, when, and by which force.
+    pub what: AttachmentEvent,
 }
 
 /// The events that the agents in `states`, by rising numbers, tell of.
 pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Event> {
-    let reported = |(agent, state): (AgentId, &'a Snapshot)| state.torn.iter().map(move |&torn| Event { agent, torn });
+    let reported =
+        |(agent, state): (AgentId, &'a Snapshot)| state.events.iter().map(move |&what| Event { agent, what });
     let mut events: Vec<Event> = (0..).map(AgentId).zip(states).flat_map(reported).collect();
-    events.sort_by_key(|event| (event.torn.at, event.torn.attachment, event.agent));
+    events.sort_by_key(|event| (event.what.at, event.what.attachment, event.what.kind, event.agent));
     events
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_core::{AttachmentId, SimTime};
+    use metachron_core::{AttachmentEventKind, AttachmentId, SimTime};
 
     #[test]
     fn events_of_all_agents_are_in_the_order_of_time() {
         let torn = |number: u32, at_ns: u64| {
             let (attachment, at) = (AttachmentId::Joint(number), SimTime::from_nanos(at_ns));
-            TornAttachment { attachment, with: None, at, force_n: 1.0 }
+            AttachmentEvent { attachment, kind: AttachmentEventKind::Tore, with: None, at, force_n: 1.0 }
         };
         let states = [vec![torn(3, 5), torn(0, 9)], vec![], vec![torn(2, 5), torn(1, 1)]];
-        let states = states.map(|torn| Snapshot { torn, ..Snapshot::default() });
-        let order: Vec<_> = events(states.iter()).iter().map(|one| (one.agent.0, one.torn.attachment)).collect();
+        let states = states.map(|events| Snapshot { events, ..Snapshot::default() });
+        let order: Vec<_> = events(states.iter()).iter().map(|one| (one.agent.0, one.what.attachment)).collect();
         assert_eq!(order, [(2, 1), (2, 2), (0, 3), (0, 0)].map(|(agent, joint)| (agent, AttachmentId::Joint(joint))));
     }
 }

@@ -347,6 +347,12 @@ impl Session {
         self.world.send(to, Command::Hand(pull))
     }
 
+    /// Sets the pressure of what fills an agent, inside minus outside, Pa; one that nothing fills stays as it is. An agent that does not exist
+    /// and a number that is not finite give an error.
+    pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), metachron_runtime::SendError> {
+        self.world.send(of, Command::SetPressure(pressure_pa))
+    }
+
     /// Ends the frame that began at `started`.
     pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
         let Finished { work, skip, .. } = finished;

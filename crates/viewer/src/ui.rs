@@ -26,7 +26,7 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, HandStatus, Law, Message, Severity, Shares,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, Filled, FrameTimes, HandStatus, Law, Message, Severity, Shares,
     Simulation, Skip, Status, Tuning, ViewRequest,
 };
 

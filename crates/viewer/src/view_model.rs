@@ -2,21 +2,24 @@
 //!
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
-use crate::ui::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
+use crate::ui::{AgentRow, AgentState, CouplingRow, Filled, Law, Shares, Status};
 use metachron_core::{SimTime, Snapshot};
 use metachron_lod::control;
 use metachron_lod::control::Policy;
 use metachron_runtime::AgentStats;
 use metachron_session::FrameRecord;
 use metachron_session::Session;
-use metachron_world::Spec;
 use metachron_world::kinds::PolicyKind;
+use metachron_world::{Member, Spec};
 use std::time::Duration;
 
 /// Frames over which the budget bar is smoothed.
 const SHARES_FRAMES: usize = 30;
 /// Mass that the user spring moves of a body that bends, at most, and of a body without a mass of its own, kilograms.
 const STRETCH_MASS_KG: f64 = 0.1;
+
+/// By what share of its radius the slider of a tube's pressure can widen it.
+const WIDENED_MAX: f64 = 0.3;
 
 /// The panels of a session that has just begun.
 pub(super) fn initial_status(session: &Session) -> Status {
@@ -31,9 +34,20 @@ pub(super) fn initial_status(session: &Session) -> Status {
         laws,
         running: true,
         speed: 1.0,
-        agents: scene.agents.iter().map(|m| AgentRow::new(m.id, m.name.clone(), m.spec.model())).collect(),
+        agents: scene.agents.iter().map(row).collect(),
         ..Status::default()
     }
+}
+
+/// The row of an agent that has not run yet.
+fn row(agent: &Member) -> AgentRow {
+    let row = AgentRow::new(agent.id, agent.name.clone(), agent.spec.model());
+    let Spec::Tube(tube) = &agent.spec else { return row };
+    let section = &tube.section;
+    // p r² (1 − ν/2)/(E t), the law of a prescribed wall
+    let most_pa = WIDENED_MAX * section.young_pa * section.wall_m / (section.radius_m * (1.0 - 0.5 * section.poisson));
+    let pressure_pa = tube.pressure_keys.first().map_or(tube.pressure_pa, |key| key.pressure_pa);
+    AgentRow { filled: (section.wall_m < section.radius_m).then_some(Filled { pressure_pa, most_pa }), ..row }
 }
 
 /// Values derived from differences of counters, over windows long enough to be meaningful.

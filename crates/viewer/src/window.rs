@@ -180,6 +180,15 @@ impl<'a> WindowSimulation<'a> {
         self.refresh();
     }
 
+    /// Sets the pressure of what fills an object; the slider stays where it is put.
+    fn set_pressure(&mut self, agent: AgentId, pressure_pa: f64) {
+        if self.session.set_pressure(agent, pressure_pa).is_err() {
+            return;
+        }
+        let row = self.status.agents.iter_mut().find(|row| row.id == agent);
+        row.and_then(|row| row.filled.as_mut()).into_iter().for_each(|filled| filled.pressure_pa = pressure_pa);
+    }
+
     /// Starts time, unless the user has paused it.
     fn begin(&mut self) {
         if self.running {
@@ -356,6 +365,7 @@ impl Simulation for WindowSimulation<'_> {
             }
             Action::DragMove(target) => self.pull(self.hand.map(|hand| Hand { target, ..hand })),
             Action::DragEnd => self.pull(None),
+            Action::Pressure { agent, pressure_pa } => self.set_pressure(agent, pressure_pa),
             Action::Select(agent) => self.status.selected = agent,
             Action::OpenScene(path) => self.open(&path),
         }

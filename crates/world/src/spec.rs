@@ -142,7 +142,8 @@ impl Member {
     /// no rope can be.
     pub fn replace_tube_by_rope(&mut self) -> bool {
         let Spec::Tube(tube) = &self.spec else { return false };
-        let plain = tube.attachments.is_empty() && tube.peristalsis.is_none() && tube.pressure_pa == 0.0;
+        let pressed = tube.pressure_pa != 0.0 || !tube.pressure_keys.is_empty();
+        let plain = tube.attachments.is_empty() && tube.peristalsis.is_none() && !pressed;
         // a link attaches to a tube at its wall, but to a rope at a point
         if !plain || !self.links.is_empty() {
             return false;

@@ -74,9 +74,21 @@ fn contact_laws(scene: &Scene) -> Vec<PairLaw> {
 /// The link that a coupling makes of its first agent, by the coupling's number in the scene.
 fn link(coupling: &Coupling, number: u32) -> Option<(AgentId, Link)> {
     let Coupling { a, b: other, kind, law } = *coupling;
-    let CouplingKind::Attach { at_a: here, at_b: there, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n } = kind
+    let CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n, yields_above_n } = kind
     else {
         return None;
     };
-    Some((a, Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n }))
+    let link = Link {
+        other,
+        here: at_a,
+        there: at_b,
+        stiffness_n_m,
+        damping_n_s_m,
+        rest_m,
+        law,
+        number,
+        tears_above_n,
+        yields_above_n,
+    };
+    Some((a, link))
 }

@@ -2,6 +2,7 @@
 
 use metachron_core::{Body, SimSpan, Snapshot};
 use metachron_geometry::Solid;
+use metachron_runtime::Command;
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError};
 
@@ -108,4 +109,31 @@ fn an_invalid_scene_is_refused_with_the_name_of_the_object() {
     }
     let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
     assert!(matches!(world.object("bal"), Err(WorldError::NoObject { .. })));
+}
+
+#[test]
+fn a_pressure_that_a_program_sets_widens_a_tube_on_every_executor() {
+    let (radius_m, wall_m, young_pa) = (0.01, 1e-3, 1e6);
+    let tube = || {
+        let path = [[0.0; 3], [0.1, 0.0, 0.0]];
+        Tube::along(&path).radius_m(radius_m).wall_m(wall_m).young_pa(young_pa).clamp([true, true])
+    };
+    for executor in EXECUTORS {
+        let world = World::start(&Scene::builder().add("hose", tube()).build().unwrap(), executor).unwrap();
+        let hose = world.object("hose").unwrap();
+        let radius = || {
+            let Body::Curve(curve) = &world.latest(hose).body else { panic!("a tube is a curve") };
+            curve.radii_m[0]
+        };
+        world.advance(span(0.1));
+        assert_eq!(radius(), radius_m);
+        let pressure_pa = 5000.0;
+        world.send(hose.id(), Command::SetPressure(pressure_pa)).unwrap();
+        world.advance(span(0.2));
+        // of a prescribed wall: p r² (1 − ν/2)/(E t)
+        let poisson = 0.45;
+        let wanted_m = pressure_pa * radius_m * radius_m * (1.0 - 0.5 * poisson) / (young_pa * wall_m);
+        assert!(((radius() - radius_m) / wanted_m - 1.0).abs() < 1e-9, "{executor:?}: {} m", radius() - radius_m);
+        assert!(world.send(hose.id(), Command::SetPressure(f64::NAN)).is_err());
+    }
 }

@@ -91,6 +91,43 @@ impl Hold {
         Self::Along { axis, low_n_s: -limit_n_s, high_n_s: limit_n_s }
     }
 
+    /// The same with impulses of at most `limit_n_s`, in whatever direction it holds.
+    #[must_use]
+    pub fn limited(self, limit_n_s: f64) -> Self {
+        match self {
+            Self::All { limit_n_s: own } => Self::All { limit_n_s: own.min(limit_n_s) },
+            Self::Across { axis, limit_n_s: own } => Self::Across { axis, limit_n_s: own.min(limit_n_s) },
+            Self::Along { axis, low_n_s, high_n_s } => {
+                Self::Along { axis, low_n_s: low_n_s.max(-limit_n_s), high_n_s: high_n_s.min(limit_n_s) }
+            }
+        }
+    }
+
+    /// The most that it gives in the direction of an impulse, N·s; infinite for as much as it takes.
+    #[must_use]
+    pub fn most_n_s(&self, impulse_n_s: DVec3) -> f64 {
+        match *self {
+            Self::All { limit_n_s } | Self::Across { limit_n_s, .. } => limit_n_s,
+            Self::Along { axis, low_n_s, high_n_s } => {
+                if impulse_n_s.dot(axis) < 0.0 {
+                    -low_n_s
+                } else {
+                    high_n_s
+                }
+            }
+        }
+    }
+
+    /// The part of a velocity in the directions in which it holds.
+    #[must_use]
+    pub fn held_part(&self, velocity_m_s: DVec3) -> DVec3 {
+        match *self {
+            Self::All { .. } => velocity_m_s,
+            Self::Across { axis, .. } => velocity_m_s - axis * velocity_m_s.dot(axis),
+            Self::Along { axis, .. } => axis * velocity_m_s.dot(axis),
+        }
+    }
+
     /// Orthonormal columns, the axis first.
     pub(super) fn frame(&self) -> DMat3 {
         match *self {

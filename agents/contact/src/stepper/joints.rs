@@ -14,7 +14,8 @@ use super::memory::Partner;
 use super::scene::ClusterScene;
 use super::search::velocity;
 use super::springs::{End, Name, Pull};
-use super::ties::{FineStep, Ties, place_of};
+use super::ties::{FineStep, RowOwner, Ties, place_of};
+use super::yielding::{Frame, Slides, SlidingRow, YieldLimit};
 use crate::cluster::{Hold, JointRow, Side};
 use crate::joint::{Joint, JointKind};
 use crate::push_out::PUSH_OUT_MAX_M_S;
@@ -22,6 +23,9 @@ use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, shortest_turn};
 use metachron_geometry::narrow_phase::TouchKey;
 use std::f64::consts::{PI, TAU};
+
+/// A row that gave this share of the most that it may is not asked whether it holds.
+const YIELDS_SHARE: f64 = 0.999;
 
 /// The joints of a fine step.
 #[derive(Debug, Default)]
@@ -88,6 +92,16 @@ struct Together {
     name: Name,
 }
 
+/// A row of a joint as it is laid out.
+struct LaidRow {
+    /// The joint, by its place here.
+    held: usize,
+    way: Way,
+    hold: Hold,
+    of: Together,
+    owner: RowOwner,
+}
+
 /// A joint and the participants that it holds.
 struct Jointed<'a> {
     number: u32,
@@ -111,7 +125,8 @@ impl Joints {
                 let b = joint.b.map(|id| place_of(all, id));
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
-                self.hold(step, &Jointed { number, joint, a, b }, ties);
+                let joint = one.memory.slipped(Partner::Joint(number)).joint(joint);
+                self.hold(step, &Jointed { number, joint: &joint, a, b }, ties);
             }
         }
         self.aim(all, ties, |member| &progress[member].before[..], step.h_s);
@@ -132,8 +147,9 @@ impl Joints {
             return;
         };
         let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
-        let (partner, tears_above_n) = (Partner::Joint(number), joint.tears_above_n);
-        let name = Name { member: first, partner, hold: None, tears_above_n };
+        let yields = YieldLimit { above_n: joint.yields_above_n, frame: Frame::of(&b) };
+        let lasting = Name::lasting(first, Partner::Joint(number), None);
+        let name = Name { tears_above_n: joint.tears_above_n, yields, ..lasting };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
             ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
@@ -141,7 +157,7 @@ impl Joints {
         let points = Together { sides: [ends[0].side(), ends[1].side()], name };
         // what holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        let turns = Together { sides: turns, name: Name { tears_above_n: f64::INFINITY, ..name } };
+        let turns = Together { sides: turns, name: lasting };
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
@@ -150,11 +166,7 @@ impl Joints {
         let axis = joint.axis(&a, anchors[1] - anchors[0]);
         let mut key = 0;
         let mut push = |way: Way, of: Together, hold: Hold| {
-            let row = ties.rows.len();
-            ties.push(step, JointRow::new(of.sides, hold), of.name.row(key, second));
-            if ties.rows.len() > row {
-                self.parts.push(Part { held, row, way });
-            }
+            self.lay(step, ties, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
             key += 1;
         };
         match joint.kind {
@@ -184,6 +196,22 @@ impl Joints {
         }
     }
 
+    /// Lays out one row of a joint.
+    fn lay(&mut self, step: &FineStep<'_, '_>, ties: &mut Ties, laid: &LaidRow) {
+        let LaidRow { held, way, hold, of: Together { sides, name }, owner } = *laid;
+        let row = ties.rows.len();
+        let YieldLimit { above_n, frame } = name.yields;
+        if !ties.push(step, JointRow::new(sides, hold.limited(above_n * step.h_s)), owner) {
+            return;
+        }
+        self.parts.push(Part { held, row, way });
+        let slides = match (self.held[held].joint.kind, hold) {
+            (JointKind::Rope { .. }, Hold::Along { axis, .. }) => Slides::Length { axis: -axis },
+            _ => Slides::Point(frame),
+        };
+        ties.slides(SlidingRow { row, slides, per_m_s: step.h_s, free_m: step.joint_miss_m, yields_above_n: above_n });
+    }
+
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
     /// Returns what they would do with these velocities themselves.
     pub fn aim<'v>(
@@ -211,7 +239,10 @@ impl Joints {
             let miss = part.way.off(&off, row) - wanted;
             let [a, b] = row.sides.map(|side| velocity(&side, &velocities));
             row.target_m_s = a - b - miss / h_s;
-            aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
+            // one that gives all that it may holds nowhere
+            if !row.gives_all(row.warm_n_s, YIELDS_SHARE) {
+                aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
+            }
         }
         aimed
     }

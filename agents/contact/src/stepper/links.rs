@@ -8,6 +8,7 @@ use super::member::MaterialPoint;
 use super::memory::Partner;
 use super::springs::{End, Name, Pull};
 use super::ties::{FineStep, Holders, Ties, place_of};
+use super::yielding::{Frame, YieldLimit};
 use crate::agent::tool_extrapolation_s;
 use crate::law::{Law, Link};
 use glam::DVec3;
@@ -31,17 +32,28 @@ impl Ties {
     fn link(&mut self, step: &FineStep<'_, '_>, ends: [Option<usize>; 2], link: &Link) {
         let [Some(member), other] = ends else { return };
         let all = step.all;
+        let partner = Partner::Link(link.number);
+        let slip = all[member].memory.slipped(partner);
+        let (link, beside_m) = (&slip.link(link), slip.beside(link));
         let there = match other {
             Some(other) => all[other].member.anchor(link.there),
             None => seen_point(&all[member], link, step.after_s),
         };
         let (Some(here), Some(there)) = (all[member].member.anchor(link.here), there) else { return };
+        let there = MaterialPoint { position: there.position + beside_m, ..there };
         let Link { stiffness_n_m, damping_n_s_m, rest_m, .. } = *link;
         let hold = Some(Holders { side_0: all[member].id, side_1: Some(link.other) });
-        // it tears where both ends are in this problem: what one of them does not see would go on holding it
-        let both = other.is_some_and(|other| !all[other].member.is_remote());
-        let tears_above_n = if both { link.tears_above_n } else { f64::INFINITY };
-        let name = Name { member, partner: Partner::Link(link.number), hold, tears_above_n };
+        // it tears and yields where both ends are in this problem: what one of them does not see would go on holding it
+        let there_too = other.filter(|other| !all[*other].member.is_remote());
+        let lasting = Name::lasting(member, partner, hold);
+        let name = match there_too {
+            Some(other) => {
+                let frame = Frame::of_link(all, [member, other], link);
+                let yields = YieldLimit { above_n: link.yields_above_n, frame };
+                Name { tears_above_n: link.tears_above_n, yields, ..lasting }
+            }
+            None => lasting,
+        };
         let ends = [End { member: Some(member), point: here }, End { member: other, point: there }];
         self.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
     }

@@ -3,6 +3,7 @@
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
+use super::yielding::Slip;
 use glam::DVec3;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::TouchKey;
@@ -75,6 +76,8 @@ pub struct ContactMemory {
     pairs: Vec<PairMemory>,
     /// Links, joints and own attachments of the body that have torn, sorted. They stay torn.
     torn: Vec<Partner>,
+    /// Links, joints and own attachments of the body that have slipped, sorted by them.
+    slips: Vec<Slip>,
     /// What attachments that may tear have given in macro steps that were cut short.
     unfinished: Vec<UnfinishedLoad>,
 }
@@ -90,13 +93,15 @@ pub(super) struct UnfinishedLoad {
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        Self { pairs: self.pairs.clone(), torn: self.torn.clone(), unfinished: self.unfinished.clone() }
+        let Self { pairs, torn, slips, unfinished } = self;
+        Self { pairs: pairs.clone(), torn: torn.clone(), slips: slips.clone(), unfinished: unfinished.clone() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { pairs, torn, unfinished } = self;
+        let Self { pairs, torn, slips, unfinished } = self;
         pairs.clone_from(&from.pairs);
         torn.clone_from(&from.torn);
+        slips.clone_from(&from.slips);
         unfinished.clone_from(&from.unfinished);
     }
 }
@@ -154,6 +159,7 @@ impl ContactMemory {
     /// Notes that an attachment has torn: nothing of it is remembered but that.
     pub(super) fn tear(&mut self, partner: Partner) {
         self.pairs.retain(|pair| pair.partner != partner);
+        self.slips.retain(|slip| slip.partner != partner);
         if let Err(at) = self.torn.binary_search(&partner) {
             self.torn.insert(at, partner);
         }
@@ -184,7 +190,24 @@ impl ContactMemory {
         &self.torn
     }
 
-    /// Forgets all pairs, where the body was divided anew; what has torn stays so.
+    /// How an attachment of the body holds, as far as it has slipped.
+    pub(super) fn slipped(&self, partner: Partner) -> Slip {
+        let at = self.slips.binary_search_by_key(&partner, |slip| slip.partner);
+        at.map_or(Slip::none(partner), |at| self.slips[at])
+    }
+
+    /// The same, to let it slip on; and whether it has never slipped before.
+    pub(super) fn slip(&mut self, partner: Partner) -> (&mut Slip, bool) {
+        match self.slips.binary_search_by_key(&partner, |slip| slip.partner) {
+            Ok(at) => (&mut self.slips[at], false),
+            Err(at) => {
+                self.slips.insert(at, Slip::none(partner));
+                (&mut self.slips[at], true)
+            }
+        }
+    }
+
+    /// Forgets all pairs, where the body was divided anew; what has torn or slipped stays so.
     pub fn forget(&mut self) {
         self.pairs.clear();
     }

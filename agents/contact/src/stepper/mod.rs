@@ -11,6 +11,7 @@
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
+//! yield     attachments that gave all that they may hold from then on where they have come to
 //! tear      attachments that gave more than they can bear are gone from the next macro step on
 
 mod arms;
@@ -35,6 +36,7 @@ mod springs;
 mod tearing;
 mod ties;
 mod weighing;
+mod yielding;
 
 use crate::StepContext;
 use crate::cluster::{Member, Settings, Solver};
@@ -60,6 +62,8 @@ use search::Search;
 use tearing::Tearing;
 pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
+pub use yielding::Yielded;
+use yielding::Yielding;
 
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
@@ -164,6 +168,7 @@ pub struct ClusterStepper {
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
     tearing: Tearing,
+    yielding: Yielding,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     rebounds: Rebounds,
@@ -202,6 +207,7 @@ impl ClusterStepper {
             members: Vec::new(),
             totals: Vec::new(),
             tearing: Tearing::default(),
+            yielding: Yielding::default(),
             kept: Vec::new(),
             rebounds: Rebounds::default(),
             heap: Heap::default(),
@@ -306,6 +312,7 @@ impl ClusterStepper {
         }
         self.totals.clear();
         self.tearing.begin();
+        self.yielding.begin();
         self.outside.begin();
         report.fine_steps = parts;
         report.depth_m = 0.0;
@@ -435,6 +442,17 @@ impl ClusterStepper {
         self.tearing.torn()
     }
 
+    /// What began to yield in the last macro step: no later step reports it again.
+    pub fn yielded(&self) -> &[Yielded] {
+        self.yielding.begun()
+    }
+
+    /// Whether every attachment held in the last macro step as it had held before.
+    #[must_use]
+    pub fn held_fast(&self) -> bool {
+        self.torn().is_empty() && self.yielded().is_empty()
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
@@ -470,9 +488,9 @@ impl ClusterStepper {
 
     /// Lays out springs, links and joints of a fine step that begins `after_s` seconds into the macro step.
     fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64, after_s: f64) {
-        let Self { ties, joints, progress, .. } = self;
+        let Self { ties, joints, progress, depth_m, .. } = self;
         ties.clear();
-        let step = FineStep { all, progress, h_s, after_s };
+        let step = FineStep { all, progress, h_s, after_s, joint_miss_m: solve::joint_miss_m(*depth_m) };
         ties.gather_springs(&step);
         ties.gather_links(&step);
         ties.gather_lines(&step, &self.outside.lines);
@@ -490,7 +508,7 @@ impl ClusterStepper {
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, ties, outside, tearing, .. } = self;
+        let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -519,6 +537,7 @@ impl ClusterStepper {
             let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
+        yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);
             all[a].memory.meet(other, now);

@@ -24,6 +24,11 @@ const MISS_SHRINKS: f64 = 0.7;
 /// By how much a body in a joint may turn in a fine step: the force of the joint is where it is at the start.
 const TURN_MAX_RAD: f64 = 0.15;
 
+/// By how much a joint that holds may be off where contacts are `depth_m` deep, metres.
+pub(super) fn joint_miss_m(depth_m: f64) -> f64 {
+    JOINT_SHARE * depth_m
+}
+
 impl ClusterStepper {
     /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
     /// its impulses (eq. 25).
@@ -68,13 +73,13 @@ impl ClusterStepper {
                 row.warm_n_s = *impulse;
             }
             let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
-            let joints_done = miss_m < JOINT_SHARE * *depth_m || miss_m > last_miss_m;
+            let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
             let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
-            let holds = miss_m < JOINT_SHARE * *depth_m;
+            let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();
             // what cannot hold does not in shorter steps either
             let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * *joints_missed_m;

@@ -6,6 +6,7 @@
 use super::member::MaterialPoint;
 use super::memory::Partner;
 use super::ties::{FineStep, Holders, RowOwner, Ties, place_of};
+use super::yielding::{Slides, YieldLimit};
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
@@ -42,11 +43,17 @@ pub(super) struct Name {
     pub hold: Option<Holders>,
     /// The force above which it tears, N; infinite where it never does.
     pub tears_above_n: f64,
+    pub yields: YieldLimit,
 }
 
 impl Name {
+    /// What neither tears nor yields.
+    pub fn lasting(member: usize, partner: Partner, hold: Option<Holders>) -> Self {
+        Self { member, partner, hold, tears_above_n: f64::INFINITY, yields: YieldLimit::NONE }
+    }
+
     pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
-        let Self { member, partner, hold, tears_above_n } = self;
+        let Self { member, partner, hold, tears_above_n, .. } = self;
         RowOwner { member, other, partner, key, hold, tears_above_n }
     }
 }
@@ -83,7 +90,7 @@ impl Ties {
             MaterialPoint::led(position, spring.target_velocity)
         });
         let hold = Holders { side_0: all[member].id, side_1: spring.by };
-        let name = Name { member, partner: Partner::Tie(number), hold: Some(hold), tears_above_n: f64::INFINITY };
+        let name = Name::lasting(member, Partner::Tie(number), Some(hold));
         let AnchorSpring { stiffness_n_m, damping_n_s_m, .. } = *spring;
         let pull = Pull { stiffness_n_m, damping_n_s_m, rest_m: 0.0 };
         let ends = [End { member: Some(member), point }, End { member: by.filter(|_| tip.is_some()), point: far }];
@@ -136,7 +143,7 @@ impl Ties {
         let sides = [drive.point.side.of_member(member), Side::FIXED];
         let row = JointRow::new(sides, Hold::All { limit_n_s: drive.limit_n * h_s }).with_spring(law, h_s);
         let target_m_s = row.target_m_s + drive.target_m_s - drive.point.led_m_s;
-        let name = Name { member, partner: Partner::Drive, hold: None, tears_above_n: f64::INFINITY };
+        let name = Name::lasting(member, Partner::Drive, None);
         self.push(step, JointRow { target_m_s, ..row }, name.row(ALONG, None));
     }
 
@@ -147,24 +154,28 @@ impl Ties {
         let sides = [a.side(), b.side()];
         let apart = a.point.position - b.point.position;
         let led_m_s = b.point.led_m_s - a.point.led_m_s;
-        let mut push = |key: u32, hold: Hold, law: Spring| {
-            let row = JointRow::new(sides, hold).with_spring(law, step.h_s);
+        let push = |ties: &mut Self, key: u32, hold: Hold, law: Spring| {
+            let row = JointRow::new(sides, hold.limited(name.yields.above_n * step.h_s)).with_spring(law, step.h_s);
             let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
-            self.push(step, row, name.row(key, b.member));
+            ties.push(step, row, name.row(key, b.member))
         };
         let Pull { stiffness_n_m, damping_n_s_m, rest_m } = *pull;
         let axis = apart.try_normalize().unwrap_or(DVec3::Z);
         let stretch_m = apart - axis * rest_m;
         if rest_m == 0.0 {
-            push(ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart });
+            if push(self, ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart }) {
+                self.spring_slides(step, pull, name, Slides::Point(name.yields.frame));
+            }
             self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
             return;
         }
-        push(ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m });
+        if push(self, ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m }) {
+            self.spring_slides(step, pull, name, Slides::Length { axis });
+        }
         let stretched = 1.0 - rest_m / apart.length();
         if stretched > 0.0 {
             let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
-            push(ACROSS, Hold::across(axis), law);
+            push(self, ACROSS, Hold::across(axis), law);
         }
         self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
     }

@@ -4,6 +4,7 @@
 
 use super::arms::Arms;
 use super::memory::Partner;
+use super::yielding::SlidingRow;
 use super::{Participant, Progress};
 use crate::cluster::JointRow;
 use glam::DVec3;
@@ -19,6 +20,8 @@ pub(super) struct FineStep<'a, 'b> {
     pub h_s: f64,
     /// How long after the start of the macro step it begins, seconds.
     pub after_s: f64,
+    /// By how much a joint that holds may be off, metres.
+    pub joint_miss_m: f64,
 }
 
 /// Where a row belongs.
@@ -57,6 +60,8 @@ pub(super) struct Ties {
     pub rows: Vec<JointRow>,
     /// One for each row.
     pub owners: Vec<RowOwner>,
+    /// Those that may slip.
+    pub sliding: Vec<SlidingRow>,
     /// The forces at arms that come with them.
     pub arms: Arms,
 }
@@ -66,18 +71,20 @@ impl Ties {
         self.arms.clear();
         self.rows.clear();
         self.owners.clear();
+        self.sliding.clear();
     }
 
-    /// Adds a row, which starts from what it gave in the last step. Left out is one of which neither side moves.
-    pub fn push(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) {
+    /// Adds a row, which starts from what it gave in the last step; whether it did. Left out is one of which neither side moves.
+    pub fn push(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) -> bool {
         let sound = row.target_m_s.is_finite() && row.compliance_per_kg.is_none_or(|r| r > 0.0 && r.is_finite());
         if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
-            return;
+            return false;
         }
         let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
         let warm_n_s = remembered.force_n * step.h_s;
         self.rows.push(JointRow { warm_n_s, ..row });
         self.owners.push(owner);
+        true
     }
 
     /// The forces by which `member` is held, of rows that gave `impulses` within a fine step of `h_s` seconds, added to `grips`.

@@ -128,9 +128,7 @@ fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
     number("substeps", substeps, (1..=super::SUBSTEPS_MAX).contains(&spec.substeps), "1 to 1000")?;
     number("twist_rad", spec.twist_rad, spec.twist_rad.abs() <= TWIST_MAX_RAD, "-1000 to 1000")?;
     not_negative("damping_per_s", spec.damping_per_s)?;
-    number("pressure_pa", spec.pressure_pa, true, "finite")?;
-    let widened = crate::rod::pressed_radius_m(&spec.section, spec.pressure_pa);
-    number("pressure_pa", spec.pressure_pa, widened > 0.0, "such that the radius stays above zero")?;
+    check_pressures(spec)?;
     not_negative("friction", spec.friction)?;
     number("gravity", spec.gravity.length(), true, "finite")?;
     if let Some(wave) = spec.peristalsis {
@@ -140,6 +138,24 @@ fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
         number("peristalsis.speed_m_s", wave.speed_m_s, true, "finite")?;
     }
     Ok(())
+}
+
+/// Every pressure leaves the tube a radius, and a sealed one some gas; keys follow each other.
+fn check_pressures(spec: &TubeSpec) -> Result<(), TubeError> {
+    let keys = &spec.pressure_keys;
+    for pressure_pa in keys.iter().map(|key| key.pressure_pa).chain([spec.pressure_pa]) {
+        number("pressure_pa", pressure_pa, true, "finite")?;
+        let widened = crate::rod::pressed_radius_m(&spec.section, pressure_pa);
+        number("pressure_pa", pressure_pa, widened > 0.0, "such that the radius stays above zero")?;
+        let has_gas = !spec.sealed || pressure_pa > -super::wall::AIR_PA;
+        number("pressure_pa", pressure_pa, has_gas, "above -101325 in a sealed tube")?;
+    }
+    let first_s = keys.first().map_or(0.0, |key| key.at_s);
+    number("pressure_keys.at_s", first_s, first_s >= 0.0, "at least 0")?;
+    keys.windows(2).try_for_each(|two| {
+        let rises = two[1].at_s > two[0].at_s;
+        number("pressure_keys.at_s", two[1].at_s, rises, "above that of the key before")
+    })
 }
 
 /// A wall that gives changes the stiffness of its bend: methods that need it before a step do not take one.
@@ -152,8 +168,7 @@ fn check_wall(spec: &TubeSpec) -> Result<(), TubeError> {
         return Ok(());
     }
     let inner_m = if gives { spec.section.radius_m - spec.section.wall_m } else { 0.0 };
-    number("inner radius", inner_m, inner_m > 0.0, "above zero, in a wall that gives, where it is sealed")?;
-    number("pressure_pa", spec.pressure_pa, spec.pressure_pa > -super::wall::AIR_PA, "above -101325 in a sealed tube")
+    number("inner radius", inner_m, inner_m > 0.0, "above zero, in a wall that gives, where it is sealed")
 }
 
 fn check_attachments(spec: &TubeSpec) -> Result<(), TubeError> {

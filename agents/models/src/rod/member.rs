@@ -102,6 +102,7 @@ impl ClusterMember for Tube {
         });
         self.unknowns.rise_j = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
         let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
+        self.follow_pressure(then);
         self.begin_wall(h_s, then).map_err(|divergence| self.diverged(divergence, h_s))?;
         let mut unknowns = std::mem::take(&mut self.unknowns);
         unknowns.take(&self.stepper.rows, &self.stepper.next.u, &self.now.x);
@@ -238,6 +239,7 @@ impl ClusterMember for Tube {
         rest.copy_from(&kept.rest);
         (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
         *acceleration = kept.acceleration;
+        self.follow_pressure(self.time);
         self.present_velocities();
     }
 

@@ -18,6 +18,7 @@ mod explicit;
 mod history;
 mod member;
 mod method;
+mod pressure;
 mod publish;
 mod remesh;
 mod residual;
@@ -41,6 +42,7 @@ mod xpbd;
 pub use check::TubeError;
 pub use discretization::{SEGMENTS_MAX, SEGMENTS_MIN};
 pub use method::Integrator;
+pub use pressure::PressureKey;
 pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec, WallModel};
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 

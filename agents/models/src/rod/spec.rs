@@ -1,6 +1,6 @@
 //! The specification of a tube: material, section, supports and options, as a scene gives them.
 
-use super::Integrator;
+use super::{Integrator, PressureKey};
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
 
@@ -42,6 +42,8 @@ pub struct TubeSpec {
     pub wall: WallModel,
     /// Inside minus outside pressure, Pa: widens a prescribed wall by dr = p r² (1 − ν/2) / (E t), and a wall that gives by Lamé's law.
     pub pressure_pa: f64,
+    /// The pressure over time by rising times, linear between them; it takes the place of the one number. Empty where that stays.
+    pub pressure_keys: Vec<PressureKey>,
     /// Whether a gas fills the tube that cannot leave: `pressure_pa` is then that in the undeformed tube, and p V = const from there on.
     /// Only of a hollow tube with a wall that gives.
     pub sealed: bool,
@@ -156,6 +158,7 @@ impl TubeSpec {
             peristalsis: None,
             wall: WallModel::Prescribed,
             pressure_pa: 0.0,
+            pressure_keys: Vec::new(),
             sealed: false,
             self_contact: false,
             friction: 0.0,

@@ -9,6 +9,7 @@ use super::check::{TubeError, check};
 use super::discretization;
 use super::discretization::Discretization;
 use super::member::Unknowns;
+use super::pressure::pressure_at_pa;
 use super::remesh::{MeshedRod, Remesher};
 use super::rest::RestDetector;
 use super::rest_curve::RestCurve;
@@ -54,8 +55,8 @@ pub struct Tube {
     pub(super) form: Arc<CollisionShape>,
     pub(super) resolution: Resolution,
     pub(super) time: SimTime,
-    /// Own time at which its wave starts, seconds.
-    wave_from_s: f64,
+    /// Own time at which its wave and its pressure start, seconds.
+    script_from_s: f64,
     pub(super) steps: u64,
     /// What it is in a contact cluster.
     pub(super) unknowns: Unknowns,
@@ -112,11 +113,12 @@ impl Tube {
             at_rest: false,
             form: Arc::new(form),
             time: SimTime::ZERO,
-            wave_from_s: 0.0,
+            script_from_s: 0.0,
             steps: 0,
             unknowns: Unknowns::default(),
         };
         tube.lay_out_springs();
+        tube.follow_pressure(SimTime::ZERO);
         tube.present_velocities();
         Ok(tube)
     }
@@ -173,8 +175,14 @@ impl Tube {
         self.wall.as_ref().map_or(rod_j, |wall| rod_j + wall.energy_j(&self.division, self.filling()))
     }
 
-    /// Sets the pressure inside minus outside, Pa, while it runs; of a sealed tube that of its gas in the undeformed tube, as if more had
-    /// been let in.
+    /// Takes the pressure of its keys at a time, where it has any.
+    pub(super) fn follow_pressure(&mut self, time: SimTime) {
+        let wanted_pa = pressure_at_pa(&self.spec.pressure_keys, time.as_secs_f64() - self.script_from_s);
+        self.spec.pressure_pa = wanted_pa.unwrap_or(self.spec.pressure_pa);
+    }
+
+    /// Sets the pressure inside minus outside, Pa, while it runs, in place of one that follows keys; of a sealed tube that of its gas in the
+    /// undeformed tube, as if more had been let in.
     ///
     /// # Errors
     /// [`TubeError::OutOfRange`] for a pressure that a new tube would not take; it then keeps the one it has.
@@ -184,6 +192,7 @@ impl Tube {
             self.spec.pressure_pa = before;
             return Err(error);
         }
+        self.spec.pressure_keys.clear();
         self.rest.wake();
         self.at_rest = false;
         Ok(())
@@ -228,7 +237,7 @@ impl Tube {
     /// By what share of the radius its wave contracts it at a time, as far as nothing resists.
     pub(super) fn contraction_at(&self, arc_m: f64, time: SimTime) -> f64 {
         let Some(wave) = self.spec.peristalsis else { return 0.0 };
-        let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.wave_from_s)) / wave.wavelength_m;
+        let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.script_from_s)) / wave.wavelength_m;
         let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
         wave.amplitude * lift
     }
@@ -251,6 +260,7 @@ impl Tube {
 
     /// A step of the wall that nothing touches, after that of the centre line.
     fn step_wall(&mut self, dt_s: f64, then: SimTime) -> Result<(), Divergence> {
+        self.follow_pressure(then);
         self.begin_wall(dt_s, then)?;
         let finite = self.wall.as_ref().is_none_or(|wall| wall.stays_finite(wall.free(), dt_s));
         if !finite {
@@ -275,9 +285,11 @@ impl Tube {
         StepError::Diverged { model: self.model(), dt_s, what }
     }
 
-    /// Whether its radius changes by itself.
-    fn has_wave(&self) -> bool {
-        self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0)
+    /// Whether its radius changes by itself: by its wave, or by a pressure whose last key is still to come.
+    fn changes_by_itself(&self) -> bool {
+        let keys_end_s = self.spec.pressure_keys.last().map_or(f64::NEG_INFINITY, |key| key.at_s + self.script_from_s);
+        let has_wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
+        has_wave || self.time.as_secs_f64() < keys_end_s
     }
 
     /// Whether it has been quiet for long enough after a step of `dt` seconds, as far as it can tell by itself.
@@ -285,7 +297,7 @@ impl Tube {
         if !self.has_quiet_wall() {
             self.rest.wake();
         }
-        self.spec.sleep && !self.has_wave() && self.rest.observe(&self.now, dt)
+        self.spec.sleep && !self.changes_by_itself() && self.rest.observe(&self.now, dt)
     }
 
     /// Stops it exactly: a sleeping tube must not drift on screen.
@@ -297,7 +309,7 @@ impl Tube {
 
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
     fn update_rest(&mut self, dt: f64) -> bool {
-        if !self.spec.sleep || self.has_wave() || !self.ties.is_empty() {
+        if !self.spec.sleep || self.changes_by_itself() || !self.ties.is_empty() {
             self.rest.wake();
             return false;
         }
@@ -368,7 +380,11 @@ impl Agent for Tube {
     }
 
     fn shift_clock(&mut self, by_s: f64) {
-        self.wave_from_s += by_s;
+        self.script_from_s += by_s;
+    }
+
+    fn set_pressure_pa(&mut self, pressure_pa: f64) -> bool {
+        Self::set_pressure_pa(self, pressure_pa).is_ok()
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -30,7 +30,7 @@ pub fn hand(target: DVec3, stiffness_n_m: f64) -> AnchorSpring {
 
 fn link(stiffness_n_m: f64, rest_m: f64, law: Law) -> Link {
     let (anchor, damping_n_s_m) = (Anchor::Local(DVec3::ZERO), 2.0);
-    let (number, tears_above_n) = (0, f64::INFINITY);
+    let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
     Link {
         other: AgentId(1),
         here: anchor,
@@ -41,6 +41,7 @@ fn link(stiffness_n_m: f64, rest_m: f64, law: Law) -> Link {
         law,
         number,
         tears_above_n,
+        yields_above_n,
     }
 }
 

@@ -25,3 +25,4 @@ mod tearing;
 mod tools;
 mod tubes;
 mod walls;
+mod yielding;

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::joint::Joint;
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, StepDoubling,
-    Torn,
+    Torn, Yielded,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
@@ -71,8 +71,9 @@ pub struct Findings {
 /// A spring whose ends are still to be named.
 pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
     let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
-    let (number, tears_above_n) = (0, f64::INFINITY);
-    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law: Law::Cluster, number, tears_above_n }
+    let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
+    let law = Law::Cluster;
+    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n, yields_above_n }
 }
 
 /// A body with its rate.
@@ -133,6 +134,11 @@ impl Table {
     /// What tore in the last macro step.
     pub fn torn(&self) -> &[Torn] {
         self.stepper.torn()
+    }
+
+    /// What began to yield in the last macro step.
+    pub fn yielded(&self) -> &[Yielded] {
+        self.stepper.yielded()
     }
 
     /// What all bodies have published, as each other sees it.

@@ -26,6 +26,14 @@ pub(super) fn resident_bytes() -> Option<f64> {
     Some(text.split_whitespace().nth(1)?.parse::<f64>().ok()? * PAGE_BYTES)
 }
 
+/// The processor's name, as the system reports it.
+pub(super) fn processor() -> String {
+    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let named =
+        text.lines().find_map(|line| Some(line.strip_prefix("model name")?.split_once(':')?.1.trim().to_owned()));
+    named.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
+}
+
 /// Context switches of the live threads of the process so far, voluntary and involuntary.
 pub(super) fn switches() -> Option<f64> {
     let tasks = fs::read_dir("/proc/self/task").ok()?;

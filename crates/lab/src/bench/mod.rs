@@ -11,6 +11,7 @@ mod render;
 mod rod;
 mod select;
 mod shown;
+mod soft;
 mod subject;
 
 use super::args::{BenchArgs, BenchSubject};
@@ -26,6 +27,7 @@ pub fn command(args: &BenchArgs) -> anyhow::Result<Exit> {
         BenchSubject::Rod => subject::run::<rod::Rod>(args),
         BenchSubject::Select => subject::run::<select::Select>(args),
         BenchSubject::Pile => subject::run::<pile::Pile>(args),
+        BenchSubject::Soft => subject::run::<soft::Soft>(args),
         BenchSubject::Render => subject::run::<render::Render>(args),
     }
 }

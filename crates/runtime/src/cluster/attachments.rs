@@ -1,12 +1,12 @@
 //! Joints and links as what keeps agents in one cluster, until they tear.
 //!
-//! In: an agent's joints and links, its memory of what has torn, what tore in a step. Out: agents that belong together, entries in the states
-//! of those that tell of it. Never here: forces, when something tears ([`metachron_contact::stepper`]).
+//! In: an agent's joints and links, its memory of what has torn, what yielded and tore in a step. Out: agents that belong together, entries in the states
+//! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::stepper`]).
 
 use super::AgentRunner;
-use metachron_contact::stepper::{ContactMemory, Partner, Torn};
+use metachron_contact::stepper::{ClusterStepper, ContactMemory, Partner, Torn, Yielded};
 use metachron_contact::{Law, Link};
-use metachron_core::{AgentId, AttachmentId, SimSpan, TornAttachment};
+use metachron_core::{AgentId, AttachmentEvent, AttachmentEventKind, AttachmentId, SimSpan};
 
 /// A joint between an agent and another.
 #[derive(Debug, Clone, Copy)]
@@ -31,10 +31,34 @@ pub(super) fn held_by_links<'a>(links: &'a [Link], memory: &'a ContactMemory) ->
     links.iter().filter(holding).map(|link| link.other)
 }
 
+/// Something that happened to an attachment in a step, of a participant by its place.
+#[derive(Debug, Clone, Copy)]
+struct Happened {
+    member: usize,
+    other: Option<usize>,
+    partner: Partner,
+    kind: AttachmentEventKind,
+    force_n: f64,
+}
+
+impl From<&Torn> for Happened {
+    fn from(torn: &Torn) -> Self {
+        let Torn { member, other, partner, force_n } = *torn;
+        Self { member, other, partner, kind: AttachmentEventKind::Tore, force_n }
+    }
+}
+
+impl From<&Yielded> for Happened {
+    fn from(yielded: &Yielded) -> Self {
+        let Yielded { member, other, partner, force_n } = *yielded;
+        Self { member, other, partner, kind: AttachmentEventKind::Yielded, force_n }
+    }
+}
+
 impl AgentRunner {
-    /// Hands what tore in the last step, of `dt`, to the members that tell of it.
-    pub(super) fn note_torn(&mut self, torn: &[Torn], dt: SimSpan) {
-        if torn.is_empty() {
+    /// Hands what yielded and tore in the last step, of `dt`, to the members that tell of it.
+    pub(super) fn note_events(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
+        if stepper.held_fast() {
             return;
         }
         let (at, mut ids) = (self.pace.scene_time() + dt, Vec::new());
@@ -42,15 +66,16 @@ impl AgentRunner {
         let mut places = 0..;
         self.each_member(|actor| {
             let (Some(place), Some(seat)) = (places.next(), &mut actor.cluster) else { return };
-            for torn in torn.iter().filter(|torn| torn.member == place) {
-                let attachment = match torn.partner {
+            let all = stepper.yielded().iter().map(Happened::from).chain(stepper.torn().iter().map(Happened::from));
+            for Happened { other, partner, kind, force_n, .. } in all.filter(|one| one.member == place) {
+                let attachment = match partner {
                     Partner::Link(number) => AttachmentId::Coupling(number),
                     Partner::Joint(number) => AttachmentId::Joint(number),
                     Partner::Attachment(number) => AttachmentId::Part(number),
                     _ => continue,
                 };
-                let with = torn.other.map(|other| ids[other]);
-                seat.torn.push(TornAttachment { attachment, with, at, force_n: torn.force_n });
+                let with = other.map(|other| ids[other]);
+                seat.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
             }
         });
     }

@@ -114,6 +114,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
         law: Law::Cluster,
         number: 0,
         tears_above_n: f64::INFINITY,
+        yields_above_n: f64::INFINITY,
     };
     spawns[1].attached = vec![link];
     let mut run = assemble(spawns, Helpers::none()).unwrap();

@@ -3,9 +3,10 @@
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
 
+use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::object::{NamedObject, Objects};
 use super::soft;
-use super::{DAMPING, POSITION_MAX_M, STIFFNESS, TEARING};
+use super::{DAMPING, POSITION_MAX_M, STIFFNESS};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
 use glam::DVec3;
@@ -113,6 +114,7 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
         ("at_b", file.at_b.is_some(), attach, attach),
         ("rest_m", file.rest_m.is_some(), attach, false),
         ("tears_above_n", file.tears_above_n.is_some(), attach, false),
+        ("yields_above_n", file.yields_above_n.is_some(), attach, false),
         ("stiffness_n_m", file.stiffness_n_m.is_some(), spring, spring),
         ("damping_n_s_m", file.damping_n_s_m.is_some(), spring, false),
     ] {
@@ -123,12 +125,16 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
             c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
         }
     }
-    if let (true, Some(_), Some(law @ (CouplingLaw::Ledger | CouplingLaw::Tlm))) =
-        (attach, file.tears_above_n, file.law)
-    {
-        let what =
-            format!("does not belong to an attachment by `{}`, of which either side knows its own force", law.name());
-        c.wrong(place, "tears_above_n", what, "expected no `law` beside it: then the two are one problem");
+    if let (true, Some(law @ (CouplingLaw::Ledger | CouplingLaw::Tlm))) = (attach, file.law) {
+        for (key, given) in [("tears_above_n", file.tears_above_n), ("yields_above_n", file.yields_above_n)] {
+            if given.is_some() {
+                let what = format!(
+                    "does not belong to an attachment by `{}`, of which either side knows its own force",
+                    law.name()
+                );
+                c.wrong(place, key, what, "expected no `law` beside it: then the two are one problem");
+            }
+        }
     }
     if attach && file.law == Some(CouplingLaw::Off) {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
@@ -164,8 +170,11 @@ fn attach(
     let at_b = Attachment { key: "at_b", object: b, spot: file.at_b? }.anchor(c, place, objects);
     let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
     let rest_m = c.optional(place, "rest_m", file.rest_m, &REST).unwrap_or(0.0);
-    let tears_above_n = c.optional(place, "tears_above_n", file.tears_above_n, &TEARING).unwrap_or(f64::INFINITY);
-    Some(CouplingKind::Attach { at_a: at_a?, at_b: at_b?, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n })
+    let limits =
+        ForceLimits::read(c, place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
+    let ForceLimits { tears_above_n, yields_above_n } = limits;
+    let (at_a, at_b) = (at_a?, at_b?);
+    Some(CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n, yields_above_n })
 }
 
 /// One end of an attachment: an object, and the spot on it that the key of the coupling gives.

@@ -3,10 +3,11 @@
 //! In: [`JointFile`]s and the objects of the scene. Out: [`Joint`]s that can hold from the first step on, problems to the
 //! [`Checker`]. Never here: solving joints.
 
+use super::POSITION_MAX_M;
+use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::joint_keys::{FreeMotion, free_motion};
 use super::joint_rules::{PlacedJoint, check_start, contradictions};
 use super::object::{NamedObject, Objects};
-use super::{POSITION_MAX_M, TEARING};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, JointKind as Kind, Point};
 use glam::{DQuat, DVec3};
@@ -76,12 +77,13 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
     let at_a_m = file.at_a_m.map_or(DVec3::ZERO, |at| c.point(&place, "at_a_m", at, POSITION_MAX_M));
     let from = a.to_world(at_a_m);
     let to = other_anchor(c, &place, file, b, from)?;
-    let tears_above_n = c.optional(&place, "tears_above_n", file.tears_above_n, &TEARING).unwrap_or(f64::INFINITY);
+    let limits =
+        ForceLimits::read(c, &place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
     if c.count() > before {
         return None;
     }
     let (ends, anchors, free_motion, collide) = ([a, b], [from, to], free?, collide(file));
-    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, tears_above_n };
+    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, limits };
     check_start(c, &placed).then_some(placed)
 }
 
@@ -188,7 +190,8 @@ impl PlacedJoint {
             None => (to, DQuat::IDENTITY),
         };
         let rest = (a.rotation.conjugate() * rotation_b).normalize();
-        let (collide, tears_above_n) = (self.collide, self.tears_above_n);
-        Joint { a: id, b: b.agent, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide, tears_above_n }
+        let (collide, ForceLimits { tears_above_n, yields_above_n }) = (self.collide, self.limits);
+        let anchor_a_m = a.to_local(from);
+        Joint { a: id, b: b.agent, kind, anchor_a_m, anchor_b_m, rest, collide, tears_above_n, yields_above_n }
     }
 }

@@ -1,5 +1,6 @@
 //! Checks that joints can hold: each with its objects as they start, and all joints of one pair together.
 
+use super::force_limits::ForceLimits;
 use super::joint::End;
 use super::joint_keys::FreeMotion;
 use crate::check::{Checker, Place};
@@ -21,7 +22,7 @@ pub(super) struct PlacedJoint {
     pub(super) anchors: [DVec3; 2],
     pub(super) free_motion: FreeMotion,
     pub(super) collide: bool,
-    pub(super) tears_above_n: f64,
+    pub(super) limits: ForceLimits,
 }
 
 impl PlacedJoint {

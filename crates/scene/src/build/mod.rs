@@ -5,6 +5,7 @@
 
 mod common;
 mod coupling;
+mod force_limits;
 mod glb;
 mod grid;
 mod group;

@@ -1,15 +1,15 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
 use super::object::ModelContext;
-use super::{FRICTION, POSITION_MAX_M, TEARING};
+use super::{FRICTION, POSITION_MAX_M, TEARING, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile, Wall};
+use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, PressureFile, TubeFile, Wall};
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::SUBSTEPS_MAX;
 use metachron_models::rod::Tube;
-use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec, WallModel};
+use metachron_models::rod::{Attachment, Material, Peristalsis, PressureKey, Section, TubeSpec, WallModel};
 
 /// Most points of a path.
 const PATH_MAX: usize = 100_000;
@@ -21,6 +21,8 @@ const SEGMENTS_DEFAULT: f64 = 64.0;
 const PICTURE_INTERVALS: (f64, f64) = (400.0, 8.0);
 /// Points nearer than this are the same point, metres.
 const SAME_POINT_M: f64 = 1e-9;
+/// Most keys of a pressure over time.
+const PRESSURE_KEYS_MAX: usize = 10_000;
 /// Most attached parts of a tube (stretches of a mesentery).
 const ATTACH_MAX: usize = 1000;
 
@@ -30,6 +32,7 @@ const POISSON: Allowed = allowed(-0.999..=0.5, "");
 const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
 const STIFFNESS: Allowed = allowed(1e-15..=1e15, "");
 const TWIST: Allowed = allowed(-36_000.0..=36_000.0, "°");
+const PRESSURE: Allowed = allowed(0.0..=1e7, "Pa");
 const SHARE: Allowed = allowed(0.0..=1.0, "");
 
 /// A tube and the resolutions that its picture may take.
@@ -66,7 +69,8 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
         wall: wall(c, place, file),
         sealed: sealed(c, place, file, &section),
-        pressure_pa: c.optional(place, "pressure_pa", file.pressure_pa, &allowed(0.0..=1e7, "Pa")).unwrap_or(0.0),
+        pressure_pa: pressure_pa(c, place, file),
+        pressure_keys: pressure_keys(c, place, file),
         self_contact: file.self_contact.unwrap_or(true),
         friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
         gravity: context.gravity,
@@ -95,6 +99,36 @@ fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
         c.wrong(place, "wall", what, "expected `integrator` to be \"implicit-euler\", \"bdf2\" or \"energy-momentum\"");
     }
     WallModel::Gives
+}
+
+/// The pressure, where it is one number.
+fn pressure_pa(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> f64 {
+    match file.pressure_pa {
+        Some(PressureFile::Constant(pressure_pa)) => c.number(place, "pressure_pa", pressure_pa, &PRESSURE),
+        _ => 0.0,
+    }
+}
+
+/// The pressure over time, by rising times.
+fn pressure_keys(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Vec<PressureKey> {
+    let Some(PressureFile::Keys(list)) = &file.pressure_pa else { return Vec::new() };
+    if !(1..=PRESSURE_KEYS_MAX).contains(&list.len()) {
+        let expected = format!("expected 1 … {PRESSURE_KEYS_MAX} times with their pressures, or one number");
+        c.wrong(place, "pressure_pa", format_args!("has {} entries", list.len()), expected);
+        return Vec::new();
+    }
+    let mut keys: Vec<PressureKey> = Vec::with_capacity(list.len());
+    for (at, &[at_s, pressure_pa]) in list.iter().enumerate() {
+        let [time, pressure] = [0, 1].map(|part| format!("pressure_pa.{at}.{part}"));
+        let at_s = c.number(place, &time, at_s, &TIME);
+        let pressure_pa = c.number(place, &pressure, pressure_pa, &PRESSURE);
+        if let Some(before) = keys.last().filter(|before| at_s <= before.at_s) {
+            let expected = format!("expected a time after the one before, {} s", before.at_s);
+            c.wrong(place, &time, format_args!("is {at_s}"), expected);
+        }
+        keys.push(PressureKey { at_s, pressure_pa });
+    }
+    keys
 }
 
 /// Whether the tube is closed: what is shut in needs room, and walls that give.

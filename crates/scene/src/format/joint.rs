@@ -42,6 +42,10 @@ pub struct JointFile {
     /// Force above which it tears, N, 1e-6 … 1e9: the mean over a common step of the two; what it gives against turns does not count. It
     /// is gone then for good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
+    /// Greatest force that it gives, N, 1e-6 … 1e9 and below `tears_above_n`: what would take more moves the point of `b` that it holds, or
+    /// lengthens a `rope` or `spring`, for good. What it gives against turns is not bounded. The report has the first time under `events`.
+    /// Default: as much as it takes.
+    pub yields_above_n: Option<f64>,
 }
 
 /// Motion that a joint leaves free.

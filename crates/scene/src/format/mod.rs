@@ -27,7 +27,7 @@ pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
 pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tool::{KeyframeFile, ToolFile};
-pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile, Wall};
+pub use tube::{AttachFile, End, Integrator, PeristalsisFile, PressureFile, TubeFile, Wall};
 pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.

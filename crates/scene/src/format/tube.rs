@@ -64,8 +64,9 @@ pub struct TubeFile {
     pub peristalsis: Option<PeristalsisFile>,
     /// What the sections do. Default `prescribed`.
     pub wall: Option<Wall>,
-    /// Pressure inside relative to outside, Pa, 0 … 1e7: widens the tube. Default 0.
-    pub pressure_pa: Option<f64>,
+    /// Pressure inside relative to outside, Pa, 0 … 1e7: widens the tube. One number, or times in seconds, each above the one before, with
+    /// the pressures then: `[[0, 0], [1, 4000]]`; between them it changes evenly. Default 0.
+    pub pressure_pa: Option<PressureFile>,
     /// Whether a gas fills the tube that cannot leave: `pressure_pa` is then that in the undeformed tube, and rises as the tube is squeezed.
     /// Only of a hollow tube whose wall gives. Default false.
     pub sealed: Option<bool>,
@@ -73,6 +74,16 @@ pub struct TubeFile {
     pub self_contact: Option<bool>,
     /// Coulomb friction coefficient of the surface, 0 … 10; a pair takes the geometric mean. Default 0.2.
     pub friction: Option<f64>,
+}
+
+/// A tube's pressure: constant, or over time.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a number of pascals, or times and pressures as [[0.0, 0.0], [1.0, 4000.0]]")]
+pub enum PressureFile {
+    /// One pressure, Pa.
+    Constant(f64),
+    /// Times, seconds, 0 … 1e6, each with the pressure then, Pa.
+    Keys(Vec<[f64; 2]>),
 }
 
 /// An end of a tube.

@@ -197,7 +197,7 @@ pub struct CouplingReport {
 pub struct EventReport {
     /// Simulated time, seconds: the end of the step in which it happened.
     pub at_s: f64,
-    /// What happened: `tore`, an attachment by its `tears_above_n`.
+    /// What happened: `yielded`, an attachment for the first time by its `yields_above_n`, or `tore`, by its `tears_above_n`.
     pub kind: &'static str,
     /// The attachment, as its place in the scene: `joint.0`, `coupling.2`, `attach.1` of the tube `a`.
     pub attachment: String,

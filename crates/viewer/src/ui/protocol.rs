@@ -89,6 +89,13 @@ pub enum Action {
     DragEnd,
     /// Select an object, or none.
     Select(Option<AgentId>),
+    /// The pressure of what fills an object.
+    Pressure {
+        /// The object.
+        agent: AgentId,
+        /// Inside minus outside, Pa, finite.
+        pressure_pa: f64,
+    },
     /// Load the scene file that was dropped on the window.
     OpenScene(PathBuf),
 }
@@ -320,10 +327,21 @@ pub struct AgentRow {
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
+    /// The pressure of what fills it; `None` of what has no inside.
+    pub filled: Option<Filled>,
     /// The agent that steps it as a member of its cluster.
     pub led_by: Option<String>,
     /// Present activity.
     pub state: AgentState,
+}
+
+/// The pressure of what fills an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filled {
+    /// The one that it started with or was set last, inside minus outside, Pa.
+    pub pressure_pa: f64,
+    /// The end of the slider for it, Pa, > 0.
+    pub most_pa: f64,
 }
 
 impl AgentRow {
@@ -345,6 +363,7 @@ impl AgentRow {
             dropped_s: 0.0,
             residual_m: 0.0,
             force_n: None,
+            filled: None,
             led_by: None,
             state: AgentState::Running,
         }

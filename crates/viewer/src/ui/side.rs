@@ -5,7 +5,7 @@
 use super::DrawingOptions;
 use super::history::{FrameSummary, History};
 use super::plots;
-use super::protocol::{Action, AgentRow, AgentState, Law, Status, Tuning};
+use super::protocol::{Action, AgentRow, AgentState, Filled, Law, Status, Tuning};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
@@ -240,6 +240,13 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         let eps = row.simulation.map_or_else(String::new, |_| format!("ε {}, ", text::metres(picture.eps_m)));
         value(ui, "Picture", &format!("{eps}n {}", picture.n), "Sample spacing of the skin, and level of its patches");
     }
+    if let Some(Filled { pressure_pa, most_pa }) = row.filled {
+        let mut wanted_pa = pressure_pa;
+        slider(ui, "Pressure", &mut wanted_pa, 0.0..=most_pa, |s| s.max_decimals(0).suffix(" Pa"));
+        if wanted_pa != pressure_pa {
+            out.push(Action::Pressure { agent: row.id, pressure_pa: wanted_pa });
+        }
+    }
     if let Some(force_n) = row.force_n {
         value(ui, "Force", &format!("{} N", text::figures(force_n)), "Reaction force of the grasped object");
     }
@@ -287,6 +294,29 @@ mod tests {
     use super::*;
     use egui_kittest::Harness;
     use egui_kittest::kittest::Queryable;
+
+    #[test]
+    fn the_pressure_slider_is_shown_for_what_has_an_inside_and_asks_for_what_it_is_moved_to() {
+        for filled in [None, Some(Filled { pressure_pa: 100.0, most_pa: 1000.0 })] {
+            let row = AgentRow { filled, ..AgentRow::new(metachron_core::AgentId(3), "hose", "tube") };
+            let mut harness = Harness::new_ui_state(|ui, out| selected(ui, Some(&row), out), Vec::new());
+            let mut sliders = harness.query_all_by_role_and_label(egui::Role::Slider, "Pressure");
+            let Some(slider) = sliders.next() else {
+                assert_eq!(filled, None);
+                continue;
+            };
+            assert!(filled.is_some());
+            slider.focus();
+            drop(sliders);
+            harness.run();
+            harness.key_press(egui::Key::ArrowRight);
+            harness.run();
+            let [Action::Pressure { agent, pressure_pa }, ..] = harness.state()[..] else {
+                panic!("{:?}", harness.state())
+            };
+            assert!(agent == row.id && pressure_pa > 100.0, "{pressure_pa} Pa");
+        }
+    }
 
     #[test]
     fn the_hysteresis_slider_is_shown_only_where_it_is_used() {

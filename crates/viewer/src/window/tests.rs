@@ -217,3 +217,22 @@ fn dropped_time_lowers_the_real_time_factor() {
     let dropped: Vec<f64> = agents.iter().map(|agent| agent.dropped_s).collect();
     assert!(dropped[0] > 1.0, "{dropped:?}");
 }
+
+#[test]
+fn the_pressure_of_a_tube_follows_its_slider() {
+    with_tube(|simulation| {
+        let row = simulation.status().agents.iter().find(|row| row.filled.is_some()).unwrap().clone();
+        let pressure_pa = 0.5 * row.filled.unwrap().most_pa;
+        let widest_m = |simulation: &WindowSimulation<'_>| {
+            let state = simulation.session.agents()[row.id.0 as usize].latest();
+            let metachron_core::Body::Curve(curve) = &state.body else { panic!("a tube is a curve") };
+            curve.radii_m.iter().copied().fold(0.0, f64::max)
+        };
+        (0..4).for_each(|_| frame(simulation, None));
+        let before_m = widest_m(simulation);
+        simulation.apply(Action::Pressure { agent: row.id, pressure_pa });
+        (0..8).for_each(|_| frame(simulation, None));
+        assert_eq!(simulation.status().agents[row.id.0 as usize].filled.unwrap().pressure_pa, pressure_pa);
+        assert!(widest_m(simulation) > 1.1 * before_m, "{} m of {before_m} m", widest_m(simulation));
+    });
+}

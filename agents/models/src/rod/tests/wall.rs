@@ -155,6 +155,48 @@ fn pressure_set_while_it_runs_widens_the_tube() {
 }
 
 #[test]
+fn pressure_that_follows_keys_widens_the_tube_by_lames_law_at_each_of_them() {
+    let key = |at_s: f64, pressure_pa: f64| PressureKey { at_s, pressure_pa };
+    let keys = vec![key(0.2, 0.0), key(1.2, 300.0), key(2.2, 300.0), key(2.3, 100.0)];
+    let mut tube = Tube::new(TubeSpec { pressure_keys: keys, sleep: true, ..giving(1e-3, 8) }).unwrap();
+    let per_pa_m = 0.009_f64.powi(2) * RADIUS_M * (2.0 - POISSON) / (YOUNG_PA * (0.01_f64.powi(2) - 0.009_f64.powi(2)));
+    let mut until_s = 0.0;
+    // the tube does not sleep through what is still to come
+    for (at_s, wanted_pa, share) in [(0.2, 0.0, 1e-9), (2.2, 300.0, 5e-3), (6.0, 100.0, 1e-4)] {
+        run(&mut tube, 5.0, at_s - until_s);
+        until_s = at_s;
+        let widened_m = tube.radius_at_m(0.1) - RADIUS_M;
+        let off_m = (widened_m - wanted_pa * per_pa_m).abs();
+        assert!(off_m <= share * 300.0 * per_pa_m, "{widened_m} m at {at_s} s, not {} m", wanted_pa * per_pa_m);
+        assert!((tube.pressure_pa() - wanted_pa).abs() < 1e-9 * 300.0, "{} Pa at {at_s} s", tube.pressure_pa());
+    }
+    // what is set by hand stays
+    tube.set_pressure_pa(50.0).unwrap();
+    run(&mut tube, 5.0, 0.5);
+    assert_eq!(tube.pressure_pa(), 50.0);
+    let back = TubeSpec { pressure_keys: vec![key(1.0, 0.0), key(1.0, 5.0)], ..giving(1e-3, 8) };
+    assert!(matches!(Tube::new(back), Err(TubeError::OutOfRange { .. })));
+}
+
+#[test]
+fn pressure_that_follows_keys_is_as_if_set_by_hand_before_every_step() {
+    let keys = vec![PressureKey { at_s: 0.0, pressure_pa: 0.0 }, PressureKey { at_s: 1.0, pressure_pa: 300.0 }];
+    let mut led = Tube::new(TubeSpec { pressure_keys: keys, ..giving(1e-3, 8) }).unwrap();
+    let mut by_hand = Tube::new(giving(1e-3, 8)).unwrap();
+    let mut time = SimTime::ZERO;
+    let dt = SimSpan::from_millis(5);
+    for _ in 0..100 {
+        by_hand.set_pressure_pa(300.0 * (time + dt).as_secs_f64()).unwrap();
+        for tube in [&mut led, &mut by_hand] {
+            tube.step(dt, &StepContext::alone(AgentId(0), time)).unwrap();
+        }
+        time += dt;
+    }
+    let radii_m = [&led, &by_hand].map(|tube| tube.radius_at_m(0.1));
+    assert!((radii_m[0] - radii_m[1]).abs() < 1e-15 && radii_m[0] > 1.0003 * RADIUS_M, "{radii_m:?}");
+}
+
+#[test]
 fn muscles_alone_narrow_a_tube_as_the_prescribed_wave_does_and_pressure_resists_them() {
     let wave = Peristalsis { amplitude: 0.3, wavelength_m: 0.1, speed_m_s: 0.01 };
     let narrowest = |wall: WallModel, pressure_pa: f64| {

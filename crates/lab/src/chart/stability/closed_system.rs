@@ -100,8 +100,19 @@ fn ring(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let ties = [(0, ball, 1, start), (1, end, 2, ball), (2, ball, 3, start), (3, end, 4, ball), (4, ball, 0, ball)];
     for (number, (a, here, b, there)) in (0..).zip(ties) {
         let (other, stiffness_n_m, damping_n_s_m, rest_m) = (ids[b], SPRING_N_M, 0.0, SPRING_REST_M);
-        let (law, tears_above_n) = (Law::Ledger, f64::INFINITY);
-        let link = Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n };
+        let (law, tears_above_n, yields_above_n) = (Law::Ledger, f64::INFINITY, f64::INFINITY);
+        let link = Link {
+            other,
+            here,
+            there,
+            stiffness_n_m,
+            damping_n_s_m,
+            rest_m,
+            law,
+            number,
+            tears_above_n,
+            yields_above_n,
+        };
         play.link(ids[a], link);
     }
     Some((play, ids))

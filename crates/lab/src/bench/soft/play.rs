@@ -1,0 +1,127 @@
+//! Bodies that are stepped as one cluster, step by step on this thread, and what their steps take.
+//!
+//! In: bodies, static solids, the length of a step. Out: CPU time of each step, contacts, states. Never here: which bodies.
+
+use super::super::machine::own_cpu;
+use anyhow::Context;
+use glam::DVec3;
+use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan};
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
+use metachron_geometry::Obstacle;
+use std::time::Duration;
+
+/// Softness of contacts in scenes: how deep what lies still is, metres.
+const DEPTH_M: f64 = 20e-6;
+
+/// What a series of steps took.
+pub(super) struct Series {
+    /// CPU milliseconds of each step, in rising order.
+    ms: Vec<f64>,
+    /// The most contacts of a step.
+    pub(super) contacts: u32,
+}
+
+/// The bound of a series: whichever comes first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bound {
+    pub(super) steps: u32,
+    pub(super) span: Duration,
+}
+
+/// A cluster of bodies.
+pub(super) struct Play {
+    bodies: Vec<Member>,
+    scene: ClusterScene,
+    stepper: ClusterStepper,
+    time: SimTime,
+    step_s: f64,
+    snapshot: Snapshot,
+}
+
+struct Member {
+    agent: Box<dyn Agent>,
+    memory: ContactMemory,
+    grips: Vec<Grip>,
+}
+
+impl Play {
+    /// Bodies among static solids, in steps of `step_s` seconds.
+    pub(super) fn new(bodies: Vec<Box<dyn Agent>>, obstacles: &[Obstacle], step_s: f64) -> anyhow::Result<Self> {
+        let member = |agent| Member { agent, memory: ContactMemory::default(), grips: Vec::new() };
+        Ok(Self {
+            bodies: bodies.into_iter().map(member).collect(),
+            scene: ClusterScene::new(obstacles).context("the static solids")?,
+            stepper: ClusterStepper::new(DEPTH_M),
+            time: SimTime::ZERO,
+            step_s,
+            snapshot: Snapshot::default(),
+        })
+    }
+
+    /// The same with steps of another length from now on.
+    pub(super) fn in_steps_of(self, step_s: f64) -> Self {
+        Self { step_s, ..self }
+    }
+
+    /// Makes one step; the number of its contacts.
+    fn step(&mut self) -> anyhow::Result<u32> {
+        let Self { bodies, scene, stepper, time, step_s, .. } = self;
+        let mut wishes = Vec::with_capacity(bodies.len());
+        for body in bodies.iter_mut() {
+            wishes.push((body.agent.member().context("a body that touches nothing")?.role(), *step_s));
+        }
+        let plan = Plan::of(wishes.iter().copied());
+        let dt = SimSpan::from_secs_f64(plan.macro_s).context("the length of a step")?;
+        let mut all = Vec::with_capacity(bodies.len());
+        for ((id, body), (role, wanted_s)) in (0..).zip(bodies.iter_mut()).zip(wishes) {
+            let Member { agent, memory, grips } = body;
+            let member = agent.member().context("a body that touches nothing")?;
+            let (id, parts) = (AgentId(id), plan.parts_in(role, wanted_s));
+            let context = StepContext::alone(id, *time);
+            all.push(Participant { id, member, context, laws: &[], memory, parts, alone_s: wanted_s, grips });
+        }
+        let report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
+        *time += dt;
+        Ok(report.contacts)
+    }
+
+    /// Steps on within a bound and measures each step; at least one.
+    pub(super) fn measured(&mut self, bound: Bound) -> anyhow::Result<Series> {
+        let begun = own_cpu();
+        let (mut ms, mut contacts) = (Vec::with_capacity(bound.steps as usize), 0);
+        for _ in 0..bound.steps.max(1) {
+            let from = own_cpu();
+            contacts = contacts.max(self.step()?);
+            let now = own_cpu();
+            ms.push((now - from).as_secs_f64() * 1e3);
+            if now - begun > bound.span {
+                break;
+            }
+        }
+        ms.sort_by(f64::total_cmp);
+        Ok(Series { ms, contacts })
+    }
+
+    /// Where the points of a soft body are.
+    pub(super) fn points(&mut self, body: usize) -> Vec<DVec3> {
+        self.bodies[body].agent.write_snapshot(&mut self.snapshot);
+        match &self.snapshot.body {
+            Body::Soft(soft) => soft.positions.clone(),
+            Body::Curve(curve) => curve.positions.clone(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl Series {
+    /// Milliseconds that a share of the steps does not exceed.
+    pub(super) fn ms_at(&self, share: f64) -> f64 {
+        let last = self.ms.len() - 1;
+        self.ms[((share * last as f64).round() as usize).min(last)]
+    }
+
+    pub(super) fn steps(&self) -> usize {
+        self.ms.len()
+    }
+}
