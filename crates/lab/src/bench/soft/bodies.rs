@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Tube, TubeSpec, WallModel};
-use metachron_models::soft::{Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
 use metachron_scene::{Source, load};
 use metachron_world::Spec;
 
@@ -24,12 +24,19 @@ const PLATE_KG: f64 = 0.2;
 const SHEET_M: f64 = 0.3;
 
 /// Soft tissue.
-const TISSUE: SoftMatter =
-    SoftMatter { young_pa: 12e3, poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, damping_s: 0.0 };
+const TISSUE: SoftMatter = SoftMatter {
+    young_pa: 12e3,
+    poisson: 0.4,
+    density_kg_m3: 1050.0,
+    damping_per_s: 0.2,
+    damping_s: 0.0,
+    law: MaterialLaw::Corotational,
+};
 
 fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
     SoftSpec {
         shape,
+        nodes: None,
         matter,
         position,
         rotation: DQuat::IDENTITY,
