@@ -9,7 +9,7 @@ const HOSE: &str = "name = \"hose\"\nmodel = \"tube\"\npath_m = [[-0.4, 0, 0], [
 /// A rope along the same path, and a sheet, which hang from two of their sides.
 const ROPE: &str = "name = \"rope\"\nmodel = \"rope\"\npath_m = [[-0.4, 0, 0], [0, 0, -0.2], [0.4, 0, 0]]\n\
     radius_m = 0.005\nyoung_pa = 1.0e6\nhold = [\"start\", \"end\"]\n";
-const SHEET: &str = "name = \"sheet\"\nmodel = \"sheet\"\nsize_m = [0.8, 0.1]\nthickness_m = 0.002\n\
+const SHEET: &str = "name = \"sheet\"\nmodel = \"sheet\"\nsize_m = [0.8, 0.03]\nthickness_m = 0.002\n\
     young_pa = 2.0e5\nhold = [\"left\", \"right\"]\n";
 
 /// An object that the camera looks at, at `away` between 1 and 6 s, and at it again.
@@ -69,7 +69,8 @@ fn far_away_a_tube_is_as_fine_as_a_pixel_is_wide() {
 #[test]
 fn out_of_sight_a_rope_and_a_sheet_are_at_their_coarsest_and_come_back_without_a_jump() {
     for object in [ROPE, SHEET] {
-        assert_eq!(eps_m(&play(object, BEHIND, "5")), 0.1);
+        // the largest cell that fits the length and is no longer than 0.1 m
+        assert!((0.09..=0.1).contains(&eps_m(&play(object, BEHIND, "5"))));
         let back = play(object, BEHIND, "9");
         assert!((eps_m(&back) - 0.01).abs() < 1e-3, "{}", eps_m(&back));
         assert!(leap_m(&back, 0.9) < 0.01, "{}", leap_m(&back, 0.9));
@@ -79,12 +80,12 @@ fn out_of_sight_a_rope_and_a_sheet_are_at_their_coarsest_and_come_back_without_a
 #[test]
 fn a_rope_and_a_sheet_are_as_coarse_as_a_tolerance_allows() {
     for object in [ROPE, SHEET] {
-        let [tight, loose] = [1e-3, 1e-2].map(|tolerance_m: f64| {
+        let [tight, loose] = [2e-4, 1e-2].map(|tolerance_m: f64| {
             let held = format!("{object}tolerance_m = {tolerance_m}\ndt_ms = [1, 10]\n");
-            let report = play(&held, "eye_m = [0, -1.5, 0], look_at_m = [0, 0, 0]", "4");
+            let report = play(&held, "eye_m = [0, -1.5, 0], look_at_m = [0, 0, 0]", "8");
             (eps_m(&report), report["agents"][0]["residual_m"].as_f64().expect("an error of its own"))
         });
         assert!(tight.0 < 0.7 * loose.0, "{tight:?} {loose:?}");
-        assert!(tight.1 < 1e-3 && loose.1 < 1e-2, "{tight:?} {loose:?}");
+        assert!(tight.1 < 2e-4 && loose.1 < 1e-2, "{tight:?} {loose:?}");
     }
 }

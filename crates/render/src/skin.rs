@@ -193,12 +193,12 @@ impl SkinScratch {
                 position: soft.positions[face.vertex as usize],
                 normal: face.sum.normalize_or(DVec3::Z),
             }));
-            self.fine.divide(CoarseSkin { edges, vertices, corners: &self.faces.triangles }, parts);
+            self.fine.divide(CoarseSkin { edges, vertices, corners: &self.faces.triangles, parts });
         } else {
             self.find_normals(form, soft);
             let both = soft.positions.iter().zip(&self.normals);
             self.fine.points.extend(both.map(|(position, normal)| SkinPoint { position: *position, normal: *normal }));
-            self.fine.divide(CoarseSkin { edges, vertices, corners: vertices }, parts);
+            self.fine.divide(CoarseSkin { edges, vertices, corners: vertices, parts });
         }
     }
 }

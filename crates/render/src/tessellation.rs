@@ -14,7 +14,7 @@ const NONE: u32 = u32::MAX;
 /// Into how many parts level `n` divides each side of a triangle of a skin: the square is nearest to 2ⁿ.
 #[must_use]
 pub const fn skin_divisions(n: u8) -> u32 {
-    ((1_u32 << (n + 2)).isqrt() + 1) / 2
+    (1_u32 << (n + 2)).isqrt().div_ceil(2)
 }
 
 /// The edges of a skin; they never change.
@@ -48,6 +48,8 @@ pub(super) struct CoarseSkin<'a> {
     pub vertices: &'a [[u32; 3]],
     /// The same triangles by their corners: a vertex has a corner for each of the surfaces that meet there.
     pub corners: &'a [[u32; 3]],
+    /// Into how many parts each side is divided, ≥ 1.
+    pub parts: u32,
 }
 
 /// The points of an edge between its ends, for one of its triangles.
@@ -111,22 +113,23 @@ fn middle_normal(a: SkinPoint, b: SkinPoint) -> DVec3 {
 }
 
 impl FineSkin {
-    /// Divides every side of a skin into `parts`; its corners are already in the list of points.
-    pub fn divide(&mut self, skin: CoarseSkin<'_>, parts: u32) {
+    /// Divides a skin whose corners are already in the list of points.
+    pub fn divide(&mut self, skin: CoarseSkin<'_>) {
         self.triangles.clear();
         self.rim.clear();
         self.strips.clear();
         self.controls.clear();
         for edge in &skin.edges.edges {
-            self.divide_edge(skin, edge, parts);
+            self.divide_edge(skin, edge);
         }
         for triangle in 0..skin.corners.len() {
-            self.divide_triangle(skin, triangle, parts);
+            self.divide_triangle(skin, triangle);
         }
     }
 
     /// Adds the points of an edge: one strip where both its triangles have the same corners, else one each at the same places.
-    fn divide_edge(&mut self, skin: CoarseSkin<'_>, edge: &Edge, parts: u32) {
+    fn divide_edge(&mut self, skin: CoarseSkin<'_>, edge: &Edge) {
+        let parts = skin.parts;
         let corners_of = |triangle: u32| {
             let [vertices, corners] = [skin.vertices, skin.corners].map(|list| list[triangle as usize]);
             edge.ends.map(|end| (0..3).find(|k| vertices[*k] == end).map_or(0, |k| corners[k]))
@@ -156,12 +159,13 @@ impl FineSkin {
         let other = if second == first { one } else { strip(second, ends[1]) };
         self.strips.push([one, other]);
         if edge.triangles[1] == NONE {
-            self.add_rim(skin, edge, parts);
+            self.add_rim(skin, edge);
         }
     }
 
     /// Lists the parts of a border edge in the direction of its triangle.
-    fn add_rim(&mut self, skin: CoarseSkin<'_>, edge: &Edge, parts: u32) {
+    fn add_rim(&mut self, skin: CoarseSkin<'_>, edge: &Edge) {
+        let parts = skin.parts;
         let Some(&[Strip { corners, from }, _]) = self.strips.last() else { return };
         let at = |part: u32| match part {
             0 => corners[0],
@@ -174,17 +178,18 @@ impl FineSkin {
         self.rim.extend(sides);
     }
 
-    /// The point of a triangle's side at `part` of `parts` from the corner where the side begins.
-    fn on_side(&self, skin: CoarseSkin<'_>, triangle: usize, side: usize, part: u32, parts: u32) -> u32 {
+    /// The point of a triangle's side `part` parts from the corner where the side begins.
+    fn on_side(&self, skin: CoarseSkin<'_>, triangle: usize, side: usize, part: u32) -> u32 {
         let number = skin.edges.of_triangle[triangle][side] as usize;
         let second = usize::from(skin.edges.edges[number].triangles[0] as usize != triangle);
         let forward = skin.vertices[triangle][side] == skin.edges.edges[number].ends[0];
-        self.strips[number][second].from + if forward { part } else { parts - part } - 1
+        self.strips[number][second].from + if forward { part } else { skin.parts - part } - 1
     }
 
     /// Adds the inner points and the small triangles of a triangle. Row i has the points with i parts of the way from its first corner to
     /// the others, from the side to its second on.
-    fn divide_triangle(&mut self, skin: CoarseSkin<'_>, triangle: usize, parts: u32) {
+    fn divide_triangle(&mut self, skin: CoarseSkin<'_>, triangle: usize) {
+        let parts = skin.parts;
         let corners = skin.corners[triangle];
         if parts == 1 {
             return self.triangles.push(corners);
@@ -197,9 +202,9 @@ impl FineSkin {
                     (0, _) => corners[0],
                     _ if i == parts && j == 0 => corners[1],
                     _ if i == parts && j == i => corners[2],
-                    (_, 0) => self.on_side(skin, triangle, 0, i, parts),
-                    _ if i == parts => self.on_side(skin, triangle, 1, j, parts),
-                    _ if j == i => self.on_side(skin, triangle, 2, parts - i, parts),
+                    (_, 0) => self.on_side(skin, triangle, 0, i),
+                    _ if i == parts => self.on_side(skin, triangle, 1, j),
+                    _ if j == i => self.on_side(skin, triangle, 2, parts - i),
                     _ => {
                         let of = |count: u32| f64::from(count) / f64::from(parts);
                         self.points.push(patch.at([of(parts - i), of(i - j), of(j)]));

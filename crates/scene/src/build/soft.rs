@@ -340,7 +340,10 @@ fn one_division(
         (false, None) => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
         _ => {}
     }
-    eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH))
+    let before = c.count();
+    let range = eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
+    // a range that was reported says nothing of what would fit
+    range.filter(|_| c.count() == before)
 }
 
 /// Gives a sheet or a rope with a range of ε the lattice of its finest as its skin, and nodes that start there.
