@@ -5,6 +5,7 @@
 
 use super::level::Shading;
 use super::picture::MeshCorner;
+use super::scene_view::SkinForm;
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceShape;
@@ -23,6 +24,8 @@ const SMOOTH_COS: f64 = 0.5;
 pub struct Skins {
     /// Corners, relative to the picture's origin, metres.
     pub corners: Vec<MeshCorner>,
+    /// The same at rest, metres in their bodies' own axes: where tissue's texture lies. Zero for skins without one.
+    pub rest: Vec<MeshCorner>,
     /// Corners of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Their sides, three per triangle, where edges are drawn.
@@ -40,6 +43,8 @@ pub struct SkinRun {
     pub instance: u32,
     /// Shading.
     pub shading: Shading,
+    /// Whether it is tissue, with a texture where it is lit per pixel.
+    pub tissue: bool,
 }
 
 /// Options of adding one skin.
@@ -53,6 +58,8 @@ pub(super) struct SkinOptions {
     pub shading: Shading,
     /// Whether its edges are drawn.
     pub edges: bool,
+    /// Whether it is tissue.
+    pub tissue: bool,
 }
 
 /// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others are stored after all vertices.
@@ -88,31 +95,30 @@ impl Skins {
     /// Clears the list; storage is kept.
     pub(super) fn clear(&mut self) {
         self.corners.clear();
+        self.rest.clear();
         self.triangles.clear();
         self.sides.clear();
         self.runs.clear();
     }
 
     /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
-    pub(super) fn add(
-        &mut self,
-        form: &SurfaceShape,
-        soft: &SoftState,
-        options: SkinOptions,
-        scratch: &mut SkinScratch,
-    ) {
-        let SkinOptions { origin, instance, shading, edges } = options;
+    pub(super) fn add(&mut self, skin: &SkinForm, soft: &SoftState, options: SkinOptions, scratch: &mut SkinScratch) {
+        let form = &skin.surface;
+        let SkinOptions { origin, instance, shading, edges, tissue } = options;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         let corner = |x: &DVec3, n: DVec3| MeshCorner {
             core: (*x - origin).as_vec3().to_array(),
             normal: n.as_vec3().to_array(),
             uv: [0.0; 2],
         };
+        let still = |vertex: usize| skin.rest.get(vertex).copied().unwrap_or(MeshCorner::NOWHERE);
         if form.closed {
             scratch.faces.find(form, soft);
             let normal = |face: &Face| face.sum.normalize_or(DVec3::Z);
             let faces = scratch.faces.all.iter();
             self.corners.extend(faces.map(|face| corner(&soft.positions[face.vertex as usize], normal(face))));
+            let faces = scratch.faces.all.iter();
+            self.rest.extend(faces.map(|face| still(face.vertex as usize)));
             self.triangles.extend(scratch.faces.triangles.iter().map(|t| t.map(|face| first + face)));
         } else {
             scratch.find_normals(form, soft);
@@ -121,6 +127,9 @@ impl Skins {
             self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
             let back = first + soft.positions.len() as u32;
             self.corners.extend(both().map(|(x, n)| corner(x, -*n)));
+            // the texture of both faces is the same
+            let vertices = 0..soft.positions.len();
+            self.rest.extend(vertices.clone().chain(vertices).map(still));
             self.triangles.extend(form.triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
             scratch.find_rim(form);
             for &[a, b] in &scratch.rim {
@@ -131,7 +140,7 @@ impl Skins {
             let all = self.triangles[from as usize..].iter();
             self.sides.extend(all.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
         }
-        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading });
+        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading, tissue });
     }
 }
 
@@ -253,9 +262,14 @@ mod tests {
     fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
         let (form, soft) = square();
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false };
+        let (origin, instance, shading) = (DVec3::ZERO, 7, Shading::Flat);
+        let options = SkinOptions { origin, instance, shading, edges: false, tissue: true };
+        let form = SkinForm::new(form, &soft.positions);
         skins.add(&form, &soft, options, &mut scratch);
-        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
+        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance, shading, tissue: true }]);
+        // either face has the texture of the sheet at rest
+        let rest: Vec<_> = skins.rest.iter().map(|corner| glam::Vec3::from(corner.core).as_dvec3()).collect();
+        assert_eq!(rest, [&soft.positions[..], &soft.positions[..]].concat());
         let thick = |i: u32| {
             let MeshCorner { core, normal, .. } = skins.corners[i as usize];
             (glam::Vec3::from(core) + glam::Vec3::from(normal) * 0.01).as_dvec3()
@@ -291,7 +305,9 @@ mod tests {
     fn a_solid_is_smooth_within_its_sides_and_sharp_at_its_edges() {
         let (form, soft) = cube(0.3);
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false };
+        let (origin, instance, shading) = (DVec3::ZERO, 0, Shading::PerPixel);
+        let options = SkinOptions { origin, instance, shading, edges: false, tissue: false };
+        let form = SkinForm::new(form, &soft.positions);
         skins.add(&form, &soft, options, &mut scratch);
         assert_eq!(skins.corners.len(), 24, "three sides meet at each of eight vertices");
         for triangle in &skins.triangles {
