@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 /// Repeats of the skin's texture around a tube; the shader uses the same number.
 const TEXTURE_AROUND: f64 = 2.0;
 /// Repeats of tissue's texture over the mean distance of a skin from its middle.
-const TEXTURE_ACROSS: f64 = 1.3;
+pub(super) const TEXTURE_ACROSS: f64 = 1.3;
 /// Radius of the user spring's coil, as a fraction of the distance to the camera's target.
 const SPRING_SHARE: f64 = 0.011;
 /// Turns of that spring, and intervals per turn.

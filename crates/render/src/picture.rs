@@ -149,6 +149,8 @@ pub struct SolidKind {
     pub shading: Shading,
     /// Number of their texture in [`Picture::textures`], from 1; 0 for none.
     pub texture: u32,
+    /// Whether they are meshes of tissue, which has a texture of its own where it is lit per pixel.
+    pub tissue: bool,
     /// Their mesh.
     pub mesh: MeshKey,
 }

@@ -131,6 +131,7 @@ impl Renderer {
         match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
             _ if self.meshes.is_strokes(run.kind.mesh) => &self.pipelines.stroke,
+            (_, shading) if run.kind.tissue => self.pipelines.hide_of(true, shading),
             (_, shading) => self.pipelines.solid_of(shading, run.kind.texture > 0),
         }
     }

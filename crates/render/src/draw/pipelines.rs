@@ -6,6 +6,7 @@ use super::super::environment::Environment;
 use super::super::level::Shading;
 use super::RendererOptions;
 use super::bindings::{DEPTH, Layouts};
+use wgpu::PrimitiveTopology::{LineList, TriangleList};
 use wgpu::{Device, RenderPipeline, ShaderModule, TextureFormat, VertexBufferLayout};
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
@@ -141,8 +142,7 @@ impl Pipelines {
             device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
         };
         let (solid, floor) = (module("solid", SOLID), module("floor", FLOOR));
-        let (skin, hide) = (module("skin", &[TISSUE, SKIN].concat()), module("hide", &[SOLID, TISSUE, HIDE].concat()));
-        let painted = module("painted", &[SOLID, PAINTED].concat());
+        let (skin, painted) = (module("skin", &[TISSUE, SKIN].concat()), module("painted", &[SOLID, PAINTED].concat()));
         let builder = PipelineBuilder::new(device, layouts, format, options);
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
@@ -155,7 +155,6 @@ impl Pipelines {
             layout(BODY_STRIDE, instance, &BODY),
             layout(CORNER_STRIDE, vertex, &CORNER_TO),
         ];
-        use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
             builder.create(&PipelineDesc { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
         };
@@ -187,11 +186,7 @@ impl Pipelines {
                 solid("shadowed solid", "vs_solid", Some("fs_solid_shadowed"), TriangleList),
                 builder.painted(&solids, &painted, "fs_painted_shadowed"),
             ],
-            hides: ["fs_hide", "fs_hide_shadowed"].map(|fragment| {
-                let (label, vertex, topology) = ("hide", "vs_hide", TriangleList);
-                let fragment = Some(fragment);
-                builder.create(&PipelineDesc { label, vertex, fragment, buffers: &solids, topology, module: &hide })
-            }),
+            hides: builder.hides(&solids, &module("hide", &[SOLID, TISSUE, HIDE].concat())),
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
@@ -253,7 +248,7 @@ impl<'a> PipelineBuilder<'a> {
 
     /// The floor in its parts, and how many corners each has.
     fn floor(&self, module: &ShaderModule, lean: bool) -> Vec<(RenderPipeline, u32)> {
-        use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
+        use wgpu::PrimitiveTopology::TriangleStrip;
         if !lean {
             return vec![(self.plain(module, "vs_floor", "fs_floor", TriangleStrip), 4)];
         }
@@ -284,6 +279,15 @@ impl<'a> PipelineBuilder<'a> {
         let topology = wgpu::PrimitiveTopology::TriangleList;
         [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
             self.create(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
+        })
+    }
+
+    /// Pipelines for soft bodies of tissue, plain and in soft shadow.
+    fn hides(&self, buffers: &[Option<VertexBufferLayout<'_>>], module: &ShaderModule) -> [RenderPipeline; 2] {
+        let (vertex, topology) = ("vs_hide", wgpu::PrimitiveTopology::TriangleList);
+        ["fs_hide", "fs_hide_shadowed"].map(|fragment| {
+            let fragment = Some(fragment);
+            self.create(&PipelineDesc { label: "hide", vertex, fragment, buffers, topology, module })
         })
     }
 
