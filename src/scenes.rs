@@ -3,7 +3,7 @@
 use metachron_scene::builtin::{self, BuiltIn, BuiltInFile};
 
 /// Every built-in scene.
-pub const ALL: [BuiltIn; 17] = [
+pub const ALL: [BuiltIn; 18] = [
     BuiltIn { name: "tube", text: include_str!("../scenes/tube.toml") },
     BuiltIn { name: "pendulum", text: include_str!("../scenes/pendulum.toml") },
     BuiltIn { name: "yard", text: include_str!("../scenes/yard.toml") },
@@ -15,7 +15,8 @@ pub const ALL: [BuiltIn; 17] = [
     BuiltIn { name: "gripper", text: include_str!("../scenes/gripper.toml") },
     BuiltIn { name: "mesentery", text: include_str!("../scenes/mesentery.toml") },
     BuiltIn { name: "organ", text: include_str!("../scenes/organ.toml") },
-    BuiltIn { name: "suture", text: include_str!("../scenes/suture.toml") },
+    BuiltIn { name: "cavity", text: include_str!("../scenes/cavity.toml") },
+    BuiltIn { name: "catenary", text: include_str!("../scenes/catenary.toml") },
     BuiltIn { name: "auditorium", text: include_str!("../scenes/auditorium.toml") },
     BuiltIn { name: "grove", text: include_str!("../scenes/grove.toml") },
     BuiltIn { name: "domes", text: include_str!("../scenes/domes.toml") },

@@ -98,9 +98,10 @@ fn check_accepts_the_built_in_scenes() {
         "gripper",
         "mesentery",
         "organ",
-        "suture",
+        "cavity",
+        "catenary",
     ]);
-    assert_eq!((code(&check), out(&check).lines().count()), (0, 12), "{}", err(&check));
+    assert_eq!((code(&check), out(&check).lines().count()), (0, 13), "{}", err(&check));
     assert!(metachron(&["check", "-q", "tube"]).stdout.is_empty());
 }
 

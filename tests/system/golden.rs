@@ -50,7 +50,7 @@ fn scenes() -> Vec<String> {
 #[test]
 fn golden_built_in_scenes_keep_their_bits_and_reports() {
     let scenes = scenes();
-    assert_eq!(scenes.len(), 17, "{scenes:?}");
+    assert_eq!(scenes.len(), 18, "{scenes:?}");
     let (left, right) = scenes.split_at(scenes.len() / 2);
     let play = |names: &[String]| names.iter().map(|name| (name.clone(), entry(name))).collect::<Vec<_>>();
     let (mut now, rest) = std::thread::scope(|threads| {

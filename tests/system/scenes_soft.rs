@@ -207,12 +207,28 @@ fn a_surface_that_is_no_solid_is_refused_by_triangle_and_reason() {
 
 #[test]
 fn the_rope_hangs_in_a_catenary_and_the_rod_keeps_some_of_its_bend() {
-    let report = lockstep("suture", &["--seconds", "1.2"]);
+    let report = lockstep("catenary", &["--seconds", "1.2"]);
     let (rope, rod) = (point(&report, "/probes/0/position_m"), point(&report, "/probes/1/position_m"));
     // span 0.2 m of 0.2973 m: sinh u/u = 1.4865, sag (cosh u - 1) 0.2/2u = 98.85 mm; it stretches by half a millimetre
     assert!((rope[2] - (0.2 - 0.09885)).abs() < 1.5e-3, "{rope:?}");
     // the rod was made as a V, 11 cm deep, and would be one again
     assert!(rod[2] > 0.088 && rod[2] < rope[2] - 3e-3, "{rod:?}");
+}
+
+#[test]
+fn in_the_cavity_a_grasper_lifts_the_gut_while_a_probe_presses_the_liver() {
+    let report = lockstep("cavity", &["--seconds", "2.6"]);
+    let (gut, tip) = (point(&report, "/probes/0/position_m"), point(&report, "/probes/2/position_m"));
+    // it lies 26 mm high, and the tip has lifted it by 30 mm of its 41
+    assert!(gut[2] > 0.045 && gut[2] < tip[2], "the gut at {gut:?}, the tip at {tip:?}");
+    let force = |a: &str, b: &str| {
+        let all = report["couplings"].as_array().unwrap();
+        let pair = all.iter().find(|c| c["a"] == a && c["b"] == b);
+        pair.map_or(0.0, |pair| number(pair, "/force_n"))
+    };
+    // more than a third of the gut's 0.4 N, with what the mesentery holds, and less than the jaws' springs give at 2 cm
+    assert!((0.15..1.2).contains(&force("grasper", "gut")), "{report}");
+    assert!(force("liver", "probe") > 0.1, "{report}");
 }
 
 /// What sleeps and owns the pair did not see it come: it fell through to the floor.

@@ -35,11 +35,14 @@ pub enum Generator {
     Books,
     /// A liver, about 2 long along x: a thick right lobe at −x, a thin left one at +x, a flat underside with the hollow of the gallbladder.
     Liver,
+    /// The wall of a cavity, seen from within: a bowl 2 wide and 0.62 deep about the origin that bends inward above it, with a ridge along y in
+    /// its bottom; open at the top.
+    Cavity,
 }
 
 impl Generator {
     /// All of them, in the order of the list of names.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Sphere,
         Self::Torus,
         Self::Blob,
@@ -52,6 +55,7 @@ impl Generator {
         Self::Door,
         Self::Books,
         Self::Liver,
+        Self::Cavity,
     ];
 
     /// The name in scene files.
@@ -70,6 +74,7 @@ impl Generator {
             Self::Door => "door",
             Self::Books => "books",
             Self::Liver => "liver",
+            Self::Cavity => "cavity",
         }
     }
 }
@@ -99,9 +104,13 @@ pub fn generate_surface(kind: Generator, seed: u64, triangles: u32) -> Triangles
         Generator::Door => sheet.boxes(triangles, &furniture::DOOR),
         Generator::Books => sheet.boxes(triangles, &furniture::BOOKS),
         Generator::Liver => sheet.ball(side(triangles, 12), |way| way * liver_m(way, seed)),
+        Generator::Cavity => sheet.bowl(side(triangles, 2), seed),
     }
     Triangles { points: sheet.points, triangles: sheet.triangles }
 }
+
+/// The rim of a cavity's wall in the middle of its sides, as an angle from its lowest point; at the corners it is a fifth more.
+const RIM_RAD: f64 = 2.0;
 
 /// How far the surface of a liver is from its middle in the direction `way`.
 fn liver_m(way: DVec3, seed: u64) -> f64 {
@@ -219,6 +228,22 @@ impl MeshBuilder {
         self.grid(cells, cells, |c, r| {
             let flat = DVec2::new(at(c), at(r));
             flat.extend(0.125 * layers(seed, flat.extend(0.5) * 2.0, 3))
+        });
+    }
+
+    /// A ball seen from within, flattened, without its top: rounded squares of a grid about the lowest point are its circles of latitude.
+    fn bowl(&mut self, cells: u32, seed: u64) {
+        let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
+        self.grid(cells, cells, |c, r| {
+            let flat = DVec2::new(at(c), at(r));
+            let fourth = (flat * flat) * (flat * flat);
+            let out = libm::sqrt(libm::sqrt(fourth.x + fourth.y));
+            let way = flat.normalize_or_zero();
+            let from_below = out * RIM_RAD;
+            let level = way * libm::sin(from_below);
+            let ridge = 0.1 * libm::exp(-(level.x / 0.22) * (level.x / 0.22)) * (1.0 - out).max(0.0);
+            let place = level.extend(ridge - 0.62 * libm::cos(from_below));
+            place * (1.0 + 0.02 * layers(seed, place * 4.0, 2))
         });
     }
 

@@ -42,6 +42,8 @@ const JAW_SWING_RAD: f64 = 0.52;
 const JAW_LENGTH: f64 = 8.0;
 /// Fraction of the jaws' length behind the point between them.
 const JAW_BEHIND: f64 = 0.75;
+/// Distance from the hinge to the shaft in shaft radii.
+const RING_BEHIND: f64 = 4.0;
 
 impl ToolShape {
     /// No point of it is farther from the point between its jaws, metres.
@@ -50,6 +52,12 @@ impl ToolShape {
         // behind the jaws come clevis and ring, then the shaft; wide open jaws reach five radii to the side
         let Self { shaft_radius_m: r, shaft_length_m } = *self;
         (10.0 * r + shaft_length_m).hypot(5.0 * r)
+    }
+
+    /// Distance from the point between the jaws to the front end of the shaft, metres: jaws, clevis and ring are within it.
+    #[must_use]
+    pub fn shaft_from_m(&self) -> f64 {
+        (JAW_BEHIND * JAW_LENGTH + RING_BEHIND) * self.shaft_radius_m
     }
 
     /// The parts of the tool with its jaws `jaw` open (0 shut … 1 wide open).
@@ -86,7 +94,7 @@ impl ToolShape {
             round(0.55 * r, 1.02 * r, hinge, across),
             round(0.82 * r, 1.5 * r, behind(1.6), straight),
             round(1.12 * r, 0.7 * r, behind(3.6), straight),
-            round(r, shaft, behind(4.0) - DVec3::Z * shaft, straight),
+            round(r, shaft, behind(RING_BEHIND) - DVec3::Z * shaft, straight),
         ]
     }
 

@@ -177,8 +177,8 @@ fn a_tube_of_one_size_allocates_nothing_once_warm() {
     assert_eq!(check(&suite), []);
 }
 
-#[test]
-fn a_tool_that_grasps_keeps_every_promise() {
+/// A tool that grasps a tube, with this pivot.
+fn check_grasping(pivot_m: Option<DVec3>) {
     let curve = tube(false, 0.0);
     let mut snapshot = Snapshot::default();
     curve.write_snapshot(&mut snapshot);
@@ -192,6 +192,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![held],
+        pivot_m,
         starts_off_m: DVec3::ZERO,
     };
     let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
@@ -203,6 +204,16 @@ fn a_tool_that_grasps_keeps_every_promise() {
         ..Suite::new(&make, DT)
     };
     assert_eq!(check(&suite), []);
+}
+
+#[test]
+fn a_tool_that_grasps_keeps_every_promise() {
+    check_grasping(None);
+}
+
+#[test]
+fn a_tool_in_a_pivot_keeps_every_promise() {
+    check_grasping(Some(DVec3::new(0.45, 0.05, 0.3)));
 }
 
 #[test]
@@ -222,6 +233,7 @@ fn a_tool_driven_at_constant_speed_keeps_every_promise() {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![],
+        pivot_m: None,
         starts_off_m: DVec3::ZERO,
     };
     let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;

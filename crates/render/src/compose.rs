@@ -20,6 +20,8 @@ use std::f64::consts::TAU;
 
 /// Repeats of the skin's texture around a tube; the shader uses the same number.
 const TEXTURE_AROUND: f64 = 2.0;
+/// Repeats of tissue's texture over the mean distance of a skin from its middle.
+pub(super) const TEXTURE_ACROSS: f64 = 1.3;
 /// Radius of the user spring's coil, as a fraction of the distance to the camera's target.
 const SPRING_SHARE: f64 = 0.011;
 /// Turns of that spring, and intervals per turn.
@@ -123,7 +125,8 @@ impl SceneView {
     /// Finds the actors that are visible or may shade a visible one.
     fn find_shown(&self, picture: &Picture, shown: &mut Vec<usize>) {
         let column = LightColumn::of(picture);
-        let needed = |track: &Track| track.seen || column.holds(track.bounds.centre, track.bounds.radius_m);
+        let shaded = picture.environment.throws_shadows();
+        let needed = |track: &Track| track.seen || shaded && column.holds(track.bounds.centre, track.bounds.radius_m);
         shown.clear();
         shown.extend(self.tracks.iter().enumerate().filter(|(_, track)| needed(track)).map(|(number, _)| number));
     }
@@ -181,9 +184,12 @@ impl SceneView {
                 continue;
             }
             let paint = Paint::of(track.actor.appearance, tint(picture.style, at, track.age_s));
-            let size = Rounding { extents: Vec3::ONE, radius_m: drawn_radius_m(form) as f32 };
+            let size = Rounding { extents: Vec3::ONE, radius_m: drawn_radius_m(&form.surface) as f32 };
             let number = picture.instances.len() as u32;
-            picture.instances.push(instance(DVec3::ZERO, DQuat::IDENTITY, size, paint));
+            let tissue = track.actor.appearance.material == Material::Tissue && form.rest.len() == soft.positions.len();
+            let repeats_per_m = TEXTURE_ACROSS / form.mean_radius_m;
+            let skin = instance(DVec3::ZERO, DQuat::IDENTITY, size, paint);
+            picture.instances.push(SolidInstance { wrap: [repeats_per_m as f32, 0.0], ..skin });
             let Picture { skins, origin, style, .. } = picture;
             let options = SkinOptions {
                 origin: *origin,
@@ -191,8 +197,9 @@ impl SceneView {
                 shading: at.shading,
                 edges: style.wireframe,
                 n: at.resolution.n,
+                tissue,
             };
-            skins.add(ShownSkin { form, edges: &track.edges, soft }, options, room);
+            skins.add(ShownSkin { form, soft }, options, room);
         }
     }
 

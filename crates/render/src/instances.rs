@@ -2,11 +2,11 @@
 //!
 //! In: posed objects, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, the choice of levels.
 
-use super::compose::{Paint, instance, level, tint};
+use super::compose::{Paint, TEXTURE_ACROSS, instance, level, tint};
 use super::level::{Level, Shading};
 use super::lod_transition::{Allowance, Geomorph};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
-use super::scene_view::{Actor, Form, Material, SceneView, StaticShape, Track};
+use super::scene_view::{Actor, Appearance, Form, Material, SceneView, StaticShape, Track};
 use glam::{DVec3, Vec3};
 use metachron_core::{Body, ToolState};
 use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
@@ -51,7 +51,7 @@ impl SceneView {
 /// The kind of a mesh without its own texture.
 pub(super) fn kind(shading: Shading, mesh: MeshKey) -> SolidKind {
     let shading = if shading == Shading::Textured { Shading::PerPixel } else { shading };
-    SolidKind { shading, texture: 0, mesh }
+    SolidKind { shading, texture: 0, tissue: false, mesh }
 }
 
 /// The mesh and size of a solid at level `n`; `None` for one that has neither a given mesh nor a primitive.
@@ -77,7 +77,8 @@ pub(super) fn add_solid(
         (Form::Solid(solid), Body::Rigid(rigid)) => {
             let Some((mesh, size)) = mesh_of(solid, track.body.mesh_index, at.resolution.n) else { return };
             let place = rigid.position - picture.origin;
-            solids.push((kind(at.shading, mesh), instance(place, rigid.rotation, size, paint)));
+            let body = instance(place, rigid.rotation, size, paint);
+            solids.push(clad(kind(at.shading, mesh), body, track.actor.appearance, track.body.radius_m));
         }
         (Form::Tool(shape), Body::Tool(tool)) => {
             solids.extend(tool_parts(shape, tool, at, paint, picture.origin));
@@ -109,7 +110,7 @@ fn add_scenery(track: &mut Track, level: Level, picture: &Picture, solids: &mut 
     let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
     let painted = track.painting.as_ref().map(|painting| painting.apply(&mut paint, level.shading));
     let (kind, wrap) = match painted.flatten() {
-        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, mesh }, wrap),
+        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, tissue: false, mesh }, wrap),
         None => (kind(level.shading, mesh), 0.0),
     };
     let still = instance(at.position - picture.origin, at.rotation, size, paint);
@@ -141,7 +142,15 @@ pub(super) fn add_static(prop: &StaticShape, picture: &mut Picture, solids: &mut
     let slab = slab_of(prop, picture.focus_radius_m);
     let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.mesh_index, STATIC_LEVEL)) else { return };
     let paint = Paint::of(prop.appearance, [0; 4]);
-    solids.push((kind(Shading::PerPixel, mesh), instance(prop.position - picture.origin, prop.rotation, size, paint)));
+    let still = instance(prop.position - picture.origin, prop.rotation, size, paint);
+    solids.push(clad(kind(Shading::PerPixel, mesh), still, prop.appearance, prop.body.radius_m));
+}
+
+/// The same with the texture of tissue where it is a mesh of it, of this radius.
+fn clad(kind: SolidKind, body: SolidInstance, look: Appearance, radius_m: f64) -> (SolidKind, SolidInstance) {
+    let tissue = look.material == Material::Tissue && matches!(kind.mesh, MeshKey::Custom(_));
+    let repeats_per_m = if tissue { TEXTURE_ACROSS / radius_m.max(1e-6) } else { 0.0 };
+    (SolidKind { tissue, ..kind }, SolidInstance { wrap: [repeats_per_m as f32, 0.0], ..body })
 }
 
 /// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and divided into cells small enough to be lit per vertex.

@@ -25,6 +25,7 @@ mod benchmark;
 mod compose;
 #[cfg(feature = "gpu")]
 mod draw;
+mod environment;
 #[cfg(feature = "gpu")]
 mod image_metrics;
 mod instances;
@@ -48,6 +49,7 @@ pub use benchmark::{Drawn, benchmark, benchmark_left};
 pub use compose::Hand;
 #[cfg(feature = "gpu")]
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
+pub use environment::{Environment, EnvironmentLight};
 #[cfg(feature = "gpu")]
 pub use image_metrics::{psnr_db, ssim};
 pub use level::{Level, Shading};
@@ -55,7 +57,7 @@ pub use level::{Level, Shading};
 pub use offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
 pub use pick::Hit;
 pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
-pub use scene_view::{Actor, Appearance, Form, Material, SceneView, States, StaticObject};
+pub use scene_view::{Actor, Appearance, Form, Material, SceneView, SkinForm, States, StaticObject};
 pub use skin::{SkinRun, Skins};
 pub use tessellation::skin_divisions;
 pub use view::{Camera, Frustum, Ray, Size};

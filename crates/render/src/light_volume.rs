@@ -1,13 +1,10 @@
-//! The key light, and the column along it whose depths the shadow map holds.
+//! The column along the key light whose depths the shadow map holds.
 //!
 //! In: the box of a picture that the light falls on. Out: the column, and whether an object in it may throw a shadow. Never here: texels,
 //! the GPU.
 
 use super::picture::Picture;
 use glam::DVec3;
-
-/// Direction towards the key light: over the left shoulder of a viewer at −y.
-pub const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
 
 /// Range of the shadow's depths towards the light and away from it, in radii of the focus: tool shafts are tall.
 pub const REACH: (f64, f64) = (2.5, 1.5);
@@ -36,8 +33,8 @@ pub struct LightColumn {
 impl LightColumn {
     /// The column of a picture.
     pub fn of(picture: &Picture) -> Self {
-        let light = LIGHT.normalize();
-        let right = DVec3::Z.cross(light).normalize();
+        let light = picture.environment.light().toward;
+        let right = DVec3::Z.cross(light).normalize_or(DVec3::X);
         let up = light.cross(right);
         let (low, high) = picture.shadowed_m;
         let (centre, extents) = (0.5 * (low + high), 0.5 * (high - low));

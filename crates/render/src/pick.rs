@@ -44,7 +44,7 @@ impl SceneView {
         match (&track.actor.form, &track.pose) {
             _ if !near => None,
             (Form::Tube, Body::Curve(curve)) => hit_curve(curve, ray),
-            (Form::Skin(form), Body::Soft(soft)) => hit_skin(form, soft, ray),
+            (Form::Skin(form), Body::Soft(soft)) => hit_skin(&form.surface, soft, ray),
             (Form::Rope { radius_m }, Body::Soft(soft)) => hit_rope(soft, *radius_m, ray),
             (Form::Tool(shape), Body::Tool(tool)) => hit_tool(shape, tool, ray),
             (Form::Solid(solid), Body::Rigid(body)) => {

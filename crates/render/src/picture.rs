@@ -3,6 +3,7 @@
 //! In: the output of [`crate::SceneView`]. Out: the input of [`crate::Renderer`]. Never here: snapshots, the GPU.
 //! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its precision.
 
+use super::environment::Environment;
 use super::level::Shading;
 use super::skin::Skins;
 use bytemuck::{Pod, Zeroable};
@@ -96,6 +97,11 @@ pub struct MeshCorner {
     pub uv: [f32; 2],
 }
 
+impl MeshCorner {
+    /// A corner without a place, for a mesh that has none.
+    pub(super) const NOWHERE: Self = Self { core: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
+}
+
 impl From<&PrimitiveVertex> for MeshCorner {
     fn from(v: &PrimitiveVertex) -> Self {
         Self { core: v.core.to_array(), normal: v.normal.to_array(), uv: v.uv.to_array() }
@@ -143,6 +149,8 @@ pub struct SolidKind {
     pub shading: Shading,
     /// Number of their texture in [`Picture::textures`], from 1; 0 for none.
     pub texture: u32,
+    /// Whether they are meshes of tissue, which has a texture of its own where it is lit per pixel.
+    pub tissue: bool,
     /// Their mesh.
     pub mesh: MeshKey,
 }
@@ -180,6 +188,8 @@ pub struct Picture {
     pub focus_radius_m: f64,
     /// Lower and upper corner of the box around all objects whose shadows are drawn, metres, world axes.
     pub shadowed_m: (DVec3, DVec3),
+    /// What lights it.
+    pub environment: Environment,
     /// Drawing options.
     pub style: Style,
     /// All tubes' samples.
@@ -209,6 +219,7 @@ impl Default for Picture {
             focus_m: DVec3::ZERO,
             focus_radius_m: 1.0,
             shadowed_m: (DVec3::NEG_ONE, DVec3::ONE),
+            environment: Environment::default(),
             style: Style::default(),
             samples: Vec::new(),
             tubes: Vec::new(),

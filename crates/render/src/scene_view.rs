@@ -3,8 +3,9 @@
 //! In: the newest snapshot of each agent and the frame's time. Out: one pose per object, at the time that the choice of [`States`] gives,
 //! and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
+use super::environment::Environment;
 use super::lod_transition::Geomorph;
-use super::picture::Picture;
+use super::picture::{MeshCorner, Picture};
 use super::pose;
 use super::tessellation::SkinEdges;
 use super::texturing::Painting;
@@ -67,12 +68,55 @@ pub enum Form {
     /// Static geometry without snapshots; its level gives the number of triangles.
     Scenery(Model, Placement),
     /// The skin of a sheet or soft solid.
-    Skin(SurfaceShape),
+    Skin(SkinForm),
     /// A rope.
     Rope {
         /// Its radius, metres.
         radius_m: f64,
     },
+}
+
+/// The skin of a sheet or soft solid.
+#[derive(Debug, Clone)]
+pub struct SkinForm {
+    /// Its triangles.
+    pub surface: SurfaceShape,
+    /// Its vertices at rest, in the body's own axes: tissue's texture keeps to them.
+    pub(super) rest: Arc<[MeshCorner]>,
+    /// Their mean distance from their middle, metres.
+    pub(super) mean_radius_m: f64,
+    pub(super) edges: SkinEdges,
+}
+
+impl SkinForm {
+    /// A skin of these triangles, whose vertices are at `rest_m` when nothing bends it, metres.
+    #[must_use]
+    pub fn new(surface: SurfaceShape, rest_m: &[DVec3]) -> Self {
+        let mut normals = vec![DVec3::ZERO; rest_m.len()];
+        for triangle in surface.triangles.iter() {
+            let corner = |k: usize| rest_m.get(triangle[k] as usize).copied().unwrap_or_default();
+            let normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+            for vertex in triangle {
+                if let Some(sum) = normals.get_mut(*vertex as usize) {
+                    *sum += normal;
+                }
+            }
+        }
+        let corner = |(at, normal): (&DVec3, &DVec3)| MeshCorner {
+            core: at.as_vec3().to_array(),
+            normal: normal.normalize_or(DVec3::Z).as_vec3().to_array(),
+            uv: [0.0; 2],
+        };
+        let count = rest_m.len().max(1) as f64;
+        let middle = rest_m.iter().sum::<DVec3>() / count;
+        let mean_radius_m = rest_m.iter().map(|at| at.distance(middle)).sum::<f64>() / count;
+        Self {
+            rest: rest_m.iter().zip(&normals).map(corner).collect(),
+            mean_radius_m: mean_radius_m.max(1e-6),
+            edges: SkinEdges::of(&surface.triangles),
+            surface,
+        }
+    }
 }
 
 /// An agent to be drawn.
@@ -136,8 +180,6 @@ pub(super) struct Track {
     pub geomorph: Option<Geomorph>,
     /// The displayed curve of a rope.
     pub rope: CurveState,
-    /// The edges of the skin of a sheet or soft solid.
-    pub edges: SkinEdges,
     /// Texture of scenery.
     pub painting: Option<Painting>,
 }
@@ -200,6 +242,11 @@ impl SceneView {
         Self { tracks, statics, picture, ..Self::default() }
     }
 
+    /// Chooses what lights the scene from the next picture on.
+    pub fn set_environment(&mut self, environment: Environment) {
+        self.picture.environment = environment;
+    }
+
     /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
     /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
     pub fn set_snapshot(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
@@ -253,10 +300,6 @@ impl Track {
             }
             _ => Body::Nothing,
         };
-        let edges = match &actor.form {
-            Form::Skin(form) => SkinEdges::of(&form.triangles),
-            _ => SkinEdges::default(),
-        };
         let mut track = Self {
             actor,
             body,
@@ -274,7 +317,6 @@ impl Track {
             cut_m: None,
             geomorph: None,
             rope: CurveState::default(),
-            edges,
             painting: None,
         };
         track.bounds = track.find_bounds();

@@ -5,7 +5,8 @@
 
 use super::level::Shading;
 use super::picture::MeshCorner;
-use super::tessellation::{CoarseSkin, FineSkin, SkinEdges, SkinPoint, skin_divisions};
+use super::scene_view::SkinForm;
+use super::tessellation::{CoarseSkin, FineSkin, RestPoint, SkinPoint, skin_divisions};
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceShape;
@@ -22,6 +23,8 @@ const SMOOTH_COS: f64 = 0.5;
 pub struct Skins {
     /// Corners, relative to the picture's origin, metres.
     pub corners: Vec<MeshCorner>,
+    /// The same at rest, metres in their bodies' own axes: where tissue's texture lies. Zero for skins without one.
+    pub rest: Vec<MeshCorner>,
     /// Corners of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Their sides, three per triangle, where edges are drawn.
@@ -39,6 +42,8 @@ pub struct SkinRun {
     pub instance: u32,
     /// Shading.
     pub shading: Shading,
+    /// Whether it is tissue, with a texture where it is lit per pixel.
+    pub tissue: bool,
 }
 
 /// Options of adding one skin.
@@ -54,14 +59,14 @@ pub(super) struct SkinOptions {
     pub edges: bool,
     /// Level of its patches.
     pub n: u8,
+    /// Whether it is tissue.
+    pub tissue: bool,
 }
 
 /// A skin as it is displayed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShownSkin<'a> {
-    pub form: &'a SurfaceShape,
-    /// The edges of its triangles.
-    pub edges: &'a SkinEdges,
+    pub form: &'a SkinForm,
     pub soft: &'a SoftState,
 }
 
@@ -97,6 +102,7 @@ impl Skins {
     /// Clears the list; storage is kept.
     pub(super) fn clear(&mut self) {
         self.corners.clear();
+        self.rest.clear();
         self.triangles.clear();
         self.sides.clear();
         self.runs.clear();
@@ -104,8 +110,8 @@ impl Skins {
 
     /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
     pub(super) fn add(&mut self, skin: ShownSkin<'_>, options: SkinOptions, scratch: &mut SkinScratch) {
-        let SkinOptions { origin, instance, shading, edges, n } = options;
-        let form = skin.form;
+        let SkinOptions { origin, instance, shading, edges, n, tissue } = options;
+        let form = &skin.form.surface;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         scratch.divide(skin, skin_divisions(n));
         let FineSkin { points, triangles, rim, .. } = &scratch.fine;
@@ -114,11 +120,15 @@ impl Skins {
             normal: n.as_vec3().to_array(),
             uv: [0.0; 2],
         };
+        let rest = points.iter().map(|point| if tissue { point.rest.corner() } else { MeshCorner::NOWHERE });
         self.corners.extend(points.iter().map(|point| corner(point.position, point.normal)));
+        self.rest.extend(rest.clone());
         self.triangles.extend(triangles.iter().map(|t| t.map(|point| first + point)));
         if !form.closed {
             let back = first + points.len() as u32;
             self.corners.extend(points.iter().map(|point| corner(point.position, -point.normal)));
+            // the texture of both faces is the same
+            self.rest.extend(rest);
             self.triangles.extend(triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
             for &[a, b] in rim {
                 self.triangles.extend([[first + b, first + a, back + a], [first + b, back + a, back + b]]);
@@ -128,7 +138,7 @@ impl Skins {
             let all = self.triangles[from as usize..].iter();
             self.sides.extend(all.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
         }
-        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading });
+        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading, tissue });
     }
 }
 
@@ -184,7 +194,8 @@ impl SkinScratch {
 
     /// Divides every side of a skin into `parts`, its front where it is open.
     fn divide(&mut self, skin: ShownSkin<'_>, parts: u32) {
-        let ShownSkin { form, edges, soft } = skin;
+        let ShownSkin { form: SkinForm { surface: form, rest, edges, .. }, soft } = skin;
+        let still = |vertex: usize| rest.get(vertex).map(RestPoint::of).unwrap_or_default();
         self.fine.points.clear();
         let vertices = &form.triangles;
         if form.closed {
@@ -192,12 +203,17 @@ impl SkinScratch {
             self.fine.points.extend(self.faces.all.iter().map(|face| SkinPoint {
                 position: soft.positions[face.vertex as usize],
                 normal: face.sum.normalize_or(DVec3::Z),
+                rest: still(face.vertex as usize),
             }));
             self.fine.divide(CoarseSkin { edges, vertices, corners: &self.faces.triangles, parts });
         } else {
             self.find_normals(form, soft);
-            let both = soft.positions.iter().zip(&self.normals);
-            self.fine.points.extend(both.map(|(position, normal)| SkinPoint { position: *position, normal: *normal }));
+            let both = soft.positions.iter().zip(&self.normals).enumerate();
+            self.fine.points.extend(both.map(|(vertex, (position, normal))| SkinPoint {
+                position: *position,
+                normal: *normal,
+                rest: still(vertex),
+            }));
             self.fine.divide(CoarseSkin { edges, vertices, corners: vertices, parts });
         }
     }
@@ -251,10 +267,14 @@ mod tests {
     fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
         let (form, soft) = square();
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false, n: 0 };
-        let shown = ShownSkin { form: &form, edges: &SkinEdges::of(&form.triangles), soft: &soft };
-        skins.add(shown, options, &mut scratch);
-        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
+        let (origin, instance, shading) = (DVec3::ZERO, 7, Shading::Flat);
+        let options = SkinOptions { origin, instance, shading, edges: false, n: 0, tissue: true };
+        let form = SkinForm::new(form, &soft.positions);
+        skins.add(ShownSkin { form: &form, soft: &soft }, options, &mut scratch);
+        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance, shading, tissue: true }]);
+        // either face has the texture of the sheet at rest
+        let rest: Vec<_> = skins.rest.iter().map(|corner| glam::Vec3::from(corner.core).as_dvec3()).collect();
+        assert_eq!(rest, [&soft.positions[..], &soft.positions[..]].concat());
         let thick = |i: u32| {
             let MeshCorner { core, normal, .. } = skins.corners[i as usize];
             (glam::Vec3::from(core) + glam::Vec3::from(normal) * 0.01).as_dvec3()
@@ -290,9 +310,10 @@ mod tests {
     fn a_solid_is_smooth_within_its_sides_and_sharp_at_its_edges() {
         let (form, soft) = cube(0.3);
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false, n: 0 };
-        let shown = ShownSkin { form: &form, edges: &SkinEdges::of(&form.triangles), soft: &soft };
-        skins.add(shown, options, &mut scratch);
+        let (origin, instance, shading) = (DVec3::ZERO, 0, Shading::PerPixel);
+        let options = SkinOptions { origin, instance, shading, edges: false, n: 0, tissue: false };
+        let form = SkinForm::new(form, &soft.positions);
+        skins.add(ShownSkin { form: &form, soft: &soft }, options, &mut scratch);
         assert_eq!(skins.corners.len(), 24, "three sides meet at each of eight vertices");
         for triangle in &skins.triangles {
             let corners = triangle.map(|corner| &skins.corners[corner as usize]);
@@ -302,7 +323,7 @@ mod tests {
         }
         // no data of the previous body is left in the scratch storage
         skins.clear();
-        skins.add(shown, options, &mut scratch);
+        skins.add(ShownSkin { form: &form, soft: &soft }, options, &mut scratch);
         assert_eq!((skins.corners.len(), skins.triangles.len()), (24, 12));
     }
 
@@ -322,9 +343,10 @@ mod tests {
 
     fn at_level(form: &SurfaceShape, soft: &SoftState, n: u8) -> Skins {
         let (mut skins, mut scratch) = (Skins::default(), SkinScratch::default());
-        let options = SkinOptions { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false, n };
-        let shown = ShownSkin { form, edges: &SkinEdges::of(&form.triangles), soft };
-        skins.add(shown, options, &mut scratch);
+        let (origin, instance, shading) = (DVec3::ZERO, 0, Shading::PerPixel);
+        let options = SkinOptions { origin, instance, shading, edges: false, n, tissue: true };
+        let form = SkinForm::new(form.clone(), &soft.positions);
+        skins.add(ShownSkin { form: &form, soft }, options, &mut scratch);
         skins
     }
 

@@ -6,7 +6,8 @@
 //! Both triangles at an edge take its points from one cubic, also where it is sharp and their normals differ: no gap opens.
 //! Nothing is allocated once sizes settle.
 
-use glam::DVec3;
+use super::picture::MeshCorner;
+use glam::{DVec3, Vec3};
 
 /// No triangle on this side of an edge.
 const NONE: u32 = u32::MAX;
@@ -18,7 +19,7 @@ pub const fn skin_divisions(n: u8) -> u32 {
 }
 
 /// The edges of a skin; they never change.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct SkinEdges {
     edges: Vec<Edge>,
     /// The edges of each triangle: from its first corner to its second, and so on.
@@ -38,6 +39,34 @@ struct Edge {
 pub(super) struct SkinPoint {
     pub position: DVec3,
     pub normal: DVec3,
+    /// The same point at rest.
+    pub rest: RestPoint,
+}
+
+/// A point of a skin at rest, in the body's own axes, with its normal of any length: where tissue's texture lies.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct RestPoint {
+    position: Vec3,
+    normal: Vec3,
+}
+
+impl RestPoint {
+    pub fn of(corner: &MeshCorner) -> Self {
+        Self { position: corner.core.into(), normal: corner.normal.into() }
+    }
+
+    pub fn corner(&self) -> MeshCorner {
+        let normal = self.normal.normalize_or(Vec3::Z);
+        MeshCorner { core: self.position.to_array(), normal: normal.to_array(), uv: [0.0; 2] }
+    }
+
+    /// The point with these shares of some points: texture lies on the triangle, not on the patch over it.
+    fn between<const N: usize>(points: [Self; N], shares: [f64; N]) -> Self {
+        points.iter().zip(shares).fold(Self::default(), |sum, (point, share)| Self {
+            position: sum.position + point.position * share as f32,
+            normal: sum.normal + point.normal * share as f32,
+        })
+    }
 }
 
 /// A skin to be divided.
@@ -151,7 +180,8 @@ impl FineSkin {
                 let position =
                     ends[0].position * (v * v * v) + (a * v + b * u) * (3.0 * u * v) + ends[1].position * (u * u * u);
                 let normal = ends[0].normal * (v * v) + middle * (u * v) + ends[1].normal * (u * u);
-                self.points.push(SkinPoint { position, normal: normal.normalize_or(middle) });
+                let rest = RestPoint::between([ends[0].rest, ends[1].rest], [v, u]);
+                self.points.push(SkinPoint { position, normal: normal.normalize_or(middle), rest });
             }
             Strip { corners, from }
         };
@@ -257,6 +287,7 @@ impl Patch {
             position += corner.position * (w * w * w) + (near * w + far * next) * (3.0 * w * next);
             normal += corner.normal * (w * w) + self.between[k] * (w * next);
         }
-        SkinPoint { position, normal: normal.normalize_or(self.corners[0].normal) }
+        let rest = RestPoint::between(self.corners.map(|corner| corner.rest), shares);
+        SkinPoint { position, normal: normal.normalize_or(self.corners[0].normal), rest }
     }
 }

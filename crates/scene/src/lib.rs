@@ -121,12 +121,14 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
             "expected no such key: contacts are solved in clusters; or false, for those that a coupling names alone";
         c.wrong(&Place::new("world", "of `[world]`"), "contacts", "is neither true nor false", expected);
     }
+    let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
         executor: file.executor.unwrap_or_default(),
         priority: file.priority.unwrap_or_default(),
         states: file.states.unwrap_or_default(),
+        environment,
         gravity,
         target: build::target(c, file.target.as_ref()),
         camera: build::camera(c, file.camera.as_ref()),

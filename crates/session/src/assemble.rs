@@ -14,10 +14,12 @@ use metachron_lod::control::{
     ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, RateControl,
     RateDemand, RateLimits, Stages, Value,
 };
-use metachron_render::{Actor, Appearance, Camera, Form, Level, Material, SceneView, StaticObject, Visibility};
+use metachron_render::{
+    Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
+};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
-use metachron_world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
+use metachron_world::kinds::{EnvironmentKind, LawKind, PolicyKind, ShadingKind, ValueKind};
 use metachron_world::{Member, Scene, Scenery, machine};
 use std::sync::Arc;
 
@@ -118,6 +120,11 @@ pub fn scene_view(scene: &Scene) -> SceneView {
     let props = scene.obstacles.iter().zip(&scene.obstacle_appearances);
     let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
+    scene_view.set_environment(match scene.environment {
+        EnvironmentKind::Room => Environment::Room,
+        EnvironmentKind::Sky => Environment::Sky,
+        EnvironmentKind::Endoscope => Environment::Endoscope,
+    });
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
             scene_view.paint(AgentId(id), texture);

@@ -3,10 +3,11 @@
 //! In: a [`Spec`]. Out: a [`Form`], counts of triangles. Never here: states, levels, frames.
 
 use metachron_contact::Agent;
+use metachron_core::Body;
 use metachron_geometry::{Primitive, ShapeKind, Solid, ToolShape, patch};
 use metachron_lod::control::PRIMITIVE_LEVELS;
 use metachron_models::soft::{SoftBody, SoftShape, SoftSpec};
-use metachron_render::{Form, skin_divisions};
+use metachron_render::{Form, SkinForm, skin_divisions};
 use metachron_world::Spec;
 use std::collections::BTreeSet;
 
@@ -26,9 +27,11 @@ fn soft_form(spec: &SoftSpec) -> Form {
     if let SoftShape::Rope { radius_m, .. } = spec.shape {
         return Form::Rope { radius_m };
     }
-    let form = SoftBody::new(spec.clone()).ok().and_then(|body| body.form());
-    match form.as_deref().map(|form| &form.kind) {
-        Some(ShapeKind::Surface(skin)) => Form::Skin(skin.clone()),
+    let Ok(body) = SoftBody::new(spec.clone()) else { return Form::Unseen };
+    match (body.form().as_deref().map(|form| &form.kind), body.start()) {
+        (Some(ShapeKind::Surface(skin)), Body::Soft(start)) => {
+            Form::Skin(SkinForm::new(skin.clone(), &start.positions))
+        }
         _ => Form::Unseen,
     }
 }

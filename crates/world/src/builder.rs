@@ -4,7 +4,9 @@
 //! Never here: files; whether a model can be built is found at [`crate::World::start`].
 
 use super::couplings::Faults;
-use super::kinds::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
+use super::kinds::{
+    EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
+};
 use super::scene::{Appearance, Gains, Machine, Member, PaceWish, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
@@ -318,6 +320,7 @@ impl SceneBuilder {
             executor: ExecutorKind::default(),
             priority: PriorityKind::default(),
             states: StatesKind::default(),
+            environment: EnvironmentKind::default(),
             gravity,
             target: Target {
                 frame_hz: 60.0,

@@ -125,7 +125,7 @@ pub(super) fn shape(member: &Member) -> Option<StartShape> {
             let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
             let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
             let tip = key.tip_m + spec.starts_off_m;
-            (ShapeKind::Tool(shape), Pose::Tool(tip, key.rotation.normalize(), key.jaw), tip - reach, tip + reach)
+            (ShapeKind::Tool(shape), Pose::Tool(tip, spec.start_rotation(), key.jaw), tip - reach, tip + reach)
         }
         Spec::Synthetic(_) => return None,
     };

@@ -1,4 +1,4 @@
-//! Choices by name that a scene makes: executor, priority, policy, law, states, shading, material.
+//! Choices by name that a scene makes: executor, priority, policy, law, states, environment, shading, material.
 //!
 //! Only their names are known here. The runtime, the policies and the renderer give them their meaning.
 
@@ -189,6 +189,19 @@ impl StatesKind {
             Self::Latest => "latest",
         }
     }
+}
+
+/// What lights a scene, and what is seen behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum EnvironmentKind {
+    /// A bright room with a lamp overhead.
+    #[default]
+    Room,
+    /// The open sky with a sun.
+    Sky,
+    /// A dark cavity with a light at the camera's lens.
+    Endoscope,
 }
 
 /// Shading of a surface.

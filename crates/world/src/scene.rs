@@ -6,7 +6,9 @@
 use super::builder::SceneBuilder;
 use super::couplings::{Coupling, Faults};
 use super::initial_overlap::Moved;
-use super::kinds::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
+use super::kinds::{
+    EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
+};
 use super::overlap::Overlap;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
@@ -33,6 +35,8 @@ pub struct Scene {
     pub priority: PriorityKind,
     /// Time at which states are drawn.
     pub states: StatesKind,
+    /// What lights it in pictures.
+    pub environment: EnvironmentKind,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// The target frame rate and how it is held.

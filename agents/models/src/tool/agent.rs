@@ -9,6 +9,7 @@
 use super::drive::{Drive, PointMotion};
 use super::gripper::{Jaws, nearest, nearest_of};
 use super::member::Unknowns;
+use super::pivot::Pivot;
 use super::trajectory::{Pose, Script};
 use super::{ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
@@ -28,6 +29,7 @@ use std::sync::Arc;
 pub struct Tool {
     pub(super) spec: ToolSpec,
     pub(super) script: Script,
+    pub(super) pivot: Option<Pivot>,
     pub(super) tool: ToolState,
     /// The commanded point and its velocity: the tip is there if no contact pushes it.
     pub(super) commanded: PointMotion,
@@ -75,9 +77,14 @@ impl Tool {
     /// [`ToolError`] for a script without keyframes, times that do not rise, and any number outside its range.
     pub fn new(spec: ToolSpec) -> Result<Self, ToolError> {
         spec.check()?;
-        let script = Script::new(&spec.keyframes, spec.repeat);
+        let pivot = spec.pivot();
+        let script = match pivot {
+            Some(pivot) => Script::new(&pivot.thread(&spec.keyframes), spec.repeat),
+            None => Script::new(&spec.keyframes, spec.repeat),
+        };
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
         let tip = tip + spec.starts_off_m;
+        let (tip, rotation) = through(pivot, tip, rotation);
         let spin = DVec3::ZERO;
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
@@ -87,6 +94,7 @@ impl Tool {
         Ok(Self {
             spec,
             script,
+            pivot,
             tool,
             commanded,
             drive,
@@ -103,7 +111,11 @@ impl Tool {
     /// Target of the user spring for the tip.
     pub(super) fn user_target(&self, spring: &AnchorSpring) -> PointMotion {
         let local = if let Anchor::Local(local) = spring.anchor { local } else { DVec3::ZERO };
-        PointMotion { position: spring.target - self.tool.rotation * local, velocity: spring.target_velocity }
+        let held = PointMotion { position: spring.target, velocity: spring.target_velocity };
+        match &self.pivot {
+            Some(pivot) => pivot.tip_for(&self.tool, local, held),
+            None => PointMotion { position: held.position - self.tool.rotation * local, ..held },
+        }
     }
 
     /// Whether jaws led by a user would close on what is near.
@@ -127,7 +139,8 @@ impl Tool {
         let off = decay(self.commanded.relative_to(start), RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
         let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
-        let turned_off = self.tool.rotation * from.rotation.conjugate();
+        let (_, scripted) = through(self.pivot, self.tool.tip, from.rotation);
+        let turned_off = self.tool.rotation * scripted.conjugate();
         let rotation = if turned_off.w.abs() >= 1.0 - SAME_TURN {
             to.rotation
         } else {
@@ -163,9 +176,17 @@ impl Tool {
         if rests {
             self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
             (self.tool.tip, self.tool.velocity) = (end.tip, DVec3::ZERO);
+            (_, self.tool.rotation) = through(self.pivot, end.tip, self.tool.rotation);
         }
         rests
     }
+}
+
+/// The pose of a tool with its tip as near to `tip` as it reaches, and its shaft through the pivot if it has one.
+pub(super) fn through(pivot: Option<Pivot>, tip: DVec3, rotation: DQuat) -> (DVec3, DQuat) {
+    let Some(pivot) = pivot else { return (tip, rotation) };
+    let tip = pivot.within(tip, rotation);
+    (tip, pivot.aligned(rotation, tip))
 }
 
 /// The shape of every tool.

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/coupling.md, eq. 9d; docs/theory/clusters.md, section 9.
 
 use super::Tool;
-use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin};
+use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin, through};
 use super::drive::{Drive, PointMotion};
 use super::gripper::Jaws;
 use super::spec::REACH_MAX_M;
@@ -80,14 +80,17 @@ impl Tool {
     /// Where it is led to in `h_s` seconds.
     fn lead(&self, h_s: f64) -> ToolState {
         let Unknowns { hand, is_near, time, .. } = &self.unknowns;
-        match hand {
+        let led = match hand {
             Some(spring) => self.follow_user_spring(spring, h_s, *is_near),
             None => {
                 let end = *time + span(h_s);
                 let [from, to] = [*time, end].map(|time| self.script.at(time.as_secs_f64()));
                 self.follow_script(&from, &to, h_s)
             }
-        }
+        };
+        let (tip, rotation) = through(self.pivot, led.tip, led.rotation);
+        let velocity = if tip == led.tip { led.velocity } else { (tip - self.commanded.position) / h_s };
+        ToolState { tip, rotation, velocity, ..led }
     }
 }
 
@@ -105,6 +108,11 @@ impl Tool {
         self.jaws.move_to(&self.spec, was, &self.tool, context);
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.tool.admits = self.open_for(context, dt_s);
+    }
+
+    /// How the point `arm_m` from its tip moves with the tip.
+    fn side_at(&self, arm_m: DVec3) -> Side {
+        self.pivot.map_or_else(|| Side::node(0, 0), |pivot| pivot.side(self.tool.tip, arm_m))
     }
 
     /// The velocity of its tip at the end of the step begun, of `h_s` seconds, where nothing but its drive acts on it, m/s.
@@ -137,7 +145,10 @@ impl ClusterMember for Tool {
         let most_n = if self.drive.is_saturated() { 0.0 } else { self.spec.max_force_n };
         let change = led_m_s + self.drive.rate() - self.tool.velocity;
         unknowns.free = [self.tool.velocity + change.clamp_length_max(most_n * h_s / self.drive.mass_kg())];
-        unknowns.led_rad_s = spin(self.tool.rotation, led.rotation, h_s);
+        // with a pivot the tip's own velocity turns the shaft, and only the turn about it is led
+        let (_, rotation) =
+            self.pivot.map_or((led.tip, led.rotation), |_| through(self.pivot, self.tool.tip, led.rotation));
+        unknowns.led_rad_s = spin(self.tool.rotation, rotation, h_s);
         unknowns.jaw_per_s = (led.jaw - self.tool.jaw) / h_s;
         (unknowns.led, unknowns.led_m_s) = (led, led_m_s);
         Ok(())
@@ -166,8 +177,9 @@ impl ClusterMember for Tool {
         Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::node(0, 0)
+    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
+        let Place::Point(point) = *place else { return Side::node(0, 0) };
+        self.side_at(point - self.tool.tip)
     }
 
     fn led_m_s(&self, place: &Place) -> DVec3 {
@@ -181,15 +193,17 @@ impl ClusterMember for Tool {
         let Anchor::Local(local) = anchor else { return None };
         let arm = self.tool.rotation * local;
         let led_m_s = self.unknowns.led_rad_s.cross(arm);
-        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(self.tool.tip + arm, Side::node(0, 0)) })
+        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(self.tool.tip + arm, self.side_at(arm)) })
     }
 
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let way = v.first().map_or(DVec3::ZERO, |v| *v * t_s);
         let led_rad_s = self.unknowns.led_rad_s;
         let centre_m = self.tool.tip + way;
-        let rotation = DQuat::from_scaled_axis(led_rad_s * t_s) * self.tool.rotation;
-        Some(Pose { centre_m, origin_m: centre_m, rotation, turns: Side::FIXED, led_rad_s })
+        let rolled = DQuat::from_scaled_axis(led_rad_s * t_s) * self.tool.rotation;
+        let rotation = self.pivot.map_or(rolled, |pivot| pivot.aligned(rolled, centre_m));
+        let turns = self.pivot.map_or(Side::FIXED, |pivot| pivot.turns(self.tool.tip));
+        Some(Pose { centre_m, origin_m: centre_m, rotation, turns, led_rad_s })
     }
 
     fn drive(&self) -> Option<stepper::Drive> {
@@ -214,7 +228,10 @@ impl ClusterMember for Tool {
     fn speed_bound(&self, v: &[DVec3]) -> f64 {
         let (front, back, side_m) = reach();
         let Unknowns { led_rad_s, jaw_per_s, .. } = self.unknowns;
-        v[0].length() + led_rad_s.length() * (front.length().max(back.length()) + side_m) + jaw_per_s.abs() * side_m
+        let reach_m = front.length().max(back.length()) + side_m;
+        let moved_m_s = v[0].length();
+        let moved_m_s = self.pivot.map_or(moved_m_s, |pivot| pivot.speed_bound(self.tool.tip, moved_m_s, reach_m));
+        moved_m_s + led_rad_s.length() * reach_m + jaw_per_s.abs() * side_m
     }
 
     fn keep(&mut self) {
@@ -245,9 +262,17 @@ impl ClusterMember for Tool {
         let Unknowns { led, led_m_s, led_rad_s, free, .. } = self.unknowns;
         let pushed_n_s = (v[0] - free[0]) * self.drive.mass_kg();
         let to = PointMotion { position: led.tip, velocity: led.velocity };
-        let driven = self.drive.follow(to, [led_m_s, v[0]], h_s);
+        // the tip comes to a stop where the shaft ends
+        let moved_m_s = self.pivot.map_or(v[0], |pivot| {
+            let (from, to) = (self.tool.tip, self.tool.tip + v[0] * h_s);
+            let stop = pivot.within(to, self.tool.rotation);
+            if stop == to { v[0] } else { (stop - from) / h_s }
+        });
+        let driven = self.drive.follow(to, [led_m_s, moved_m_s], h_s);
         self.commanded = driven.commanded;
-        let tip = ToolState { tip: driven.tip.position, velocity: driven.tip.velocity, ..led };
+        let (position, rotation) = through(self.pivot, driven.tip.position, led.rotation);
+        let turned_rad_s = self.pivot.map_or(DVec3::ZERO, |pivot| pivot.spin_rad_s(position, driven.tip.velocity));
+        let tip = ToolState { tip: position, rotation, velocity: driven.tip.velocity, ..led };
         self.speed_m_s = speed(&self.tool, &tip, h_s);
         let force_n = (pushed_n_s - driven.impulse_n_s).length() / h_s;
         let unknowns = &mut self.unknowns;
@@ -260,7 +285,7 @@ impl ClusterMember for Tool {
         self.lag_m = tip.tip.distance(wanted);
         let over = self.script.is_over(self.unknowns.time.as_secs_f64());
         let is_idle = self.unknowns.hand.is_none() && over && self.has_reached(&end);
-        self.tool = ToolState { spin: led_rad_s, is_idle, force_n, ..tip };
+        self.tool = ToolState { spin: led_rad_s + turned_rad_s, is_idle, force_n, ..tip };
         self.jaws.age(h_s);
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.steps += 1;

@@ -4,12 +4,14 @@
 //! Never here: the grasp force; it is a row of the cluster's problem.
 //!
 //! `trajectory.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `gripper.rs` the
-//! grasp, `agent.rs` is the agent, `member.rs` what it is in a contact cluster.
+//! grasp, `pivot.rs` the
+//! point that the shaft of one in a trocar passes through, `agent.rs` is the agent, `member.rs` what it is in a contact cluster.
 
 mod agent;
 mod drive;
 mod gripper;
 mod member;
+mod pivot;
 mod spec;
 mod trajectory;
 

@@ -23,6 +23,10 @@ pub struct ToolSpec {
     pub max_force_n: f64,
     /// The agents it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
+    /// The remote centre of motion, metres: a fixed point that the shaft passes through wherever the tip is, as through a trocar; the
+    /// rotations of keyframes then only turn the tool about its shaft. The pivot is on the shaft ([`ToolSpec::insertion_m`]) in every
+    /// keyframe; a tip led farther away, or nearer, stops there. `None` for a tool whose rotation is led.
+    pub pivot_m: Option<DVec3>,
     /// Offset of the tip's start from the first keyframe, metres: it approaches its path from there as after a user spring.
     pub starts_off_m: DVec3,
 }
@@ -69,6 +73,21 @@ pub enum ToolError {
         /// The range it must be in.
         wanted: &'static str,
     },
+    /// The tip of a keyframe is so far from the pivot, or so near, that the pivot is not on the shaft.
+    #[error(
+        "keyframe {index} has its tip {depth_m} m from the pivot; it must be between {least_m} and {most_m} m away, with the pivot on \
+         the shaft"
+    )]
+    Unreachable {
+        /// Number of the keyframe, from 0.
+        index: usize,
+        /// Distance from the pivot to the tip, metres.
+        depth_m: f64,
+        /// Its least, metres.
+        least_m: f64,
+        /// Its greatest, metres.
+        most_m: f64,
+    },
     /// A number of the tool is outside its range.
     #[error("{what} is {value}; it must be {wanted}")]
     BadNumber {
@@ -112,9 +131,14 @@ impl ToolSpec {
             within(off_m, 0.0, REACH_MAX_M),
             "finite, within 1e6 m",
         )?;
+        let pivot = self.pivot();
+        for value in self.pivot_m.map_or([0.0; 3], |pivot_m| pivot_m.to_array()) {
+            number("the pivot", value, within(value, -REACH_MAX_M, REACH_MAX_M), "finite, within 1e6 m")?;
+        }
         let mut before_s = f64::NEG_INFINITY;
         for (index, key) in self.keyframes.iter().enumerate() {
             key.check(index)?;
+            pivot.map_or(Ok(()), |pivot| pivot.check(index, key))?;
             if key.at_s <= before_s {
                 return Err(ToolError::NotRising { index, at_s: key.at_s, before_s });
             }

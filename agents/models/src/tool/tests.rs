@@ -23,6 +23,7 @@ fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![TUBE],
+        pivot_m: None,
         starts_off_m: DVec3::ZERO,
     }
 }
@@ -106,6 +107,51 @@ fn a_tool_follows_its_script_to_the_bit() {
     stage.run(1.5);
     assert_eq!(state(&stage.tool).tip, DVec3::Z);
     assert!(stage.step().at_rest);
+}
+
+#[test]
+fn a_shaft_passes_through_its_pivot_all_along_a_script_and_a_user_s_way() {
+    let pivot_m = DVec3::new(0.0, 0.0, 0.3);
+    let tips = [DVec3::new(0.05, 0.0, 0.1), DVec3::new(-0.04, 0.06, 0.12), DVec3::new(0.0, -0.05, 0.2)];
+    let keys = tips.iter().zip(0..).map(|(tip, i)| key(f64::from(i), *tip, 1.0)).collect();
+    let mut stage = Stage::new(ToolSpec { pivot_m: Some(pivot_m), ..spec(keys) });
+    let check = |stage: &Stage, what: &str| {
+        let ToolState { tip, rotation, .. } = state(&stage.tool);
+        let local = rotation.conjugate() * (pivot_m - tip);
+        // on the axis, and inserted by the distance between tip and pivot
+        assert!(local.distance(DVec3::NEG_Z * tip.distance(pivot_m)) < 1e-12, "{what}: {local}");
+    };
+    check(&stage, "start");
+    for _ in 0..150 {
+        stage.step();
+        check(&stage, "script");
+    }
+    for i in 0..200 {
+        let user = hand(DVec3::new(0.002 * f64::from(i) - 0.2, 0.1, 0.05));
+        stage.step_with(&[user]).unwrap();
+        check(&stage, "user");
+    }
+    // farther than the shaft is long it stops, on the line to where it is led
+    let far = DVec3::new(3.0, 0.0, -3.7);
+    (0..200).for_each(|_| drop(stage.step_with(&[hand(far)])));
+    check(&stage, "far");
+    let stop = pivot_m + DVec3::new(3.0, 0.0, -4.0) / 5.0 * ToolSpec::insertion_m().end();
+    assert!(state(&stage.tool).tip.distance(stop) < 1e-6, "{}", state(&stage.tool).tip);
+    stage.run(4.0);
+    assert!(state(&stage.tool).tip.distance(tips[2]) < 1e-4);
+}
+
+#[test]
+fn a_pivot_that_no_shaft_passes_through_is_refused() {
+    let refuse =
+        |pivot_m| Tool::new(ToolSpec { pivot_m: Some(pivot_m), ..spec(vec![key(0.0, DVec3::Y, 1.0)]) }).unwrap_err();
+    for away_m in [0.0, 0.024, 0.326, 5.0] {
+        let error = refuse(DVec3::new(0.0, 1.0, away_m));
+        assert!(matches!(error, ToolError::Unreachable { index: 0, .. }), "{error}");
+    }
+    for bad in [DVec3::NAN, DVec3::Y * f64::INFINITY] {
+        assert!(matches!(refuse(bad), ToolError::BadNumber { .. }));
+    }
 }
 
 #[test]

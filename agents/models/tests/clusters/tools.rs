@@ -1,7 +1,7 @@
 //! Tools and led bodies in clusters: what a drive presses with, what jaws hold, what a led body pushes.
 
 use crate::bodies::{block, cube, rigid, sheet};
-use crate::table::{GRAVITY, Table, placed};
+use crate::table::{GRAVITY, Table, placed, spring};
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
@@ -24,6 +24,7 @@ fn tool(keys: &[(f64, DVec3, f64)], max_force_n: f64, graspable: Vec<AgentId>) -
         damping_n_s_m: 2.0,
         max_force_n,
         graspable,
+        pivot_m: None,
         starts_off_m: DVec3::ZERO,
     })
     .unwrap()
@@ -127,6 +128,39 @@ fn jaws_lift_a_box_and_both_are_told_its_weight() {
         let wanted = DVec3::Y * (-weight_n * 0.01 / (400.0 * 0.02 * 0.02 + weight_n * 0.02));
         assert!(turned.distance(wanted) < 2e-4, "turned by {turned}, not {wanted}");
     }
+}
+
+#[test]
+fn what_hangs_on_a_shaft_in_a_pivot_weighs_on_its_tip_by_the_lever() {
+    // 0.1 kg on the shaft at 0.1 m from the pivot, of a tip at 0.2 m from it; a drive of 20 N gives 5 mm
+    let (mass_kg, tip) = (0.1, DVec3::new(0.2, 0.0, 0.5));
+    let weight =
+        RigidSpec { gravity: GRAVITY, ..rigid(Solid::Ball { radius_m: 0.01 }, DVec3::new(0.1, 0.0, 0.4), mass_kg) };
+    let keyframes = vec![Keyframe { at_s: 0.0, tip_m: tip, rotation: DQuat::IDENTITY, jaw: 0.0 }];
+    let spec = ToolSpec {
+        keyframes,
+        repeat: false,
+        reach_m: 0.02,
+        stiffness_n_m: 400.0,
+        damping_n_s_m: 2.0,
+        max_force_n: 20.0,
+        graspable: vec![],
+        pivot_m: Some(up(0.5)),
+        starts_off_m: DVec3::ZERO,
+    };
+    let bodies = vec![placed(RigidBody::new(weight).unwrap(), false), placed(Tool::new(spec).unwrap(), false)];
+    let mut table = Table::new(bodies).at_rates(240.0, 240.0);
+    table.link([(0, Anchor::Local(DVec3::ZERO)), (1, Anchor::Local(up(-0.1)))], spring(400.0, 8.0, 0.1));
+    while table.time.as_secs_f64() < 3.0 {
+        table.step();
+    }
+    let ToolState { tip: now, rotation, force_n, .. } = state(&table, 1);
+    let felt_n = 0.5 * mass_kg * -GRAVITY.z;
+    assert!((force_n - felt_n).abs() < 2e-3 * felt_n, "{force_n} N instead of {felt_n}");
+    // the drive is aligned with the world, and the shaft with the pivot whatever weighs on it
+    assert!((tip.z - now.z - felt_n * 5e-3 / 20.0).abs() < 1e-6, "the tip is at {now}");
+    let behind = rotation.conjugate() * (up(0.5) - now);
+    assert!(behind.truncate().length() < 1e-12, "the pivot is at {behind} of the tool");
 }
 
 /// A box that is led along x: it has no mass, and nothing stops it.

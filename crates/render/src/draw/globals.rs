@@ -1,8 +1,9 @@
-//! The uniforms that every shader of a frame shares, and the light.
+//! The uniforms that every shader of a frame shares, and the light of an environment as shader source.
 //!
 //! In: a picture and a camera. Out: one uniform block. Never here: the GPU.
 
-use super::super::light_volume::{LIGHT, LightColumn};
+use super::super::environment::{Environment, EnvironmentLight};
+use super::super::light_volume::LightColumn;
 use super::super::picture::{Colouring, FloorDraw, Picture};
 use super::super::view::{Camera, Size};
 use bytemuck::{Pod, Zeroable};
@@ -24,6 +25,9 @@ pub struct Globals {
     patch_centre: [f32; 4],
     patch_x: [f32; 4],
     patch_y: [f32; 4],
+    view_forward: [f32; 4],
+    view_right: [f32; 4],
+    view_up: [f32; 4],
     materials: [[f32; 4]; 8],
 }
 
@@ -43,12 +47,22 @@ const MATERIALS: [[f32; 4]; 8] = [
     [0.1800, 1.6, 0.20, 0.0],
 ];
 
-/// The constants of the light, as shader source.
-pub fn light_source() -> String {
-    let light = LIGHT.normalize();
-    let lamp_x = (LAMP_SIDE - light * LAMP_SIDE.dot(light)).normalize();
+/// The constants of an environment's light, as shader source: constants cost a software rasteriser nothing.
+pub fn light_source(environment: Environment) -> String {
+    let EnvironmentLight { toward, key, sky, ground, lamp, at_camera, far_share, fades } = environment.light();
+    let lamp_x = (LAMP_SIDE - toward * LAMP_SIDE.dot(toward)).normalize();
     let line = |name, v: DVec3| format!("const {name} = vec3f({:.9}, {:.9}, {:.9});\n", v.x, v.y, v.z);
-    [line("LIGHT", light), line("LAMP_X", lamp_x), line("LAMP_Y", light.cross(lamp_x))].concat()
+    [
+        line("LIGHT", toward),
+        line("LAMP_X", lamp_x),
+        line("LAMP_Y", toward.cross(lamp_x)),
+        line("KEY", key),
+        line("SKY", sky),
+        line("GROUND", ground),
+        line("LAMP", lamp),
+        format!("const FAR_SHARE = {far_share:.9};\nconst AT_CAMERA = {at_camera};\nconst FADES = {fades};\n"),
+    ]
+    .concat()
 }
 
 impl Globals {
@@ -64,11 +78,13 @@ impl Globals {
         let colour = floor.map_or([0; 3], |f| f.colour).map(|c| (f64::from(c) / 255.0).powf(2.2));
         let patch = floor.map_or_else(Patch::default, |floor| frame.patch(floor, picture.origin));
         let reach = patch.reach(floor.map_or(focus, |f| f.below(focus)), radius);
+        // half the picture's width and height one metre away
+        let half = DVec2::new(f64::from(size.width), f64::from(size.height)) * (0.5 * pixel);
         Self {
             view_projection: camera.view_projection(size, picture.origin).to_cols_array(),
             light_projection: frame.projection(picture.origin).as_mat4().to_cols_array(),
             eye: four(camera.eye() - picture.origin, frame.texel_m),
-            texel: [1.0 / shadow_px as f32; 4],
+            texel: [1.0 / shadow_px as f32, camera.distance_m as f32, 0.0, 0.0],
             focus: four(focus, radius),
             viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, pixel).as_vec4().to_array(),
             floor_point: four(floor.map_or(DVec3::ZERO, |f| f.point), 0.0),
@@ -77,6 +93,9 @@ impl Globals {
             patch_centre: four(patch.centre, reach),
             patch_x: four(patch.x, 0.0),
             patch_y: four(patch.y, 0.0),
+            view_forward: four(camera.forward(), 0.0),
+            view_right: four(camera.right() * half.x, 0.0),
+            view_up: four(camera.up() * half.y, 0.0),
             materials: MATERIALS,
         }
     }

@@ -15,6 +15,7 @@ mod textures;
 mod timing;
 mod tissue;
 
+use super::environment::Environment;
 use super::offscreen::DeviceLoss;
 use super::picture::{Picture, SkinSample, SolidInstance};
 use super::view::{Camera, Size};
@@ -23,7 +24,7 @@ use buffers::{Growing, Targets};
 use cuts::Cuts;
 use globals::Globals;
 use meshes::Meshes;
-use pipelines::Pipelines;
+use pipelines::{Pipelines, Setup};
 use skins::SkinBuffers;
 use std::time::{Duration, Instant};
 use textures::Textures;
@@ -112,9 +113,9 @@ pub enum DrawError {
 pub struct Renderer {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    options: RendererOptions,
-    format: wgpu::TextureFormat,
+    setup: Setup,
     lost: DeviceLoss,
+    layouts: Layouts,
     pipelines: Pipelines,
     bindings: Bindings,
     meshes: Meshes,
@@ -147,13 +148,13 @@ impl Renderer {
         };
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let layouts = Layouts::new(device);
-        let pipelines = Pipelines::new(device, &layouts, format, options);
+        let setup = Setup { format, options, environment: Environment::default() };
+        let pipelines = Pipelines::new(device, &layouts, setup);
         let bindings = Bindings::new(device, queue, &layouts, options.shadow_px);
         let renderer = Self {
             device: device.clone(),
             queue: queue.clone(),
-            options,
-            format,
+            setup,
             lost,
             pipelines,
             bindings,
@@ -162,7 +163,8 @@ impl Renderer {
             samples: Growing::new("tube samples", size_of::<SkinSample>()),
             instances: Growing::new("solid instances", size_of::<SolidInstance>()),
             skins: SkinBuffers::default(),
-            textures: Textures::new(device, layouts.texture),
+            textures: Textures::new(device, layouts.texture.clone()),
+            layouts,
             targets: None,
             timing: Timing::new(device, queue),
         };
@@ -179,7 +181,7 @@ impl Renderer {
     /// The options in use.
     #[must_use]
     pub fn options(&self) -> RendererOptions {
-        self.options
+        self.setup.options
     }
 
     /// Draws `picture` as seen by `camera` and submits the work; it does not wait for the GPU.
@@ -195,6 +197,7 @@ impl Renderer {
             return Ok(DrawTimes::default());
         }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        self.prepare_light(picture.environment);
         self.upload(picture, camera, target.size);
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         let shadows = self.draw_shadows(&mut encoder, picture);
@@ -236,8 +239,16 @@ impl Renderer {
         Ok(())
     }
 
+    /// Makes the pipelines anew where the picture has another light than the one before: rare, and 0.1 s.
+    fn prepare_light(&mut self, environment: Environment) {
+        if self.setup.environment != environment {
+            self.setup.environment = environment;
+            self.pipelines = Pipelines::new(&self.device, &self.layouts, self.setup);
+        }
+    }
+
     fn upload(&mut self, picture: &Picture, camera: &Camera, size: Size) {
-        let globals = Globals::new(picture, camera, size, self.options.shadow_px);
+        let globals = Globals::new(picture, camera, size, self.setup.options.shadow_px);
         self.queue.write_buffer(&self.bindings.globals, 0, bytemuck::bytes_of(&globals));
         self.samples.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.samples));
         self.instances.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.instances));
@@ -246,7 +257,7 @@ impl Renderer {
         self.cuts.prepare(&self.device, &self.queue, picture);
         self.textures.prepare(&self.device, &self.queue, picture);
         if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
-            self.targets = Some(Targets::new(&self.device, self.format, size, self.options.samples));
+            self.targets = Some(Targets::new(&self.device, self.setup.format, size, self.setup.options.samples));
         }
     }
 }

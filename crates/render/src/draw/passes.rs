@@ -2,8 +2,8 @@
 //!
 //! In: a picture whose meshes and uniforms are uploaded. Out: draws. Never here: uploads, pipelines, submission.
 
-use super::super::level::Shading;
 use super::super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
+use super::super::skin::SkinRun;
 use super::cuts::MorphedCut;
 use super::meshes::Mesh;
 use super::timing::Timing;
@@ -23,9 +23,12 @@ impl Renderer {
         });
         pass.set_bind_group(0, &self.bindings.light, &[]);
         // the outermost texels stay empty: everything past the map is lit
-        let inner = self.options.shadow_px - 2;
+        let inner = self.setup.options.shadow_px - 2;
         pass.set_scissor_rect(1, 1, inner, inner);
         let mut draws = 0;
+        if !picture.environment.throws_shadows() {
+            return draws;
+        }
         pass.set_pipeline(&self.pipelines.skin_shadow);
         for tube in &picture.tubes {
             let mesh = self.meshes.patch(tube.n.min(SHADOW_LEVEL));
@@ -73,7 +76,7 @@ impl Renderer {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
-        draws += self.draw_skins(&mut pass, picture, |shading| self.pipelines.solid_of(shading, false), false);
+        draws += self.draw_skins(&mut pass, picture, |run| self.pipelines.hide_of(run.tissue, run.shading), false);
         if picture.style.wireframe {
             draws += self.draw_edges(&mut pass, picture);
         }
@@ -109,14 +112,14 @@ impl Renderer {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         picture: &Picture,
-        pipeline: impl Fn(Shading) -> &'a wgpu::RenderPipeline,
+        pipeline: impl Fn(&SkinRun) -> &'a wgpu::RenderPipeline,
         edges: bool,
     ) -> u32 {
         let Some(instances) = self.instances.buffer() else { return 0 };
         let stride = size_of::<SolidInstance>() as u64;
         let drawn = picture.skins.runs.iter().map(|run| {
             let from = u64::from(run.instance) * stride;
-            pass.set_pipeline(pipeline(run.shading));
+            pass.set_pipeline(pipeline(run));
             pass.set_vertex_buffer(1, instances.slice(from..from + stride));
             self.skins.draw(pass, run, edges)
         });
@@ -128,6 +131,7 @@ impl Renderer {
         match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
             _ if self.meshes.is_strokes(run.kind.mesh) => &self.pipelines.stroke,
+            (_, shading) if run.kind.tissue => self.pipelines.hide_of(true, shading),
             (_, shading) => self.pipelines.solid_of(shading, run.kind.texture > 0),
         }
     }

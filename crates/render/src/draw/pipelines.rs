@@ -2,17 +2,32 @@
 //!
 //! In: a device and a format. Out: pipelines. Never here: a frame, bind groups.
 
+use super::super::environment::Environment;
 use super::super::level::Shading;
 use super::RendererOptions;
 use super::bindings::{DEPTH, Layouts};
+use wgpu::PrimitiveTopology::{LineList, TriangleList};
 use wgpu::{Device, RenderPipeline, ShaderModule, TextureFormat, VertexBufferLayout};
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
 const SKIN: &str = include_str!("shaders/skin.wgsl");
 const SOLID: &str = include_str!("shaders/solid.wgsl");
 const PAINTED: &str = include_str!("shaders/painted.wgsl");
+const TISSUE: &str = include_str!("shaders/tissue.wgsl");
+const HIDE: &str = include_str!("shaders/hide.wgsl");
 const STROKE: &str = include_str!("shaders/stroke.wgsl");
 const FLOOR: &str = include_str!("shaders/floor.wgsl");
+
+/// What pipelines are made for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Setup {
+    /// The format of targets.
+    pub format: TextureFormat,
+    /// Quality settings.
+    pub options: RendererOptions,
+    /// The light, which is written into the shaders.
+    pub environment: Environment,
+}
 
 /// Every pipeline of a renderer.
 #[derive(Debug)]
@@ -37,6 +52,8 @@ pub struct Pipelines {
     pub skins_shadowed: [RenderPipeline; 2],
     /// Solids in soft shadow: plain, textured.
     pub solids_shadowed: [RenderPipeline; 2],
+    /// Skins of soft bodies that are tissue, plain and in soft shadow.
+    pub hides: [RenderPipeline; 2],
     /// Points and lines that turn to the camera.
     pub stroke: RenderPipeline,
     /// Points and lines in the shadow map.
@@ -85,7 +102,7 @@ const CORNER_STRIDE: u64 = 32;
 
 /// Cells along a side of the floor's shadowed patch, and rings around it; the shader uses the same numbers.
 const FLOOR_CELLS: u32 = 8;
-const FLOOR_RINGS: u32 = 8;
+const FLOOR_RINGS: u32 = 12;
 const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
 const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
 
@@ -116,15 +133,16 @@ fn layout(
 }
 
 impl Pipelines {
-    /// All pipelines for targets of `format`.
-    pub fn new(device: &Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
-        let light = super::globals::light_source();
+    /// All pipelines of a renderer in an environment.
+    pub fn new(device: &Device, layouts: &Layouts, setup: Setup) -> Self {
+        let Setup { format, options, environment } = setup;
+        let light = super::globals::light_source(environment);
         let module = |label, source: &str| {
             let source = wgpu::ShaderSource::Wgsl(format!("{light}{COMMON}\n{source}").into());
             device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
         };
-        let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
-        let painted = module("painted", &[SOLID, PAINTED].concat());
+        let (solid, floor) = (module("solid", SOLID), module("floor", FLOOR));
+        let (skin, painted) = (module("skin", &[TISSUE, SKIN].concat()), module("painted", &[SOLID, PAINTED].concat()));
         let builder = PipelineBuilder::new(device, layouts, format, options);
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
@@ -137,7 +155,6 @@ impl Pipelines {
             layout(BODY_STRIDE, instance, &BODY),
             layout(CORNER_STRIDE, vertex, &CORNER_TO),
         ];
-        use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
             builder.create(&PipelineDesc { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
         };
@@ -169,6 +186,7 @@ impl Pipelines {
                 solid("shadowed solid", "vs_solid", Some("fs_solid_shadowed"), TriangleList),
                 builder.painted(&solids, &painted, "fs_painted_shadowed"),
             ],
+            hides: builder.hides(&solids, &module("hide", &[SOLID, TISSUE, HIDE].concat())),
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
@@ -189,6 +207,15 @@ impl Pipelines {
             Shading::Shadowed => &self.skins_shadowed[usize::from(tissue)],
             Shading::PerPixel | Shading::Textured if tissue => &self.tissue,
             Shading::PerPixel | Shading::Textured => &self.skin,
+        }
+    }
+
+    /// The pipeline for the skins of soft bodies of a shading.
+    pub fn hide_of(&self, tissue: bool, shading: Shading) -> &RenderPipeline {
+        match shading {
+            Shading::PerPixel | Shading::Textured if tissue => &self.hides[0],
+            Shading::Shadowed if tissue => &self.hides[1],
+            _ => self.solid_of(shading, false),
         }
     }
 
@@ -221,7 +248,7 @@ impl<'a> PipelineBuilder<'a> {
 
     /// The floor in its parts, and how many corners each has.
     fn floor(&self, module: &ShaderModule, lean: bool) -> Vec<(RenderPipeline, u32)> {
-        use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
+        use wgpu::PrimitiveTopology::TriangleStrip;
         if !lean {
             return vec![(self.plain(module, "vs_floor", "fs_floor", TriangleStrip), 4)];
         }
@@ -252,6 +279,15 @@ impl<'a> PipelineBuilder<'a> {
         let topology = wgpu::PrimitiveTopology::TriangleList;
         [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
             self.create(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
+        })
+    }
+
+    /// Pipelines for soft bodies of tissue, plain and in soft shadow.
+    fn hides(&self, buffers: &[Option<VertexBufferLayout<'_>>], module: &ShaderModule) -> [RenderPipeline; 2] {
+        let (vertex, topology) = ("vs_hide", wgpu::PrimitiveTopology::TriangleList);
+        ["fs_hide", "fs_hide_shadowed"].map(|fragment| {
+            let fragment = Some(fragment);
+            self.create(&PipelineDesc { label: "hide", vertex, fragment, buffers, topology, module })
         })
     }
 

@@ -1,5 +1,6 @@
 //! Pictures drawn on the adapter present, compared with what they must show.
 mod adapter;
+mod light;
 mod painting;
 mod scenery;
 mod stage;

@@ -3,17 +3,21 @@
 use super::mesh;
 use super::mesh::Mesh;
 use super::object::ModelContext;
+use super::scenery::{SurfaceSource, generator, surface_source};
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid, generate_surface};
 use metachron_models::rigid::RigidSpec;
 use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.
 const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
+
+/// Triangles of generated surfaces.
+const TRIANGLES: Allowed = allowed(4.0..=1e5, "");
 
 const MASS: Allowed = allowed(1e-9..=1e9, "kg");
 
@@ -100,7 +104,7 @@ const fn keys_of(shape: Shape) -> &'static [&'static str] {
         Shape::Box => &["half_extents_m"],
         Shape::Capsule | Shape::Cylinder => &["radius_m", "half_height_m"],
         Shape::Plane => &[],
-        Shape::Hull | Shape::Mesh => &["file", "scale"],
+        Shape::Hull | Shape::Mesh => &["file", "generate", "seed", "triangles", "scale"],
     }
 }
 
@@ -112,6 +116,9 @@ fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) ->
         ("half_extents_m", file.half_extents_m.is_some()),
         ("half_height_m", file.half_height_m.is_some()),
         ("file", file.file.is_some()),
+        ("generate", file.generate.is_some()),
+        ("seed", file.seed.is_some()),
+        ("triangles", file.triangles.is_some()),
         ("scale", file.scale.is_some()),
     ];
     let name = format!("{:?}", file.shape).to_lowercase();
@@ -123,7 +130,8 @@ fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) ->
         if is_given && !takes {
             c.wrong(place, key, format_args!("does not belong to a {name}"), expected.clone());
         }
-        if takes && !is_given && key != "scale" {
+        // a surface has one of `file` and `generate`, which is checked where it is read
+        if takes && !is_given && !matches!(key, "file" | "generate" | "seed" | "triangles" | "scale") {
             c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
             complete = false;
         }
@@ -153,11 +161,11 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
         }
         Shape::Plane => Solid::Plane,
         Shape::Hull => {
-            let (points_m, _) = from_file(c, place, file, source)?;
+            let (points_m, _) = triangles(c, place, file, source)?;
             sound(c, place, Solid::Hull { points_m })?
         }
         Shape::Mesh => {
-            let (points_m, triangles) = from_file(c, place, file, source)?;
+            let (points_m, triangles) = triangles(c, place, file, source)?;
             sound(c, place, Solid::Mesh { points_m, triangles })?
         }
     })
@@ -166,9 +174,16 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
 /// Points of a mesh, metres, and its triangles.
 type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
 
-fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
-    let name = file.file.as_deref()?;
+fn triangles(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let wanted = c.optional(place, "triangles", file.triangles.map(f64::from), &TRIANGLES).unwrap_or(4000.0);
+    let name = match surface_source(c, place, file.file.as_deref(), file.generate)? {
+        SurfaceSource::File(name) => name,
+        SurfaceSource::Generated(kind) => {
+            let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), wanted as u32);
+            return Some((made.points.iter().map(|p| *p * scale).collect(), made.triangles.into()));
+        }
+    };
     let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read {
         Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),

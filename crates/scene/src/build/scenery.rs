@@ -199,6 +199,7 @@ pub(super) const fn generator(kind: GeneratorKind) -> Generator {
         GeneratorKind::Door => Generator::Door,
         GeneratorKind::Books => Generator::Books,
         GeneratorKind::Liver => Generator::Liver,
+        GeneratorKind::Cavity => Generator::Cavity,
     }
 }
 

@@ -1,10 +1,11 @@
 //! Reads a tool of a scene file as a [`ToolSpec`].
 
+use super::common::rounded;
 use super::object::{ModelContext, NamedObject, Names};
 use super::rigid::rotation;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
 use crate::check::{Checker, Place, allowed};
-use crate::format::{KeyframeFile, ToolFile};
+use crate::format::{KeyframeFile, Point, ToolFile};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -25,8 +26,10 @@ const FORCES_WHY: &str = "N: a stronger drive would push light objects into thei
 /// Reads a tool.
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelContext<'_>, names: &Names) -> ToolSpec {
     let place = context.place;
+    let keyframes = keyframes(c, place, &file.keyframe);
     ToolSpec {
-        keyframes: keyframes(c, place, &file.keyframe),
+        pivot_m: file.pivot_m.and_then(|pivot| pivot_of(c, place, pivot, &keyframes)),
+        keyframes,
         repeat: file.repeat.unwrap_or(false),
         reach_m: c.optional(place, "reach_m", file.reach_m, &allowed(1e-6..=100.0, "m")).unwrap_or(REACH_DEFAULT_M),
         stiffness_n_m: c
@@ -41,6 +44,27 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelCon
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
     }
+}
+
+/// The pivot, where the shaft passes through it in every keyframe.
+fn pivot_of(c: &mut Checker<'_, '_>, place: &Place, file: Point, keyframes: &[Keyframe]) -> Option<DVec3> {
+    let pivot = c.point(place, "pivot_m", file, POSITION_MAX_M);
+    if pivot.to_array() != file {
+        return None;
+    }
+    let reached = ToolSpec::insertion_m();
+    let far = keyframes.iter().enumerate().find(|(_, key)| !reached.contains(&key.tip_m.distance(pivot)));
+    let Some((number, key)) = far else { return Some(pivot) };
+    let depth_m = key.tip_m.distance(pivot);
+    let what = format!("is {} m from the tip of keyframe {}", rounded(depth_m), number + 1);
+    let (least, most) = (rounded(*reached.start()), rounded(*reached.end()));
+    c.wrong(
+        place,
+        "pivot_m",
+        what,
+        format!("expected {least} … {most} m: the pivot is a point of the shaft, behind the jaws"),
+    );
+    None
 }
 
 fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &ToolFile, names: &Names) -> Vec<AgentId> {

@@ -1,6 +1,6 @@
 //! `model = "rigid"`: a rigid body, or with `fixed = true` a solid that never moves.
 
-use super::Point;
+use super::{GeneratorKind, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -9,7 +9,8 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct RigidFile {
     /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
-    /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`.
+    /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`
+    /// or `generate`.
     pub shape: Shape,
     /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
     pub radius_m: Option<f64>,
@@ -19,7 +20,14 @@ pub struct RigidFile {
     pub half_height_m: Option<f64>,
     /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
-    /// Factor that converts the file's coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// A generated surface, about a metre large; not with `file`.
+    pub generate: Option<GeneratorKind>,
+    /// Seed of a generated surface. Default 0.
+    pub seed: Option<u32>,
+    /// Triangles of a generated surface, 4 … 100000. Default 4000.
+    #[schemars(range(min = 4, max = 100_000))]
+    pub triangles: Option<u32>,
+    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
     /// Position of the origin of the shape's axes, metres. Default: the world's origin.
     pub position_m: Option<Point>,

@@ -1,7 +1,7 @@
 //! The tables of a scene other than its objects.
 
 use super::{CouplingFile, FaultsFile, GroupFile, JointFile, Point};
-use metachron_world::kinds::{ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
+use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -59,6 +59,8 @@ pub struct SceneFile {
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
+    /// What lights the scene in pictures, and what is seen behind it. Default `room`.
+    pub environment: Option<EnvironmentKind>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<ContactsFile>,
     /// Faults injected into the clock and messages of every object.

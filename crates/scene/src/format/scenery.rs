@@ -117,6 +117,8 @@ pub enum GeneratorKind {
     Books,
     /// A liver, about 2 long: closed.
     Liver,
+    /// The wall of a cavity seen from within, 2 wide and 0.62 deep under the origin: open at the top.
+    Cavity,
 }
 
 /// How a tree is drawn from afar.

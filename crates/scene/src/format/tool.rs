@@ -23,6 +23,9 @@ pub struct ToolFile {
     /// Greatest force of the drive, newtons, 1e-3 … 1e3. Default 50. Under it the tip is displaced by up to 5 mm; a greater load holds
     /// the tip back from its path. Forces of grasps and attachments do not count.
     pub max_force_n: Option<f64>,
+    /// Remote centre of motion, metres: a fixed point that the shaft passes through wherever the tip is, as through a trocar, in every
+    /// keyframe 0.025 … 0.325 from the tip. Rotations of keyframes then only turn the tool about its shaft. Default: none.
+    pub pivot_m: Option<Point>,
     /// Names of objects that it can grasp: tubes, sheets, solids, ropes, rigid objects that move. Default: every tube of the scene.
     pub grasps: Option<Vec<String>>,
 }

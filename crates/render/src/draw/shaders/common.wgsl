@@ -1,13 +1,14 @@
 // What every shader shares: the frame's numbers, light, shadow, materials, tone.
 // Positions are metres relative to the picture's origin, z up; colours are linear until `finish`.
-// LIGHT (towards the key light), LAMP_X and LAMP_Y (its lamp's sides) are written before this text.
+// Written before this text, by the environment: LIGHT (towards the key light), LAMP_X and LAMP_Y (its lamp's sides), its strength KEY, what
+// surfaces facing up and down receive from all around (SKY, GROUND), the lamp as a mirror shows it (LAMP), FAR_SHARE, AT_CAMERA, FADES.
 // Lean fragments read no uniforms: Mesa's llvmpipe spends as long on one as on ten additions.
 
 struct Globals {
     view_projection: mat4x4f,
     light_projection: mat4x4f, // to shadow texture coordinates and depth
     eye: vec4f,                // w: shadow texel in metres
-    texel: vec4f,              // x: one shadow texel in texture coordinates
+    texel: vec4f,              // x: one shadow texel in texture coordinates, y: metres from the eye to what it looks at
     focus: vec4f,              // xyz: centre of what is lit, w: its radius
     viewport: vec4f,           // width, height, whether stripes show intervals, metres a pixel one metre away
     floor_point: vec4f,
@@ -16,6 +17,9 @@ struct Globals {
     patch_centre: vec4f,       // the part of the floor under the shadow map; w: how many times larger all of the floor is
     patch_x: vec4f,            // its sides
     patch_y: vec4f,
+    view_forward: vec4f,       // the direction of view, and half the picture's width and height one metre away
+    view_right: vec4f,
+    view_up: vec4f,
     materials: array<vec4f, 8>,
 }
 
@@ -33,11 +37,6 @@ override SHADOW_TAPS: i32 = 1;
 // lines lie on the triangles they outline: they come a little nearer
 override NUDGE: f32 = 0.0;
 
-const KEY = vec3f(3.7, 3.5, 3.2);
-const SKY = vec3f(0.26, 0.31, 0.39);
-const GROUND = vec3f(0.13, 0.09, 0.085);
-const BOX = vec3f(6.5, 6.3, 6.0);
-
 fn linear(c: vec3f) -> vec3f {
     return c * c * (c * 0.305306 + 0.682171) + c * 0.0125229;
 }
@@ -48,12 +47,14 @@ fn clip(p: vec3f) -> vec4f {
     return c;
 }
 
-// What lies behind everything: a dark room, lighter towards the top.
-// `place`: 0 … 1 across and down.
-fn room(place: vec2f) -> vec3f {
-    let y = place.y;
-    let x = place.x - 0.5;
-    return mix(vec3f(0.040, 0.052, 0.066), vec3f(0.010, 0.012, 0.016), saturate(y * 0.9 + x * x * 0.6));
+// What lies behind everything in a direction of view: what SKY and GROUND are the integrals of (environment.rs).
+fn background(direction: vec3f) -> vec3f {
+    return 0.5 * (SKY + GROUND) + (SKY - GROUND) * (0.75 * normalize(direction).z);
+}
+
+// What a surface receives from all around: `within` the pool of the key light.
+fn ambient(n: vec3f, within: f32) -> vec3f {
+    return mix(GROUND, SKY, 0.5 + 0.5 * n.z) * mix(FAR_SHARE, 1.0, within);
 }
 
 // Where a point of a surface is in the shadow map, a little off the surface.
@@ -63,6 +64,9 @@ fn shadow_place(p: vec3f, n: vec3f) -> vec3f {
 
 // Share of the key light that reaches a place in the shadow map: filtered comparisons around it.
 fn lit(at: vec3f) -> f32 {
+    if AT_CAMERA {
+        return 1.0;
+    }
     let z = min(at.z, 1.0);
     if SHADOW_TAPS == 1 {
         return textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy, z);
@@ -78,6 +82,9 @@ fn lit(at: vec3f) -> f32 {
 
 // The same with a soft rim: three rings of four comparisons, each turned a little from the one within.
 fn lit_softly(at: vec3f) -> f32 {
+    if AT_CAMERA {
+        return 1.0;
+    }
     let z = min(at.z, 1.0);
     var o = vec2f(0.9, 0.3) * g.texel.x;
     var sum = 0.0;
@@ -91,15 +98,23 @@ fn lit_softly(at: vec3f) -> f32 {
     return sum / 12.0;
 }
 
-// How open a point is to the sky, from how far its surroundings rise above it towards the light.
+// How open a point is to the sky, from how far its surroundings rise above its tangent plane towards the light.
 fn openness(p: vec3f, n: vec3f) -> f32 {
+    if AT_CAMERA {
+        return 1.0;
+    }
     let reach = 0.075 * g.focus.w;
     let at = g.light_projection * vec4f(p + n * (0.35 * reach), 1.0);
     let size = 1.0 / g.texel.x;
     let o = vec2f(0.9, 0.35) * (reach / g.eye.w);
+    let across = vec2f(-o.y, o.x);
     let c = at.xy * size;
-    let low = rise(c + o, at.z) + rise(c - o, at.z);
-    let high = rise(c + vec2f(-o.y, o.x), at.z) + rise(c + vec2f(o.y, -o.x), at.z);
+    // how the depth of the tangent plane changes by texel: steeper than 1 in 7 it is no longer followed
+    let m = g.light_projection;
+    let n_map = vec2f(dot(vec3f(m[0].x, m[1].x, m[2].x), n), dot(vec3f(m[0].y, m[1].y, m[2].y), n));
+    let fall = n_map * (g.eye.w * g.eye.w * size / (g.floor_colour.w * max(dot(n, LIGHT), 0.15)));
+    let low = rise(c + o, at.z + dot(fall, o)) + rise(c - o, at.z - dot(fall, o));
+    let high = rise(c + across, at.z + dot(fall, across)) + rise(c - across, at.z - dot(fall, across));
     return 1.0 - 0.17 * (low + high);
 }
 
@@ -109,8 +124,18 @@ fn rise(texel: vec2f, depth: f32) -> f32 {
     return saturate((depth - d) * g.floor_colour.w / g.focus.w * 8.0);
 }
 
-// The light pool: full near the focus, fading outward.
+// The light pool: full near the focus, fading outward; of a light at the camera full on the axis of view at what it looks at.
 fn pool(p: vec3f) -> f32 {
+    if AT_CAMERA {
+        let arm = p - g.eye.xyz;
+        let away = max(dot(arm, arm), 1e-12);
+        let along = dot(arm, g.view_forward.xyz);
+        let fall = min(g.texel.y * g.texel.y / away, 2.0);
+        return fall * smoothstep(0.40, 0.98, along * along / away);
+    }
+    if !FADES {
+        return 1.0;
+    }
     let arm = p - g.focus.xyz;
     let off = arm - LIGHT * dot(arm, LIGHT);
     let d = dot(off, off) / (1.5 * g.focus.w * g.focus.w);
@@ -125,7 +150,7 @@ fn reflected(r: vec3f) -> vec3f {
     let soft = inside * inside * (3.0 - 2.0 * inside);
     // dark below, a bright band above the horizon, dimmer overhead
     let band = saturate(r.z * 3.0 + 0.3) * (1.3 - r.z);
-    return mix(GROUND * 0.5, SKY * 2.2, band) + BOX * (soft.x * soft.y * step(0.0, r.z));
+    return mix(GROUND * 0.5, SKY * 2.2, band) + LAMP * (soft.x * soft.y * step(0.0, r.z));
 }
 
 struct Surface {
@@ -142,15 +167,16 @@ struct Surface {
 fn shade(s: Surface, within: f32, share: f32) -> vec3f {
     let m = s.m;
     let k = s.k;
-    let nl = dot(s.n, LIGHT);
+    let toward = select(LIGHT, s.v, AT_CAMERA);
+    let nl = dot(s.n, toward);
     let nv = saturate(dot(s.n, s.v));
-    let vl = dot(s.v, LIGHT);
+    let vl = dot(s.v, toward);
     // light that went in here comes out a little further round, redder
     let faced = saturate(nl);
     let bleed = vec3f(1.0, 0.42, 0.34) * (saturate((nl + m.x) / (1.0 + m.x)) - faced);
     let key = KEY * share;
-    let ambient = mix(GROUND, SKY, 0.5 + 0.5 * s.n.z) * (s.open * (0.35 + 0.65 * within));
-    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.42 + ambient);
+    let around = ambient(s.n, within) * s.open;
+    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.42 + around);
     // two lobes of Trowbridge and Reitz about half way between eye and light, each 1 at its peak times its gain
     let half = max(nl + nv, 0.0);
     let nh2 = min(half * half * 0.5 / max(1.0 + vl, 1e-3), 1.0);

@@ -1,4 +1,4 @@
-// The floor, a plane that fades into the room, and the room itself.
+// The floor, a plane that fades into the background, and the background itself.
 
 struct Ground {
     @builtin(position) clip: vec4f,
@@ -23,7 +23,7 @@ fn fs_floor(in: Ground) -> @location(0) vec4f {
     let within = pool(in.p);
     let share = lit(shadow_place(in.p, g.floor_normal.xyz)) * within;
     let far = far_out(in.p);
-    let back = room(in.clip.xy / g.viewport.xy);
+    let back = background(in.p - g.eye.xyz);
     return ground(paint(), in.p.xy * 10.0, vec3f(within, haze(far), line_share(far)), share, back);
 }
 
@@ -34,8 +34,10 @@ struct Paint {
 }
 
 fn paint() -> Paint {
-    let faced = 0.42 * saturate(dot(g.floor_normal.xyz, LIGHT));
-    return Paint(g.floor_colour.rgb * KEY * faced, g.floor_colour.rgb * SKY);
+    let n = g.floor_normal.xyz;
+    // a light at the camera meets the floor as it is seen from there at what the camera looks at
+    let toward = select(LIGHT, -g.view_forward.xyz, AT_CAMERA);
+    return Paint(g.floor_colour.rgb * KEY * (0.42 * saturate(dot(n, toward))), g.floor_colour.rgb * ambient(n, 1.0));
 }
 
 // Distance from the focus along the floor, in its radii.
@@ -44,7 +46,7 @@ fn far_out(p: vec3f) -> f32 {
     return length(arm - g.floor_normal.xyz * dot(arm, g.floor_normal.xyz)) / g.focus.w;
 }
 
-// How far the floor has faded into the room.
+// How far the floor has faded into the background.
 fn haze(far: f32) -> f32 {
     return smoothstep(0.9, 2.8, far);
 }
@@ -59,14 +61,14 @@ fn ground(paint: Paint, lines: vec2f, air: vec3f, share: f32, back: vec3f) -> ve
     let line = abs(fract(lines - 0.5) - 0.5);
     let width = fwidth(lines);
     let grid = max(1.0 - line.x / (width.x + 0.008), 1.0 - line.y / (width.y + 0.008));
-    let colour = (paint.key * share + paint.sky * (0.25 + 0.75 * air.x)) * (1.0 + saturate(grid) * air.z);
+    let colour = (paint.key * share + paint.sky * mix(FAR_SHARE, 1.0, air.x)) * (1.0 + saturate(grid) * air.z);
     return finish(mix(colour, back, air.y));
 }
 
 // The lean floor: a patch of cells under the shadow map and rings of cells around it, which no shadow reaches.
 // What changes slowly is worked out at their corners.
 const CELLS = 8u;
-const RINGS = 8.0;
+const RINGS = 12.0;
 
 struct Cell {
     @builtin(position) clip: vec4f,
@@ -75,7 +77,7 @@ struct Cell {
     @location(2) at: vec3f,
     @location(3) @interpolate(flat) key: vec3f,
     @location(4) @interpolate(flat) sky: vec3f,
-    @location(5) @interpolate(flat) pixel: vec2f,
+    @location(5) direction: vec3f, // of view
 }
 
 // A corner of the floor at a place in the patch, whose sides are 1 long.
@@ -90,7 +92,7 @@ fn cell(place: vec2f) -> Cell {
     let paint = paint();
     out.key = paint.key;
     out.sky = paint.sky;
-    out.pixel = 1.0 / g.viewport.xy;
+    out.direction = p - g.eye.xyz;
     return out;
 }
 
@@ -125,26 +127,28 @@ fn vs_floor_rings(@builtin(vertex_index) vertex: u32) -> Cell {
 
 @fragment
 fn fs_floor_patch(in: Cell) -> @location(0) vec4f {
-    return ground(Paint(in.key, in.sky), in.lines, in.air, lit(in.at) * in.air.x, room(in.clip.xy * in.pixel));
+    return ground(Paint(in.key, in.sky), in.lines, in.air, lit(in.at) * in.air.x, background(in.direction));
 }
 
 @fragment
 fn fs_floor_rings(in: Cell) -> @location(0) vec4f {
-    return ground(Paint(in.key, in.sky), in.lines, in.air, in.air.x, room(in.clip.xy * in.pixel));
+    return ground(Paint(in.key, in.sky), in.lines, in.air, in.air.x, background(in.direction));
 }
 
 struct Room {
     @builtin(position) clip: vec4f,
+    @location(0) direction: vec3f,
 }
 
 @vertex
 fn vs_room(@builtin(vertex_index) corner: u32) -> Room {
     var out: Room;
     out.clip = vec4f(f32(corner & 1u) * 4.0 - 1.0, f32(corner >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+    out.direction = g.view_forward.xyz + g.view_right.xyz * out.clip.x + g.view_up.xyz * out.clip.y;
     return out;
 }
 
 @fragment
 fn fs_room(in: Room) -> @location(0) vec4f {
-    return finish(room(in.clip.xy / g.viewport.xy));
+    return finish(background(in.direction));
 }

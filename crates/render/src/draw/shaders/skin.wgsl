@@ -96,31 +96,10 @@ fn vs_skin_shadow(in: Patch) -> @builtin(position) vec4f {
     return vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, at.z, 1.0);
 }
 
-// What tissue looks like at a pixel.
-struct Flesh {
-    albedo: vec3f,
-    n: vec3f,
-    gloss: f32,
-}
-
-// Wet tissue: mottled, veined, with a film of water over small folds.
-fn flesh(uv: vec2f, n0: vec3f, t: vec3f, colour: vec3f, tint: vec4f) -> Flesh {
-    let tissue = textureSample(tissue_map, tissue_sampler, uv);
-    let plain = 1.0 - tint.a;
-    var out: Flesh;
-    out.albedo = colour * (0.50 + 0.85 * tissue.r);
-    out.albedo = mix(out.albedo, colour * vec3f(0.55, 0.10, 0.15), 0.85 * plain * tissue.g);
-    out.albedo = mix(out.albedo, tint.rgb, tint.a);
-    let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
-    out.n = normalize(n0 - t * fold.x - cross(t, n0) * fold.y);
-    out.gloss = 0.55 + 0.45 * plain;
-    return out;
-}
-
 @fragment
 fn fs_tissue(in: Skin) -> @location(0) vec4f {
     let n0 = normalize(in.n);
-    let f = flesh(in.uv.xy, n0, in.t, in.colour, in.tint);
+    let f = flesh(sampled(in.uv.xy), n0, in.t, in.colour, in.tint);
     let within = pool(in.p);
     let v = normalize(g.eye.xyz - in.p);
     let share = lit(shadow_place(in.p, n0)) * within;
@@ -141,7 +120,7 @@ fn fs_skin(in: Skin) -> @location(0) vec4f {
 @fragment
 fn fs_tissue_shadowed(in: Skin) -> @location(0) vec4f {
     let n0 = normalize(in.n);
-    let f = flesh(in.uv.xy, n0, in.t, in.colour, in.tint);
+    let f = flesh(sampled(in.uv.xy), n0, in.t, in.colour, in.tint);
     let within = pool(in.p);
     let v = normalize(g.eye.xyz - in.p);
     let share = lit_softly(shadow_place(in.p, n0)) * within;
@@ -253,7 +232,7 @@ fn vs_skin_lean(in: Patch) -> Lean {
 
 @fragment
 fn fs_tissue_lean(in: Lean) -> @location(0) vec4f {
-    let f = flesh(in.uv, in.n, in.t, in.colour, in.tint);
+    let f = flesh(sampled(in.uv), in.n, in.t, in.colour, in.tint);
     let s = Surface(f.n, in.v, f.albedo, in.m, in.k, f.gloss, in.air.y);
     return finish(shade(s, in.air.x, lit(in.at) * in.air.x));
 }
