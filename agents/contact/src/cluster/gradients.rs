@@ -125,7 +125,7 @@ impl Gradients {
     }
 
     /// What a solution leaves.
-    fn measure(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
+    pub fn measure(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         task.left.copy_from_slice(task.right);
         if task.x.iter().any(|x| *x != DVec3::ZERO) {
             self.products += 1;

@@ -16,6 +16,8 @@ use metachron_core::ParallelFor;
 
 /// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
 const LOOK_SHARE: f64 = 0.01;
+/// The share of what velocities may leave unanswered that the last step leaves: the rest is for what laws then change.
+const FINAL_SHARE: f64 = 0.5;
 /// The share of impulses from which on unanswered ones are not rounding that keeps a solve from its goal.
 const UNANSWERED: f64 = 1e-6;
 /// The share of what an inexact step may leave that friction may be off by from what its pressure allows.
@@ -58,6 +60,17 @@ pub(super) struct Iterate {
 pub(super) struct Kept {
     lambda: Vec<DVec3>,
     compliances: Vec<f64>,
+}
+
+/// What became of impulses that laws ask for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Refined {
+    /// They were that.
+    Kept,
+    /// They are that now, and velocities theirs.
+    Changed,
+    /// Velocities do not answer them yet: a step that leaves no more than this, √J, makes them.
+    Unanswered { goal: f64 },
 }
 
 /// Where the impulses that a velocity asks for would lead.
@@ -127,6 +140,15 @@ impl Iterate {
         }
     }
 
+    /// Velocities that a Newton step may start from: as the impulses make them where that takes a factor alone, else as members go on.
+    pub fn begin(&mut self, members: &[Member<'_>]) {
+        let Self { rows, system, state, scratch, .. } = self;
+        rows.scatter(&state.lambda, scratch);
+        system.begin(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal: 0.0 });
+        self.exact = self.state.left.iter().all(|left| *left == DVec3::ZERO);
+        self.update_velocities();
+    }
+
     /// Velocities as the impulses make them: momentum to rounding by a factor, else to the share of it that is wanted (eq. 17).
     pub fn respond(&mut self, members: &[Member<'_>]) {
         let Self { rows, system, state, scratch, .. } = self;
@@ -137,13 +159,29 @@ impl Iterate {
         self.update_velocities();
     }
 
-    /// Makes impulses those that laws allow, and velocities theirs. Returns whether anything was off.
-    pub fn refine(&mut self, form: Form, members: &[Member<'_>]) -> bool {
-        let off = self.obey(form) || self.state.left.iter().any(|left| *left != DVec3::ZERO);
-        if off {
+    /// Makes impulses those that laws ask for, and velocities theirs where a factor makes them. Returns what that came to.
+    pub fn refine(&mut self, form: Form, members: &[Member<'_>]) -> Refined {
+        if self.system.form == StepForm::Direct {
+            if !self.obey(form) {
+                return Refined::Kept;
+            }
             self.respond(members);
+            return Refined::Changed;
         }
-        off
+        let Self { rows, state, scratch, .. } = &mut *self;
+        rows.scatter(&state.lambda, scratch);
+        state.left.iter_mut().zip(&*scratch).for_each(|(left, before)| *left -= *before);
+        let changed = self.obey(form);
+        let Self { rows, system, state, scratch, .. } = &mut *self;
+        rows.scatter(&state.lambda, scratch);
+        state.left.iter_mut().zip(&*scratch).for_each(|(left, now)| *left += *now);
+        let most = system.response_share * system.members.size_squared(scratch).sqrt();
+        self.exact = system.members.size_squared(&state.left).sqrt() <= most;
+        match (self.exact, changed) {
+            (false, _) => Refined::Unanswered { goal: FINAL_SHARE * most },
+            (true, true) => Refined::Changed,
+            (true, false) => Refined::Kept,
+        }
     }
 
     /// Makes impulses those that laws ask for at the velocities as they are; returns whether any was not.

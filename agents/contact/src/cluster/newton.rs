@@ -4,7 +4,7 @@
 //! Never here: what to do then (`convex.rs`). Theory: `docs/theory/clusters.md`, eq. 7–9.
 
 use super::cone::Form;
-use super::iterate::Iterate;
+use super::iterate::{Iterate, Refined};
 use super::members::worse;
 use super::problem::Member;
 use super::rows::Point;
@@ -58,12 +58,23 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
             harden(iterate, aim.yield_m_s);
         }
         let mut miss = linearise(iterate, aim.form);
-        if miss < aim.tolerance_m_s && iterate.refine(aim.form, aim.members) {
-            miss = linearise(iterate, aim.form);
-            missed = sum_of_squares(iterate, aim, 0.0).sqrt();
-        }
+        let mut most_left = f64::INFINITY;
         if miss < aim.tolerance_m_s {
-            return true;
+            match iterate.refine(aim.form, aim.members) {
+                Refined::Kept => return true,
+                Refined::Changed => {
+                    miss = linearise(iterate, aim.form);
+                    missed = sum_of_squares(iterate, aim, 0.0).sqrt();
+                    if miss < aim.tolerance_m_s {
+                        return true;
+                    }
+                }
+                // what is left and the contacts are solved together, to the end
+                Refined::Unanswered { goal } => {
+                    linearise(iterate, aim.form);
+                    most_left = goal;
+                }
+            }
         }
         stale += 1;
         if miss <= 0.5 * least {
@@ -73,7 +84,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
         if step == STEPS_MAX
             || stale >= STALE_MAX
             || !miss.is_finite()
-            || !iterate.take_step(leave * missed, aim.threads)
+            || !iterate.take_step((leave * missed).min(most_left), aim.threads)
         {
             return false;
         }

@@ -16,10 +16,10 @@ const SAMPLES: usize = 4;
 /// joins two axes has both signs.
 const DIRECTIONS: [DVec3; SAMPLES] =
     [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)];
-/// The most that an iterative solve may leave of a sample's impulses, in shares of them. A compliance is off by about the square, and
-/// may be by this many times what responses may be.
-const SAMPLE_SHARE: f64 = 0.01;
-const COARSER: f64 = 1e4;
+/// The most that an iterative solve may leave of a sample's impulses, in shares of them, and how many times what responses may leave: a
+/// compliance is off by about the square.
+const SAMPLE_SHARE: f64 = 0.1;
+const COARSER: f64 = 1e8;
 
 /// Storage for the samples.
 #[derive(Debug, Clone, Default)]
@@ -105,7 +105,7 @@ impl Scales {
                 at.estimate += given.dot(system.members.mobilities[term.block] * given);
             }
         }
-        let share = (COARSER * system.response_share).sqrt().min(SAMPLE_SHARE);
+        let share = (COARSER * system.response_share).min(SAMPLE_SHARE);
         let goal = share * system.members.size_squared(right).sqrt();
         system.respond(members, &mut Task { right, x, left, goal });
         for (member, at) in samples.iter_mut().enumerate() {

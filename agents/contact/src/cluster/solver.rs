@@ -188,7 +188,7 @@ impl Solver {
         self.iterate.state.lambda.clone_from(&self.warm);
         self.iterate.rows.rows.iter_mut().zip(&self.compliances).for_each(|(row, r)| row.compliance = *r);
         self.iterate.guess(members);
-        self.iterate.respond(members);
+        self.iterate.begin(members);
     }
 
     /// The ways in their order, again without rebounds that make energy, then the guard.

@@ -68,13 +68,30 @@ impl System {
             }
             StepForm::Iterative => self.descend(members, task),
         }
+        self.lend(members, task);
+    }
+
+    /// What velocities `x` leave of the impulses `right` before anything is solved: by a factor, and for members that lend one, nothing, as
+    /// they are solved for at once; else a Newton step takes up what is left together with the contacts.
+    pub fn begin(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
+        if self.form == StepForm::Direct {
+            return self.respond(members, task);
+        }
+        let operator = Operator { members: &self.members, contacts: None };
+        self.gradients.measure(&operator, task);
+        self.lend(members, task);
+    }
+
+    /// Solves for the members that lend a factor.
+    fn lend(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
         for (range, member) in lending(members) {
             let x = &mut task.x[range.clone()];
-            x.copy_from_slice(&task.right[range]);
+            x.copy_from_slice(&task.right[range.clone()]);
             if let Some(response) = member.response {
                 response.respond(x);
             }
             x.iter_mut().for_each(|x| *x *= member.share);
+            task.left[range].fill(DVec3::ZERO);
         }
     }
 

@@ -15,7 +15,7 @@ use metachron_core::{ParallelFor, StepError, recycled};
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
 /// A member of more blocks that lends no factor gets none: the problem is solved by conjugate gradients.
-const FACTORED_BLOCKS_MAX: usize = 1000;
+const FACTORED_BLOCKS_MAX: usize = 200;
 /// Joints hold to this share of the depth of contacts, in metres and radians.
 const JOINT_SHARE: f64 = 0.25;
 /// From so many fine steps on, joints that do not hold ask for more only while that brings what they miss below this share of it.

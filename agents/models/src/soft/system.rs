@@ -14,7 +14,7 @@ const PRODUCTS_LEAST: f64 = 16.0;
 const PRODUCTS_PER_ROOT: f64 = 4.0;
 const PER_BLOCK: f64 = 18.0;
 /// How many solutions a problem that the body shares with others takes by gradients, and by factors.
-const SHARED_SOLUTIONS: f64 = 10.0;
+const SHARED_SOLUTIONS: f64 = 20.0;
 const SHARED_FACTORS: f64 = 2.0;
 /// What fills a volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
 const FACTOR_VERTICES_MAX: usize = 3000;
