@@ -39,7 +39,7 @@ fn help_teaches_by_examples_and_exit_codes() {
 #[test]
 fn list_names_every_built_in_scene_with_what_it_shows() {
     let list = metachron(&["list"]);
-    assert_eq!((code(&list), out(&list).lines().count()), (0, 17));
+    assert_eq!((code(&list), out(&list).lines().count()), (0, 18));
     assert!(out(&list).starts_with("tube        a soft tube"), "{}", out(&list));
     let rows: serde_json::Value = serde_json::from_slice(&metachron(&["list", "--json"]).stdout).unwrap();
     assert_eq!(rows[3]["name"], "overload");

@@ -76,7 +76,7 @@ fn a_fixed_mesh_may_be_generated_and_has_no_file_beside_it() {
     for (keys, why) in [
         ("", "`file` of `wall` is missing"),
         ("generate = \"cavity\"\nfile = \"wall.stl\"\n", "contradicts `file`"),
-        ("generate = \"cavity\"\ntriangles = 3\n", "expected 4 … 100000"),
+        ("generate = \"cavity\"\ntriangles = 3\n", "expected a number from 4 to 100000"),
     ] {
         let said = scene(&format!("{wall}{keys}{TOOL}{KEYS}")).unwrap_err();
         assert!(said.contains(why), "{keys}: {said}");

@@ -186,7 +186,7 @@ impl Pipelines {
                 solid("shadowed solid", "vs_solid", Some("fs_solid_shadowed"), TriangleList),
                 builder.painted(&solids, &painted, "fs_painted_shadowed"),
             ],
-            hides: builder.hides(&solids, &module("hide", &[SOLID, TISSUE, HIDE].concat())),
+            hides: builder.hides(&solids, &module("hide", &[SOLID, TISSUE, HIDE].concat()), options.lean),
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
@@ -283,9 +283,15 @@ impl<'a> PipelineBuilder<'a> {
     }
 
     /// Pipelines for soft bodies of tissue, plain and in soft shadow.
-    fn hides(&self, buffers: &[Option<VertexBufferLayout<'_>>], module: &ShaderModule) -> [RenderPipeline; 2] {
+    fn hides(
+        &self,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+        module: &ShaderModule,
+        lean: bool,
+    ) -> [RenderPipeline; 2] {
+        let plain = if lean { "fs_hide_lean" } else { "fs_hide" };
         let (vertex, topology) = ("vs_hide", wgpu::PrimitiveTopology::TriangleList);
-        ["fs_hide", "fs_hide_shadowed"].map(|fragment| {
+        [plain, "fs_hide_shadowed"].map(|fragment| {
             let fragment = Some(fragment);
             self.create(&PipelineDesc { label: "hide", vertex, fragment, buffers, topology, module })
         })

@@ -5,3 +5,4 @@ mod painting;
 mod scenery;
 mod stage;
 mod still_life;
+mod tissue;

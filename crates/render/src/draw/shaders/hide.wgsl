@@ -63,6 +63,23 @@ fn fs_hide(in: Hide) -> @location(0) vec4f {
     return finish(shade(s, in.within, lit(in.at) * in.within));
 }
 
+// Lean: the one texture of the axis that a pixel faces most, where its sides meet with a seam.
+@fragment
+fn fs_hide_lean(in: Hide) -> @location(0) vec4f {
+    let a = abs(in.side);
+    let x_most = a.x >= max(a.y, a.z);
+    let z_most = !x_most && a.z >= a.y;
+    let uv = select(select(in.rest.zx, in.rest.xy, z_most), in.rest.yz, x_most);
+    let tissue = sampled(uv);
+    let fold = tissue.ba - 0.5;
+    let y_slope = vec3f(fold.y, 0.0, fold.x);
+    let slope = select(select(y_slope, vec3f(fold, 0.0), z_most), vec3f(0.0, fold), x_most);
+    var f = coloured(tissue, normalize(in.n), in.colour, in.tint);
+    f.n = normalize(f.n - (slope - f.n * dot(slope, f.n)) * (HIDE_FOLDS * fold_share(in.tint)));
+    let s = Surface(f.n, normalize(in.v), f.albedo, in.m, in.k, f.gloss, 1.0);
+    return finish(shade(s, in.within, lit(in.at) * in.within));
+}
+
 @fragment
 fn fs_hide_shadowed(in: Hide) -> @location(0) vec4f {
     let f = hide(in);

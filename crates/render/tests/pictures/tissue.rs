@@ -1,0 +1,71 @@
+//! Soft bodies of tissue: mottled and veined as tubes are, with a texture that keeps to their matter.
+
+use crate::adapter::gpu;
+use glam::DVec3;
+use image::RgbaImage;
+use metachron_core::{AgentId, Body, Resolution, SimTime, Snapshot, SoftState};
+use metachron_geometry::{Generator, SurfaceShape, generate_surface};
+use metachron_render::{
+    Actor, Appearance, Camera, Environment, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading,
+    Size, SkinForm, States, Style,
+};
+use std::sync::Arc;
+
+const SIZE: Size = Size { width: 160, height: 160 };
+
+/// A soft ball of a material, moved from where it is at rest.
+fn draw(gpu: &Gpu, material: Material, shading: Shading, moved: DVec3) -> RgbaImage {
+    let made = generate_surface(Generator::Sphere, 0, 3000);
+    let surface = SurfaceShape {
+        vertices: (0..made.points.len() as u32).collect(),
+        edges: [].into(),
+        triangles: made.triangles.into(),
+        fans: Arc::default(),
+        radius_m: 0.0,
+        edge_m: 0.1,
+        closed: true,
+    };
+    let form = Form::Skin(SkinForm::new(surface, &made.points));
+    let appearance = Appearance { colour: [150, 60, 55], material };
+    let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form, appearance }], vec![]);
+    stage.set_environment(Environment::Endoscope);
+    let positions: Vec<DVec3> = made.points.iter().map(|p| *p + moved).collect();
+    let body = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions });
+    stage.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+    stage.pose(SimTime::ZERO, States::Latest);
+    let camera = Camera::looking(moved + DVec3::new(0.6, -3.0, 1.0), moved, 0.6);
+    stage.survey(&camera, SIZE);
+    let level = Level { shading, ..Resolution { eps_m: 0.01, n: 3 }.into() };
+    let options = RendererOptions { samples: 1, shadow_px: 256, shadow_taps: 1, lean: true };
+    let mut offscreen = Offscreen::new(gpu.clone(), SIZE, options).expect("a small target");
+    offscreen.render(stage.compose(&camera, &[level], Style::default(), None), &camera).expect("a picture");
+    offscreen.read_back().expect("pixels")
+}
+
+/// Mean difference of the red of neighbouring pixels in the middle of a picture, in steps of 1/255.
+fn roughness(image: &RgbaImage) -> f64 {
+    let red = |x: u32, y: u32| f64::from(image.get_pixel(x, y).0[0]);
+    let pixels = (50..110).flat_map(|y| (50..110).map(move |x| (x, y)));
+    pixels.map(|(x, y)| (red(x + 1, y) - red(x, y)).abs()).sum::<f64>() / 3600.0
+}
+
+#[test]
+fn a_soft_body_of_tissue_is_mottled_where_it_is_lit_per_pixel_and_plastic_is_smooth() {
+    let Some(gpu) = gpu() else { return };
+    for shading in [Shading::PerPixel, Shading::Textured, Shading::Shadowed] {
+        let [tissue, plastic] = [Material::Tissue, Material::Plastic]
+            .map(|material| roughness(&draw(&gpu, material, shading, DVec3::ZERO)));
+        // what is left of plastic is the slope of its light; measured 2.6 times as much
+        assert!(tissue > 2.0 * plastic, "{shading:?}: {tissue}, {plastic}");
+    }
+}
+
+#[test]
+fn the_texture_of_a_soft_body_moves_with_it() {
+    let Some(gpu) = gpu() else { return };
+    let [here, there] =
+        [DVec3::ZERO, DVec3::new(3.0, -2.0, 1.0)].map(|moved| draw(&gpu, Material::Tissue, Shading::PerPixel, moved));
+    let worst = here.as_raw().iter().zip(there.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
+    // positions are relative to whole metres: the same numbers
+    assert!(worst.is_some_and(|worst| worst <= 2), "{worst:?}");
+}
