@@ -68,7 +68,7 @@ pub use spatial_hash::{BoxGrid, Grid};
 pub use tetrahedra::{Tetrahedra, TetrahedraFault};
 pub use texture::{Pattern, Texture, Wrap};
 pub use topology::is_closed;
-pub use topology::{Branch, OpenEdge, branch, open_edge, pieces, welded};
+pub use topology::{Branch, OpenEdge, branch, open_edge, opposed, pieces, welded};
 
 pub use tool::{ToolPart, ToolShape};
 

@@ -77,6 +77,19 @@ pub fn open_edge(surface: &Triangles) -> Option<OpenEdge> {
     Some(OpenEdge { triangle: triangle as usize, corners: edge.map(at) })
 }
 
+/// The first triangle that goes along an edge in the direction in which another does: the two face opposite ways. `None` where all agree, as
+/// they cannot on a surface with one side.
+#[must_use]
+pub fn opposed(surface: &Triangles) -> Option<usize> {
+    let place = places(&surface.points);
+    let sides = sides(&surface.points, &place, &surface.triangles, |_| 0);
+    let against = sides.chunk_by(same_edge).filter_map(|sharing| {
+        let second = |forward: bool| sharing.iter().filter(|side| side.forward == forward).nth(1);
+        second(true).into_iter().chain(second(false)).map(|side| side.triangle as usize).min()
+    });
+    against.min()
+}
+
 /// How many separate pieces a surface has: triangles that share a point, or coincident ones, belong to one piece.
 #[must_use]
 pub fn pieces(surface: &Triangles) -> usize {

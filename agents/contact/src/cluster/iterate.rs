@@ -62,12 +62,12 @@ pub(super) struct Kept {
     compliances: Vec<f64>,
 }
 
-/// What became of impulses that laws ask for.
+/// What became of impulses when they were made those that laws ask for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Refined {
-    /// They were that.
+    /// None changed.
     Kept,
-    /// They are that now, and velocities theirs.
+    /// Some changed, and velocities answer them.
     Changed,
     /// Velocities do not answer them yet: a step that leaves no more than this, √J, makes them.
     Unanswered { goal: f64 },

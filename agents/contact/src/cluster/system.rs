@@ -16,10 +16,10 @@ use std::ops::Range;
 /// How the linear equations of a Newton step are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StepForm {
-    /// By a sparse factor of the members' size, to rounding. For what is thin, rigid or has some hundred blocks.
+    /// By a sparse factor of the members' size, to rounding. For what is thin or rigid, and for stiff solids.
     #[default]
     Direct,
-    /// By conjugate gradients without any factor, as exactly as the step is worth. For solids of a thousand nodes and more, where a
+    /// By conjugate gradients without any factor, as exactly as the step is worth. For solids of some hundred nodes and more, where a
     /// factor fills in. Many rigid bodies on each other take it many products.
     Iterative,
 }

@@ -32,7 +32,7 @@ pub trait ClusterMember: Send {
     /// stand for themselves, and no side refers to them.
     fn blocks(&self) -> &[Block];
 
-    /// The factor of that matrix, where `begin` has made one. Of up to a thousand blocks without one the problem makes it; beyond, conjugate
+    /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
     /// gradients solve the whole cluster.
     fn response(&self) -> Option<&dyn Response> {
         None

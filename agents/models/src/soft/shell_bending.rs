@@ -35,6 +35,10 @@ fn fold([a, b, c, d]: [DVec3; 4]) -> Fold {
     let length = edge.length();
     let (here, there) = (edge.cross(c - a), (d - a).cross(edge));
     let (area, across) = (here.length_squared(), there.length_squared());
+    // of a triangle that has collapsed no angle is known, and none is resisted until it opens again
+    if area.min(across).min(length) <= f64::MIN_POSITIVE {
+        return Fold { angle: 0.0, slopes: [DVec3::ZERO; 4] };
+    }
     let along = edge / length;
     let angle = libm::atan2(-here.cross(there).dot(along), here.dot(there));
     let (by_c, by_d) = (here * (length / area), there * (length / across));

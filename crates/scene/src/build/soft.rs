@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 pub(super) const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
 pub(super) const POISSON: Allowed = allowed(0.0..=0.499, "");
+const POISSON_DEFAULT: f64 = 0.4;
 pub(super) const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 /// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
@@ -124,7 +125,7 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
         velocity_m_s: file.velocity_m_s,
         friction: file.friction,
         held,
-        law: soft_mesh::law(c, place, file.law, file.exponent),
+        law: soft_mesh::law(c, place, file.law, file.exponent, file.poisson.unwrap_or(POISSON_DEFAULT)),
     };
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
     let pose = pose(c, place, file.position_m, file.rotation_deg, half);
@@ -349,6 +350,10 @@ fn one_division(
 /// Gives a sheet or a rope with a range of ε the lattice of its finest as its skin, and nodes that start there.
 fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option<(f64, f64)>) -> BuiltSoft {
     let Some(range_m) = eps_m else { return BuiltSoft { spec, eps_m } };
+    // a path without a length has no lattice, and is refused for what it is
+    if matches!(&spec.shape, SoftShape::Rope { path_m, .. } if path_m.windows(2).all(|pair| pair[0] == pair[1])) {
+        return BuiltSoft { spec, eps_m: None };
+    }
     let most = |shape: &SoftShape| match *shape {
         SoftShape::Sheet { segments: [x, y], .. } => f64::from(x.max(y)),
         SoftShape::Rope { segments, .. } => f64::from(segments),
@@ -392,7 +397,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
     let place = context.place;
     let matter = SoftMatter {
         young_pa: c.number(place, "young_pa", shared.young_pa, &YOUNG),
-        poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(0.4),
+        poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(POISSON_DEFAULT),
         density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
         damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING_RATE).unwrap_or(0.0),
         damping_s: c.optional(place, "damping_s", shared.damping_s, &allowed(0.0..=10.0, "s")).unwrap_or(0.0),

@@ -8,15 +8,27 @@ use super::soft::{DENSITY, POISSON, YOUNG, too_large};
 use super::{LENGTH, SCALE, tetrahedra};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
-use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, pieces, welded};
+use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, welded};
 use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
 use std::sync::Arc;
 
-/// The law that the keys of a scene name; those that do not belong together are reported.
-pub(super) fn law(c: &mut Checker<'_, '_>, place: &Place, kind: Option<LawKind>, exponent: Option<f64>) -> MaterialLaw {
+/// The law that the keys of a scene name, for this Poisson's ratio; those that do not belong together are reported.
+pub(super) fn law(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    kind: Option<LawKind>,
+    exponent: Option<f64>,
+    poisson: f64,
+) -> MaterialLaw {
     match (kind, exponent) {
         (Some(LawKind::Ogden), Some(exponent)) => {
             let size = c.number(place, "exponent", exponent.abs(), &allowed(1.0..=20.0, "or its negative"));
+            // λ + 2 μ/a > 0: else it would push back less the more it is compressed
+            let least = 1.0 / (size + 2.0);
+            if exponent < 0.0 && poisson <= least {
+                let what = format!("is {exponent} with a Poisson's ratio of {poisson}");
+                c.wrong(place, "exponent", what, format!("expected a ratio above {least:.3} for a negative exponent"));
+            }
             MaterialLaw::Ogden { exponent: size.copysign(exponent) }
         }
         (Some(LawKind::Ogden), None) => {
@@ -38,14 +50,27 @@ pub(super) fn tetrahedra_of(
     file: &SolidFile,
     context: &ModelContext<'_>,
 ) -> Option<Option<SoftShape>> {
-    let bytes = context.source.sibling(file.file.as_deref()?).ok()?;
-    if !tetrahedra::is_volume(&bytes) {
+    let (place, name) = (context.place, file.file.as_deref()?);
+    let bytes = match context.source.sibling(name) {
+        Ok(bytes) => bytes,
+        Err(why) => {
+            c.wrong(place, "file", format!("cannot be used: {name}: {why}"), "expected a mesh beside the scene");
+            return Some(None);
+        }
+    };
+    if !tetrahedra::is_volume(name, &bytes) {
         return None;
     }
-    let (place, name) = (context.place, file.file.as_deref().unwrap_or_default());
-    if file.eps_m.is_some() {
-        let what = format!("does not belong to {name}: a mesh of tetrahedra is taken as it is");
-        c.wrong(place, "eps_m", what, "expected no such key, or a closed surface of triangles as the file");
+    for (key, is_given) in [
+        ("eps_m", file.eps_m.is_some()),
+        ("generate", file.generate.is_some()),
+        ("seed", file.seed.is_some()),
+        ("triangles", file.triangles.is_some()),
+    ] {
+        if is_given {
+            let what = format!("does not belong to {name}: a mesh of tetrahedra is taken as it is");
+            c.wrong(place, key, what, "expected no such key, or a closed surface of triangles as the file");
+        }
     }
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let read = tetrahedra::read(&bytes).and_then(|mesh| solid(mesh, scale, file.scale.is_none()));
@@ -99,11 +124,12 @@ pub(super) fn regions(
         if regions.iter().any(|known| known.region == region) {
             c.wrong(&here, "region", format!("is {region}, which has a material already"), "expected each region once");
         }
-        let own = law(c, &here, file.law, file.exponent);
+        let poisson = c.optional(&here, "poisson", file.poisson, &POISSON).unwrap_or(matter.poisson);
+        let own = law(c, &here, file.law, file.exponent, poisson);
         let law = if file.law.is_some() { own } else { matter.law };
         let matter = SoftMatter {
             young_pa: c.number(&here, "young_pa", file.young_pa, &YOUNG),
-            poisson: c.optional(&here, "poisson", file.poisson, &POISSON).unwrap_or(matter.poisson),
+            poisson,
             density_kg_m3: c
                 .optional(&here, "density_kg_m3", file.density_kg_m3, &DENSITY)
                 .unwrap_or(matter.density_kg_m3),
@@ -145,6 +171,12 @@ fn sheet(mesh: &mesh::Mesh, scale: f64, scale_is_missing: bool) -> Result<Triang
     if let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) {
         let (number, sharing) = (found.triangle + 1, found.sharing);
         return Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"));
+    }
+    if let Some(triangle) = opposed(&surface) {
+        return Err(format!(
+            "triangle {}: it faces the other way than a neighbour: turn one of them round",
+            triangle + 1
+        ));
     }
     let found = pieces(&surface);
     if found > 1 {

@@ -101,7 +101,8 @@ pub struct SolidFile {
     pub rotation_deg: Option<Point>,
     /// Velocity of the whole solid at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
-    /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its cage there. Default none.
+    /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its
+    /// cage there, of tetrahedra those within half a mean edge. Default none.
     pub hold: Option<Vec<SolidSide>>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
@@ -158,7 +159,8 @@ pub enum LawKind {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionFile {
-    /// Its number: of gmsh the physical group, of VTK the cell data `region`.
+    /// Its number: of gmsh the physical group, or the volume's own where it has none; of VTK the cell data `region`, `gmsh:physical`,
+    /// `medit:ref`, `material` or `CellEntityIds`, the first of these that there is.
     pub region: i64,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,

@@ -15,6 +15,8 @@ const REGIONS: [&str; 5] = ["region", "gmsh:physical", "medit:ref", "material", 
 /// Numbers for each cell.
 pub(super) struct CellData {
     pub name: String,
+    /// How many numbers a cell has.
+    pub width: usize,
     pub values: Vec<f64>,
 }
 
@@ -39,6 +41,14 @@ impl Grid {
             return Err(format!("it has {cells} cells, and says of {kinds} what they are"));
         }
         let numbers = REGIONS.iter().find_map(|name| self.data.iter().find(|data| data.name == *name));
+        if let Some(CellData { name, width, values }) = numbers {
+            let (found, cells) = (values.len(), self.kinds.len());
+            if *width != 1 || found != cells {
+                return Err(format!(
+                    "its `{name}` has {found} numbers, {width} a cell: expected one for each of {cells} cells"
+                ));
+            }
+        }
         let mut mesh = Tetrahedra { points: points(&self.coordinates), ..Tetrahedra::default() };
         for (cell, (&kind, ends)) in self.kinds.iter().zip(self.offsets.windows(2)).enumerate() {
             if WITHOUT_VOLUME.contains(&kind) {
@@ -50,15 +60,18 @@ impl Grid {
             if kind != TETRAHEDRON {
                 return Err(format!("cell {} is of VTK's kind {kind}: expected tetrahedra (10)", cell + 1));
             }
-            let corners = self.connectivity.get(ends[0] as usize..ends[1] as usize).unwrap_or_default();
+            let ends = ends[0] as usize..ends[1] as usize;
+            let corners = self.connectivity.get(ends).unwrap_or_default();
             let corners: [u64; 4] =
                 corners.try_into().map_err(|_| format!("cell {} is a tetrahedron without four points", cell + 1))?;
             // a number too large for a point is no point of the mesh either
             mesh.corners.push(corners.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX)));
             if let Some(numbers) = numbers {
-                let number = numbers.values.get(cell).copied();
-                let number = number.filter(|number| number.is_finite());
-                mesh.regions.push(number.ok_or_else(|| format!("cell {} has no number of a region", cell + 1))? as i64);
+                let number = numbers.values[cell];
+                if !(number.abs() < 9e15 && number.fract() == 0.0) {
+                    return Err(format!("cell {} has the region {number}: expected a whole number", cell + 1));
+                }
+                mesh.regions.push(number as i64);
             }
         }
         Ok(mesh)

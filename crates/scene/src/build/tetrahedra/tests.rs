@@ -24,7 +24,7 @@ const SAMPLES: [(&str, &[u8]); 14] = [
 fn every_format_gives_the_same_two_cubes() {
     let meshio: (&str, &[u8]) = ("meshio XML", include_bytes!("samples/meshio.vtu"));
     for (name, bytes) in SAMPLES.into_iter().chain([meshio]) {
-        assert!(is_volume(bytes), "{name}");
+        assert!(is_volume("mesh", bytes), "{name}");
         let mesh = read(bytes).unwrap_or_else(|why| panic!("{name}: {why}"));
         assert_eq!(mesh.check(), Ok(()), "{name}");
         let volume = |region: i64| -> f64 {
@@ -52,6 +52,32 @@ fn what_cannot_be_read_is_named_with_what_would_be() {
     assert!(why(hexahedron.as_bytes()).contains("a hexahedron (5): expected tetrahedra of first order (4)"));
     let polydata = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\n";
     assert!(why(polydata.as_bytes()).contains("line 4: the data set is POLYDATA: expected UNSTRUCTURED_GRID"));
+    let legacy = str::from_utf8(SAMPLES[3].1).unwrap();
+    let cells = legacy.find("CELLS ").unwrap();
+    let (before, after) = legacy.split_at(cells + legacy[cells..].find('\n').unwrap() + 1);
+    for (count, said) in
+        [("1e300", "expected a whole number"), ("-4", "expected a whole number"), ("240", "has not as many points")]
+    {
+        let damaged = format!("{before}{count}{}", &after[1..]);
+        assert!(why(damaged.as_bytes()).contains(said), "{count}: {}", why(damaged.as_bytes()));
+    }
+    let xml = str::from_utf8(SAMPLES[8].1).unwrap();
+    let open = &xml[..xml.find("\"connectivity\"").unwrap() + 60];
+    assert!(
+        why(open.as_bytes()).contains("it ends within `VTKFile/UnstructuredGrid/Piece/Cells/DataArray`"),
+        "{}",
+        why(open.as_bytes())
+    );
+    assert!(why(xml.replace("NumberOfCells=\"48\"", "NumberOfCells=\"47\"").as_bytes()).contains("cells of 47"));
+    let wide = xml.replacen("Name=\"region\"", "Name=\"region\" NumberOfComponents=\"3\"", 1);
+    assert!(why(wide.as_bytes()).contains("its `region` has 48 numbers, 3 a cell"), "{}", why(wide.as_bytes()));
+    let huge = xml.replace("NumberOfPoints=\"23\"", "NumberOfPoints=\"99999999999\"");
+    assert!(why(huge.as_bytes()).contains("it says that it has 99999999999 points"));
+    assert_eq!(why(b""), "it is empty");
+    assert!(why(b"hello").contains("it begins neither as a gmsh file"));
+    // what VTK says about an array changes nothing
+    let told = xml.replacen("<CellData>", "<CellData><DataArray type=\"Int8\" Name=\"more\" format=\"ascii\">1 <InformationKey name=\"a\"><Value>7</Value></InformationKey></DataArray>", 1);
+    assert_eq!(read(told.as_bytes()).unwrap().regions, read(SAMPLES[8].1).unwrap().regions);
     let cut = &SAMPLES[6].1[..900];
     assert!(why(cut).contains("it ends within a block of"), "{}", why(cut));
 }

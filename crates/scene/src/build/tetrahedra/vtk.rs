@@ -3,8 +3,8 @@
 //! In: bytes. Out: tetrahedra and their regions. Never here: fields of points, other data sets.
 
 use super::cells::{CellData, Grid};
-use super::counted;
 use super::words::Words;
+use super::{NUMBERS_MAX, counted, whole};
 use metachron_geometry::Tetrahedra;
 
 pub(super) fn is_vtk(bytes: &[u8]) -> bool {
@@ -46,31 +46,29 @@ impl Reader<'_> {
                 "CELLS" => self.cells(&mut grid)?,
                 "CELL_TYPES" => {
                     let count = self.count("cells")?;
-                    grid.kinds = self.numbers("int", count)?.into_iter().map(|kind| kind as u64).collect();
+                    grid.kinds = whole("cell types", &self.numbers("int", count)?)?;
                 }
                 "CELL_DATA" => (cells, of_cells) = (self.count("cells")?, true),
                 "POINT_DATA" => (cells, of_cells) = (self.count("points")?, false),
-                "METADATA" => {
-                    self.words.rest_of_line();
-                    while !self.words.rest_of_line().is_empty() {}
-                }
+                "METADATA" => self.skip_metadata(),
                 "LOOKUP_TABLE" => self.table()?,
                 "FIELD" => {
                     self.words.word();
                     for _ in 0..self.count("arrays")? {
-                        let name = self.words.word().unwrap_or_default().to_owned();
+                        let name = self.name();
                         let (width, count) = (self.count("components")?, self.count("values")?);
                         let values = self.array(width.saturating_mul(count))?;
-                        if of_cells && width == 1 {
-                            grid.data.push(CellData { name, values });
+                        if of_cells {
+                            grid.data.push(CellData { name, width, values });
                         }
                     }
                 }
                 "SCALARS" => {
                     let name = self.words.word().unwrap_or_default().to_owned();
                     let values = self.scalars(cells)?;
-                    if of_cells && values.len() == cells {
-                        grid.data.push(CellData { name, values });
+                    if of_cells {
+                        let width = values.len() / cells.max(1);
+                        grid.data.push(CellData { name, width, values });
                     }
                 }
                 other @ ("VECTORS" | "NORMALS" | "TENSORS") => {
@@ -82,6 +80,22 @@ impl Reader<'_> {
             }
         }
         Ok(grid)
+    }
+
+    /// Goes past what VTK says about an array, which ends at an empty line.
+    fn skip_metadata(&mut self) {
+        self.words.rest_of_line();
+        while !self.words.rest_of_line().is_empty() {}
+    }
+
+    /// The name of an array of a field, before which there may be what is said about the one before.
+    fn name(&mut self) -> String {
+        let name = self.words.word().unwrap_or_default();
+        if name != "METADATA" {
+            return name.to_owned();
+        }
+        self.skip_metadata();
+        self.words.word().unwrap_or_default().to_owned()
     }
 
     fn data_set(&mut self) -> Result<(), String> {
@@ -104,7 +118,9 @@ impl Reader<'_> {
 
     /// So many numbers of a type. Binary ones begin after the end of the line, the most significant byte first.
     fn numbers(&mut self, kind: &str, count: usize) -> Result<Vec<f64>, String> {
-        counted("numbers", count as u64 / 16)?;
+        if count > NUMBERS_MAX {
+            return Err(self.words.wrong(format_args!("an array has {count} numbers, more than {NUMBERS_MAX}")));
+        }
         if !self.is_binary {
             return (0..count).map(|_| self.words.number("a number")).collect();
         }
@@ -154,14 +170,15 @@ impl Reader<'_> {
     /// Cells as files before version 5 have them: each its number of points and its points.
     fn cells(&mut self, grid: &mut Grid) -> Result<(), String> {
         let (count, size) = (self.count("cells")?, self.count("numbers of cells")?);
-        let numbers = self.numbers("int", size)?;
+        let numbers = whole("cells", &self.numbers("int", size)?)?;
         let mut at = 0;
         grid.offsets.push(0);
         for cell in 0..count {
-            let width = numbers.get(at).copied().unwrap_or(-1.0);
-            let points = (width >= 0.0).then(|| numbers.get(at + 1..at + 1 + width as usize)).flatten();
+            let width = numbers.get(at).copied().unwrap_or(u64::MAX);
+            let left = numbers.len().saturating_sub(at + 1);
+            let points = (width <= left as u64).then(|| &numbers[at + 1..at + 1 + width as usize]);
             let points = points.ok_or_else(|| format!("cell {} has not as many points as it says", cell + 1))?;
-            grid.connectivity.extend(points.iter().map(|point| *point as u64));
+            grid.connectivity.extend_from_slice(points);
             grid.offsets.push(grid.connectivity.len() as u64);
             at += 1 + points.len();
         }
@@ -175,7 +192,7 @@ impl Reader<'_> {
             if self.words.word() != Some(word) {
                 return Err(self.words.wrong(format_args!("expected {word}")));
             }
-            let numbers = self.array(count)?.into_iter().map(|number| number as u64).collect();
+            let numbers = whole(&word.to_ascii_lowercase(), &self.array(count)?)?;
             if word == "OFFSETS" { grid.offsets = numbers } else { grid.connectivity = numbers }
         }
         Ok(())

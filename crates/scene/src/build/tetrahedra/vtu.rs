@@ -3,7 +3,7 @@
 //! In: bytes. Out: tetrahedra and their regions. Never here: fields of points, several pieces, parallel files.
 
 use super::cells::{CellData, Grid};
-use super::counted;
+use super::{NUMBERS_MAX, counted, whole};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
@@ -14,9 +14,11 @@ use std::io::Read;
 
 pub(super) fn is_vtu(bytes: &[u8]) -> bool {
     let start = bytes.trim_ascii_start();
-    start.starts_with(b"<VTKFile")
-        || (start.starts_with(b"<?xml") && start.windows(8).take(1000).any(|w| w == b"<VTKFile"))
+    start.starts_with(b"<") && start.windows(8).take(2000).any(|window| window == b"<VTKFile")
 }
+
+/// Most bytes of an array.
+const BYTES_MAX: usize = 8 * NUMBERS_MAX;
 
 /// What the file says of all its data.
 #[derive(Debug, Clone, Copy, Default)]
@@ -40,17 +42,23 @@ struct Array {
     name: String,
     kind: String,
     format: String,
-    offset: usize,
+    offset: Option<usize>,
+    /// How many numbers a point or a cell has.
+    width: usize,
 }
 
 /// What has been read.
 struct File<'a> {
     coding: Coding,
     appended: Option<Appended<'a>>,
-    section: String,
+    /// The elements that have begun, outermost first.
+    open: Vec<String>,
     array: Option<Array>,
     text: String,
     pieces: usize,
+    /// How many points and cells the piece says that it has.
+    points: usize,
+    cells: usize,
     grid: Grid,
 }
 
@@ -61,10 +69,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tetrahedra, String> {
     let mut file = File {
         coding: Coding::default(),
         appended: appended(&bytes[end..]),
-        section: String::new(),
+        open: vec![],
         array: None,
         text: String::new(),
         pieces: 0,
+        points: 0,
+        cells: 0,
         grid: Grid { offsets: vec![0], ..Grid::default() },
     };
     let mut reader = Reader::from_str(head);
@@ -75,16 +85,30 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tetrahedra, String> {
             Event::Start(tag) => file.begin(&tag)?,
             Event::Empty(tag) => {
                 file.begin(&tag)?;
-                file.end(tag.name().as_ref())?;
+                file.end()?;
             }
-            Event::Text(text) => file.text.push_str(&String::from_utf8_lossy(&text)),
-            Event::End(tag) => file.end(tag.name().as_ref())?,
+            // what is said about an array stands in elements within it
+            Event::Text(text) if file.open.last().is_some_and(|name| name == "DataArray") => {
+                file.text.push_str(&String::from_utf8_lossy(&text));
+            }
+            Event::End(_) => file.end()?,
             Event::Eof => break,
             _ => {}
         }
     }
+    // appended data stand within the outermost element
+    if file.open.len() > usize::from(file.appended.is_some()) {
+        return Err(format!("it ends within `{}`", file.open.join("/")));
+    }
     if file.pieces != 1 {
         return Err(format!("it has {} pieces: expected one", file.pieces));
+    }
+    let (points, cells) = (file.grid.coordinates.len(), file.grid.kinds.len());
+    if points != 3 * file.points || cells != file.cells {
+        let (said, of) = (file.points, file.cells);
+        return Err(format!(
+            "it has {points} coordinates for {said} points, and says of {cells} cells of {of} what they are"
+        ));
     }
     file.grid.tetrahedra()
 }
@@ -105,6 +129,7 @@ fn attribute(tag: &BytesStart<'_>, name: &str) -> Option<String> {
 impl File<'_> {
     fn begin(&mut self, tag: &BytesStart<'_>) -> Result<(), String> {
         let name = String::from_utf8_lossy(tag.name().as_ref()).into_owned();
+        let of = |key: &str| attribute(tag, key).unwrap_or_default();
         match name.as_str() {
             "VTKFile" => {
                 let kind = attribute(tag, "type").unwrap_or_default();
@@ -122,27 +147,31 @@ impl File<'_> {
                     is_compressed: compressor.is_some(),
                 };
             }
-            "Piece" => self.pieces += 1,
+            "Piece" => {
+                self.pieces += 1;
+                let number = |key: &str| of(key).parse().map_err(|_| format!("expected a number as `{key}`"));
+                self.points = counted("points", number("NumberOfPoints")?)?;
+                self.cells = counted("cells", number("NumberOfCells")?)?;
+            }
             "DataArray" => {
-                let of = |key: &str| attribute(tag, key).unwrap_or_default();
-                let offset = of("offset").parse().unwrap_or(0);
-                let array = Array {
-                    section: self.section.clone(),
+                self.array = Some(Array {
+                    section: self.open.last().cloned().unwrap_or_default(),
                     name: of("Name"),
                     kind: of("type"),
                     format: of("format"),
-                    offset,
-                };
-                self.array = Some(array);
+                    offset: of("offset").parse().ok(),
+                    width: of("NumberOfComponents").parse().unwrap_or(1),
+                });
                 self.text.clear();
             }
-            _ => self.section = name,
+            _ => {}
         }
+        self.open.push(name);
         Ok(())
     }
 
-    fn end(&mut self, name: &[u8]) -> Result<(), String> {
-        if name != b"DataArray" {
+    fn end(&mut self) -> Result<(), String> {
+        if self.open.pop().is_none_or(|name| name != "DataArray") {
             return Ok(());
         }
         let Some(array) = self.array.take() else { return Ok(()) };
@@ -152,13 +181,13 @@ impl File<'_> {
         }
         let wrong = |why: String| format!("the array `{}` of {}: {why}", array.name, array.section);
         let values = self.values(&array).map_err(wrong)?;
-        let whole = || values.iter().map(|value| *value as u64);
+        let grid = &mut self.grid;
         match (array.section.as_str(), array.name.as_str()) {
-            ("Points", _) => self.grid.coordinates = values,
-            ("Cells", "connectivity") => self.grid.connectivity = whole().collect(),
-            ("Cells", "offsets") => self.grid.offsets.extend(whole()),
-            ("Cells", "types") => self.grid.kinds = whole().collect(),
-            ("CellData", _) => self.grid.data.push(CellData { name: array.name, values }),
+            ("Points", _) => grid.coordinates = values,
+            ("Cells", "connectivity") => grid.connectivity = whole("connectivity", &values)?,
+            ("Cells", "offsets") => grid.offsets.extend(whole("offsets", &values)?),
+            ("Cells", "types") => grid.kinds = whole("types", &values)?,
+            ("CellData", _) => grid.data.push(CellData { name: array.name, width: array.width, values }),
             _ => {}
         }
         Ok(())
@@ -175,7 +204,8 @@ impl File<'_> {
                 let Some(Appended { bytes, is_base64 }) = &self.appended else {
                     return Err("there are no appended data".to_owned());
                 };
-                let from = bytes.get(array.offset..).ok_or("it begins beyond the end of the file")?;
+                let offset = array.offset.ok_or("it says no offset where it begins")?;
+                let from = bytes.get(offset..).ok_or("it begins beyond the end of the file")?;
                 if *is_base64 { self.coding.decoded(from)? } else { self.coding.unpacked(from)? }
             }
             other => return Err(format!("its format is `{other}`: expected ascii, binary or appended")),
@@ -198,8 +228,14 @@ impl Coding {
         if self.is_big_endian {
             word[..width].reverse();
         }
-        counted("bytes of data (in units of 256)", u64::from_le_bytes(word) / 256)?;
-        Ok(u64::from_le_bytes(word) as usize)
+        match usize::try_from(u64::from_le_bytes(word)) {
+            Ok(count) if count <= BYTES_MAX => Ok(count),
+            _ => Err(format!(
+                "it says that it has {} bytes, more than {} MiB",
+                u64::from_le_bytes(word),
+                BYTES_MAX >> 20
+            )),
+        }
     }
 
     /// How many words the header of compressed data has.
@@ -248,6 +284,9 @@ impl Coding {
         let mut data = vec![];
         for block in 3..words {
             let most = if block + 1 == words && last > 0 { last } else { size };
+            if data.len() + most > BYTES_MAX {
+                return Err(format!("it has more than {} MiB", BYTES_MAX >> 20));
+            }
             let packed = part(self.count(bytes, block)?)?;
             let unpacked = ZlibDecoder::new(packed).take(most as u64).read_to_end(&mut data);
             unpacked.map_err(|why| format!("block {} cannot be unpacked: {why}", block - 2))?;
@@ -258,6 +297,9 @@ impl Coding {
     fn numbers(self, kind: &str, bytes: &[u8]) -> Result<Vec<f64>, String> {
         macro_rules! read {
             ($type:ty) => {{
+                if bytes.len() / size_of::<$type>() > NUMBERS_MAX {
+                    return Err(format!("it has more than {NUMBERS_MAX} numbers"));
+                }
                 let (values, _) = bytes.as_chunks::<{ size_of::<$type>() }>();
                 let of = if self.is_big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
                 Ok(values.iter().map(|bytes| of(*bytes) as f64).collect())
