@@ -33,6 +33,8 @@ pub(super) struct Bound {
 pub(super) struct Play {
     bodies: Vec<Member>,
     scene: ClusterScene,
+    /// Whether there is nothing that it could touch: it then steps by itself, as agents that touch nothing do.
+    is_alone: bool,
     stepper: ClusterStepper,
     time: SimTime,
     step_s: f64,
@@ -50,6 +52,7 @@ impl Play {
     pub(super) fn new(bodies: Vec<Box<dyn Agent>>, obstacles: &[Obstacle], step_s: f64) -> anyhow::Result<Self> {
         let member = |agent| Member { agent, memory: ContactMemory::default(), grips: Vec::new() };
         Ok(Self {
+            is_alone: obstacles.is_empty() && bodies.len() == 1,
             bodies: bodies.into_iter().map(member).collect(),
             scene: ClusterScene::new(obstacles).context("the static solids")?,
             stepper: ClusterStepper::new(DEPTH_M),
@@ -66,7 +69,13 @@ impl Play {
 
     /// Makes one step; the number of its contacts.
     fn step(&mut self) -> anyhow::Result<u32> {
-        let Self { bodies, scene, stepper, time, step_s, .. } = self;
+        let Self { bodies, scene, stepper, time, step_s, is_alone, .. } = self;
+        if let ([body], true) = (&mut bodies[..], *is_alone) {
+            let dt = SimSpan::from_secs_f64(*step_s).context("the length of a step")?;
+            body.agent.step(dt, &StepContext::alone(AgentId(0), *time))?;
+            *time += dt;
+            return Ok(0);
+        }
         let mut wishes = Vec::with_capacity(bodies.len());
         for body in bodies.iter_mut() {
             wishes.push((body.agent.member().context("a body that touches nothing")?.role(), *step_s));
