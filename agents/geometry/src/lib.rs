@@ -65,7 +65,7 @@ pub use progressive_mesh::{Cut, ProgressiveMesh, ProgressiveMeshError};
 pub use render_curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
 pub use solid::{Obstacle, Solid};
 pub use spatial_hash::{BoxGrid, Grid};
-pub use tetrahedra::{Tetrahedra, TetrahedraFault};
+pub use tetrahedra::{Tetrahedra, TetrahedraFault, lone_faces};
 pub use texture::{Pattern, Texture, Wrap};
 pub use topology::is_closed;
 pub use topology::{Branch, OpenEdge, branch, open_edge, opposed, pieces, welded};

@@ -91,11 +91,7 @@ impl Tetrahedra {
     /// The triangles around it, over its own points, counter-clockwise seen from outside.
     #[must_use]
     pub fn boundary(&self) -> Vec<[u32; 3]> {
-        let mut open: HashMap<[u32; 3], u32> = HashMap::with_capacity(2 * self.corners.len());
-        for face in self.faces() {
-            *open.entry(sorted(face)).or_default() += 1;
-        }
-        self.faces().filter(|face| open[&sorted(*face)] == 1).collect()
+        lone_faces(self.faces().collect())
     }
 
     /// Points and triangles of the boundary alone.
@@ -178,6 +174,15 @@ impl Tetrahedra {
         let pieces = (0..).zip(&parent).filter(|(at, parent)| at == *parent).count();
         if pieces == 1 { Ok(()) } else { Err(TetrahedraFault::Pieces { pieces }) }
     }
+}
+
+/// Those of the faces of all cells that one cell alone has.
+#[must_use]
+pub fn lone_faces(mut faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
+    let mut cells: HashMap<[u32; 3], u32> = HashMap::with_capacity(faces.len());
+    faces.iter().for_each(|face| *cells.entry(sorted(*face)).or_default() += 1);
+    faces.retain(|face| cells[&sorted(*face)] == 1);
+    faces
 }
 
 fn root(parent: &mut [u32], mut at: u32) -> u32 {

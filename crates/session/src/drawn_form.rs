@@ -39,35 +39,51 @@ fn soft_form(spec: &SoftSpec) -> Form {
 /// Triangles at every level, for an object that is one mesh per level.
 pub(super) fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
     let of_tool = |n: u8| ToolShape::default().parts(0.0).iter().map(|part| part.primitive.triangles(n)).sum();
+    let skin = if let Spec::Soft(body) = spec { Some(SkinCounts::of(&body.shape)) } else { None };
     std::array::from_fn(|n| {
         let n = n as u8;
         match spec {
             Spec::Rigid(body) => solid_triangles(&body.solid, n),
             Spec::Tool(_) => of_tool(n),
-            Spec::Soft(body) => soft_triangles(&body.shape, n),
+            Spec::Soft(body) => match body.shape {
+                SoftShape::Rope { segments, .. } => segments * patch::triangles(n),
+                _ => skin.map_or(0, |skin| skin.at(n)),
+            },
             Spec::Tube(_) | Spec::Synthetic(_) => 0,
         }
     })
 }
 
-/// Triangles drawn for a soft body at level `n`: a sheet has two faces and a rim, a rope is drawn as a tube.
-fn soft_triangles(shape: &SoftShape, n: u8) -> u32 {
-    let parts = skin_divisions(n);
-    let each = parts * parts;
-    match shape {
-        SoftShape::Embedded { surface, .. } => surface.triangles.len() as u32 * each,
-        SoftShape::Tetrahedra { mesh, .. } => mesh.boundary().len() as u32 * each,
-        // both faces, and two for each edge of the rim
-        SoftShape::Shell { surface, .. } => {
-            let sides = || surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
-            let known: BTreeSet<[u32; 2]> = sides().collect();
-            let rim = sides().filter(|[a, b]| !known.contains(&[*b, *a])).count() as u32;
-            2 * (surface.triangles.len() as u32 * each + rim * parts)
+/// The triangles of a skin as it is, of both faces where it is open, and the edges of its rim.
+#[derive(Debug, Clone, Copy)]
+struct SkinCounts {
+    triangles: u32,
+    rim: u32,
+}
+
+impl SkinCounts {
+    fn of(shape: &SoftShape) -> Self {
+        let closed = |triangles: u32| Self { triangles, rim: 0 };
+        match shape {
+            SoftShape::Embedded { surface, .. } => closed(surface.triangles.len() as u32),
+            SoftShape::Tetrahedra { mesh, .. } => closed(mesh.boundary().len() as u32),
+            SoftShape::Shell { surface, .. } => {
+                let sides = || surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+                let known: BTreeSet<[u32; 2]> = sides().collect();
+                let rim = sides().filter(|[a, b]| !known.contains(&[*b, *a])).count() as u32;
+                Self { triangles: 2 * surface.triangles.len() as u32, rim }
+            }
+            SoftShape::Sheet { segments: [x, y], .. } => Self { triangles: 4 * x * y, rim: 2 * (x + y) },
+            SoftShape::Box { segments: [x, y, z], .. } => closed(4 * (x * y + y * z + z * x)),
+            SoftShape::Ball { segments: n, .. } => closed(12 * n * n),
+            SoftShape::Rope { .. } => closed(0), // it is drawn as a tube
         }
-        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y * each + 4 * (x + y) * parts,
-        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x) * each,
-        SoftShape::Ball { segments: n, .. } => 12 * n * n * each,
-        SoftShape::Rope { segments, .. } => segments * patch::triangles(n),
+    }
+
+    /// Triangles drawn at level `n`; a part of the rim has two.
+    fn at(self, n: u8) -> u32 {
+        let parts = skin_divisions(n);
+        self.triangles * parts * parts + 2 * self.rim * parts
     }
 }
 

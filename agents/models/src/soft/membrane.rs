@@ -3,6 +3,7 @@
 //! In: vertices. Out: forces and stiffness. Never here: bending ([`crate::soft::bending`]). Theory: docs/theory/soft.md, eq. 5, 6:
 //! St. Venant–Kirchhoff in the plane.
 
+use super::deformation::outer;
 use super::spec::SoftMatter;
 use super::system::System;
 use glam::{DMat2, DMat3, DVec2, DVec3};
@@ -89,10 +90,6 @@ impl Membrane {
         let stress = self.stress(strain);
         0.5 * self.volume_m3 * (strain[0] * stress[0] + strain[1] * stress[1] + 2.0 * strain[2] * stress[2])
     }
-}
-
-fn outer(a: DVec3, b: DVec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 fn times([xx, yy, xy]: [f64; 3], v: DVec2) -> DVec2 {

@@ -8,7 +8,7 @@ use super::fe_mesh::{FeMesh, edges_of};
 use super::spec::SoftError;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::VoronoiRegions;
-use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape, Tetrahedra};
+use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape, Tetrahedra, lone_faces};
 use std::sync::Arc;
 
 /// The faces of a cell whose corners' bits are x, y, z, counter-clockwise seen from outside.
@@ -66,18 +66,7 @@ impl FeMesh {
         });
         let corners = self.tetrahedra.iter().map(|element| element.vertices).collect();
         let tetrahedra = Tetrahedra { corners, ..Tetrahedra::default() };
-        let mut faces: Vec<[u32; 3]> = halves.collect();
-        let sorted = |mut face: [u32; 3]| {
-            face.sort_unstable();
-            face
-        };
-        let mut known: Vec<[u32; 3]> = faces.iter().map(|face| sorted(*face)).collect();
-        known.sort_unstable();
-        let times = |face: [u32; 3]| {
-            let from = known.partition_point(|other| *other < face);
-            known[from..].iter().take_while(|other| **other == face).count()
-        };
-        faces.retain(|face| times(sorted(*face)) == 1);
+        let mut faces = lone_faces(halves.collect());
         faces.extend(tetrahedra.boundary());
         faces
     }

@@ -6,6 +6,7 @@ mod errors;
 mod grasp;
 mod hands;
 mod heaps;
+mod hung;
 mod joints;
 mod large;
 mod links;

@@ -1,81 +1,19 @@
 //! Links and joints that tear, against closed forms: weights that hang or fall, ramps, momentum, equal bits.
 
-use crate::bodies::{rigid, tube};
+use crate::bodies::tube;
+use crate::hung::{self, ALL, CENTRE, G, Held, Limits, WEIGHT_N, ball, balls};
 use crate::table::{GRAVITY, Table, placed, spring};
 use glam::DVec3;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::stepper::{Partner, StepDoubling, Torn};
 use metachron_contact::{AnchorSpring, Link};
 use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange};
-use metachron_geometry::Solid;
-use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Attachment, Material, Section, Tube, TubeSpec};
 
-const G: f64 = -GRAVITY.z;
-const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
-const MASS_KG: f64 = 2.0;
-const WEIGHT_N: f64 = MASS_KG * G;
-
-fn ball(middle: DVec3, mass_kg: f64, gravity: DVec3) -> RigidSpec {
-    RigidSpec { gravity, ..rigid(Solid::Ball { radius_m: 0.05 }, middle, mass_kg) }
-}
-
-fn balls(specs: impl IntoIterator<Item = RigidSpec>) -> Table {
-    let bodies = specs.into_iter().map(|spec| placed(RigidBody::new(spec).unwrap(), false)).collect();
-    Table::among(bodies, &[])
-}
-
-/// How a ball of 2 kg is held from above in these tests.
-#[derive(Debug, Clone, Copy)]
-enum Held {
-    /// By a joint to the world.
-    Joint(JointKind),
-    /// By a joint to a body that nothing pulls and that 1e9 kg keep where it is.
-    Beam(JointKind),
-    /// By a link to such a body, with this length at rest.
-    Link { rest_m: f64 },
-}
-
-/// Stiffness of springs, N/m: a weight stretches them by 2 cm.
-const STIFFNESS_N_M: f64 = WEIGHT_N / 0.02;
-
-/// Everything that can hold the ball, each of which bears its weight from the first step on.
-const ALL: [Held; 10] = [
-    Held::Joint(JointKind::Fixed),
-    Held::Joint(JointKind::Spherical),
-    Held::Joint(JointKind::Revolute { axis: DVec3::Y, range_rad: Some([-0.1, 0.1]) }),
-    Held::Joint(JointKind::Prismatic { axis: DVec3::Y, range_m: None }),
-    Held::Joint(JointKind::Prismatic { axis: DVec3::Z, range_m: Some([-1.0, 0.0]) }),
-    Held::Joint(JointKind::Rope { length_m: 0.5 }),
-    Held::Joint(JointKind::Spring { stiffness_n_m: STIFFNESS_N_M, damping_n_s_m: 0.0, rest_m: 0.48 }),
-    Held::Beam(JointKind::Fixed),
-    Held::Link { rest_m: 0.48 },
-    Held::Link { rest_m: 0.0 },
-];
-
-/// The ball, at rest in the origin with its spring stretched by its weight, held by what tears above some force.
+/// The ball held by what tears above some force.
 fn hung(held: Held, tears_above_n: f64) -> Table {
-    let weight = ball(DVec3::ZERO, MASS_KG, GRAVITY);
-    let beam = ball(DVec3::Z * 0.5, 1e9, DVec3::ZERO);
-    let joint = |kind: JointKind, b: Option<AgentId>| {
-        let above = match kind {
-            JointKind::Rope { .. } | JointKind::Spring { .. } => DVec3::Z * 0.5,
-            _ => DVec3::ZERO,
-        };
-        let below = if b.is_some() { DVec3::Z * -0.5 } else { DVec3::ZERO };
-        Joint { anchor_b_m: above + below, tears_above_n, ..Joint::new(AgentId(0), b, kind) }
-    };
-    match held {
-        Held::Joint(kind) => balls([weight]).jointed([joint(kind, None)]),
-        Held::Beam(kind) => balls([weight, beam]).jointed([joint(kind, Some(AgentId(1)))]),
-        Held::Link { rest_m } => {
-            let mut table = balls([weight, beam]);
-            let there = if rest_m > 0.0 { DVec3::ZERO } else { DVec3::Z * -0.48 };
-            let link = Link { tears_above_n, ..spring(STIFFNESS_N_M, 0.0, rest_m) };
-            table.link([(0, CENTRE), (1, Anchor::Local(there))], link);
-            table
-        }
-    }
+    hung::hung(held, Limits { tears_above_n, yields_above_n: f64::INFINITY })
 }
 
 /// The ball's place above its start, metres.

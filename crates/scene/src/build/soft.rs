@@ -10,7 +10,7 @@ use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Aabb, Triangles, branch, generate_surface, open_edge, pieces, welded};
+use metachron_geometry::{Aabb, Triangles, generate_surface, open_edge};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{MaterialLaw, NodeSpacing, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
@@ -260,12 +260,7 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
 
 /// The surface of a mesh in metres, where it encloses a solid of one piece; what is wrong with it else.
 fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Triangles, String> {
-    let points: Vec<DVec3> = mesh.points.iter().map(|point| *point * scale).collect();
-    let surface = welded(&Triangles { points, triangles: mesh.triangles.clone() });
-    if let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) {
-        let (number, sharing) = (found.triangle + 1, found.sharing);
-        return Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"));
-    }
+    let surface = soft_mesh::manifold(mesh, scale)?;
     if let Some(open) = open_edge(&surface) {
         let at = |i: u32| surface.points[i as usize].to_array().map(|x| format!("{x:.4}")).join(", ");
         return Err(format!(
@@ -275,10 +270,7 @@ fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Trian
             at(open.corners[1])
         ));
     }
-    let found = pieces(&surface);
-    if found > 1 {
-        return Err(format!("it has {found} separate pieces, and a solid is one: make each an object"));
-    }
+    soft_mesh::one_piece(&surface, "solid")?;
     let volume_m3 = surface.volume_m3();
     if volume_m3 < 0.0 {
         return Err("its triangles face inwards: turn them round".to_owned());

@@ -87,10 +87,7 @@ pub(super) fn tetrahedra_of(
 fn solid(mut mesh: Tetrahedra, scale: f64, scale_is_missing: bool) -> Result<Tetrahedra, String> {
     mesh.points.iter_mut().for_each(|point| *point *= scale);
     mesh.check().map_err(|fault| fault.to_string())?;
-    let count = mesh.points.len();
-    if count as u64 > VERTICES_MAX {
-        return Err(format!("it has {count} points, more than {VERTICES_MAX}"));
-    }
+    few_enough(mesh.points.len())?;
     let Aabb { low, high } = Aabb::of(&mesh.points);
     mesh::within(low.abs().max(high.abs()).max_element() / scale, scale)?;
     too_large((high - low).max_element(), scale_is_missing)?;
@@ -166,27 +163,42 @@ pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
 
 /// The surface of a mesh in metres, where it can be a sheet of one piece.
 fn sheet(mesh: &mesh::Mesh, scale: f64, scale_is_missing: bool) -> Result<Triangles, String> {
-    let points = mesh.points.iter().map(|point| *point * scale).collect();
-    let surface = welded(&Triangles { points, triangles: mesh.triangles.clone() });
-    if let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) {
-        let (number, sharing) = (found.triangle + 1, found.sharing);
-        return Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"));
-    }
+    let surface = manifold(mesh, scale)?;
     if let Some(triangle) = opposed(&surface) {
         return Err(format!(
             "triangle {}: it faces the other way than a neighbour: turn one of them round",
             triangle + 1
         ));
     }
-    let found = pieces(&surface);
-    if found > 1 {
-        return Err(format!("it has {found} separate pieces, and a sheet is one: make each an object"));
-    }
-    let count = surface.points.len();
-    if count as u64 > VERTICES_MAX {
-        return Err(format!("it has {count} points, more than {VERTICES_MAX}"));
-    }
+    one_piece(&surface, "sheet")?;
+    few_enough(surface.points.len())?;
     let Aabb { low, high } = Aabb::of(&surface.points);
     too_large((high - low).max_element(), scale_is_missing)?;
     Ok(surface)
+}
+
+/// The surface of a mesh in metres with one point for all that coincide, where at most two triangles share an edge.
+pub(super) fn manifold(mesh: &mesh::Mesh, scale: f64) -> Result<Triangles, String> {
+    let points = mesh.points.iter().map(|point| *point * scale).collect();
+    let surface = welded(&Triangles { points, triangles: mesh.triangles.clone() });
+    let Some(found) = branch(&surface.points, &surface.triangles, |_| 0) else { return Ok(surface) };
+    let (number, sharing) = (found.triangle + 1, found.sharing);
+    Err(format!("triangle {number}: it is not manifold: {sharing} triangles share one of its edges"))
+}
+
+/// Refuses a surface in several pieces; `what` it would be is one.
+pub(super) fn one_piece(surface: &Triangles, what: &str) -> Result<(), String> {
+    match pieces(surface) {
+        0 | 1 => Ok(()),
+        found => Err(format!("it has {found} separate pieces, and a {what} is one: make each an object")),
+    }
+}
+
+/// Refuses more points than a soft body may have.
+fn few_enough(points: usize) -> Result<(), String> {
+    if points as u64 <= VERTICES_MAX {
+        Ok(())
+    } else {
+        Err(format!("it has {points} points, more than {VERTICES_MAX}"))
+    }
 }

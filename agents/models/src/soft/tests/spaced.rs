@@ -219,6 +219,6 @@ fn the_work_of_a_step_falls_by_the_power_that_the_rate_control_is_told() {
         let work = |cells: f64| SoftBody::new(spaced(shape.clone(), length_m / cells)).unwrap().work();
         let found = [(8.0, 16.0), (16.0, 32.0)].map(|(coarse, fine): (f64, f64)| (work(fine) / work(coarse)).log2());
         // a sheet's elements grow with the power 2, the products of its factor with 3
-        assert!(found.iter().all(|found| (found - power).abs() < 0.6), "{found:?}, {power} told");
+        assert!(found.iter().all(|found| (found - power).abs() < 0.6), "{found:?}, {power} stated");
     }
 }
