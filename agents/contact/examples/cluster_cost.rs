@@ -67,7 +67,14 @@ fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_conta
     let members: Vec<_> = scene
         .bodies
         .iter()
-        .map(|body| Member { blocks: &body.blocks, free: &body.free, now: &[], share: 1.0, response: None })
+        .map(|body| Member {
+            blocks: &body.blocks,
+            free: &body.free,
+            unanswered: &[],
+            now: &[],
+            share: 1.0,
+            response: None,
+        })
         .collect();
     let (members, contacts) = (&members, &scene.contacts);
     let problem = Problem { h_s: H_S, members, contacts, rows: &[], threads: &PlainLoop };

@@ -17,7 +17,7 @@
 //!     Block { row: 1, column: 1, value: DMat3::from_diagonal(inertia) },
 //! ];
 //! let free = [DVec3::new(0.5, 0.0, -9.81 * h_s), DVec3::ZERO];
-//! let members = [Member { blocks: &blocks, free: &free, now: &[], share: 1.0, response: None }];
+//! let members = [Member { blocks: &blocks, free: &free, unanswered: &[], now: &[], share: 1.0, response: None }];
 //! let corner = |x, y| Contact {
 //!     sides: [Side::rigid(0, DVec3::new(x, y, -0.1)), Side::FIXED],
 //!     normal: DVec3::Z,

@@ -25,7 +25,7 @@ struct Played {
     seconds: f64,
 }
 
-const LIST: [Played; 13] = [
+const LIST: [Played; 14] = [
     Played { name: "ten boxes", table: || scenes::scene("ten boxes"), seconds: 1.5 },
     Played { name: "box, two ropes, slab", table: || scenes::scene("box on two ropes on a slab"), seconds: 1.5 },
     Played { name: "three cloths, cube", table: || scenes::scene("cube on three cloths"), seconds: 1.5 },
@@ -38,6 +38,11 @@ const LIST: [Played; 13] = [
     Played { name: "soft cube of 343, floor", table: || Table::new(vec![organ(6)]), seconds: 0.7 },
     Played { name: "soft cube of 729, floor", table: || Table::new(vec![organ(8)]), seconds: 0.7 },
     Played { name: "soft cube of 1331, floor", table: || Table::new(vec![organ(10)]), seconds: 0.7 },
+    Played {
+        name: "soft cube of 1331, plate",
+        table: || Table::new(vec![organ(10), block(DVec3::Z * 0.1056, DVec3::new(0.05, 0.05, 0.005), 0.2, 0.0)]),
+        seconds: 0.7,
+    },
     Played { name: "caged bar held, ball", table: caged, seconds: 0.7 },
 ];
 

@@ -9,7 +9,6 @@ use super::problem::Block;
 use super::rows::Rows;
 use glam::DMat3;
 use glam::DVec3;
-use metachron_core::ParallelFor;
 
 /// A matrix, where rows add to it, and its factor.
 #[derive(Debug, Clone, Default)]
@@ -128,14 +127,6 @@ impl Coupled {
             order[front[0]..front[1]].sort_unstable_by_key(|&k| (unsorted[k].place, k));
         }
         meetings.extend(order.iter().map(|&k| unsorted[k]));
-    }
-
-    /// Factors the matrix without contacts.
-    ///
-    /// # Errors
-    /// A block at which it is not positive definite.
-    pub fn factor_members(&mut self, threads: &dyn ParallelFor) -> Result<(), usize> {
-        self.factor.factor(threads, |_, _| ())
     }
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.

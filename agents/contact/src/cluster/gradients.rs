@@ -5,7 +5,8 @@
 
 use super::coupled::Coupled;
 use super::factor::Pair;
-use super::members::Members;
+use super::members::{Members, Size};
+use super::problem::Block;
 use super::rows::Rows;
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
@@ -16,8 +17,8 @@ const ROUNDS: usize = 3;
 const PRODUCTS_BASE: usize = 50;
 const PRODUCTS_PER_BLOCK: usize = 12;
 const PRODUCTS_MAX: usize = 3000;
-/// The share of a goal at which a round ends, so that rounding does not spoil it.
-const SHARE_OF_GOAL: f64 = 0.9;
+/// The share of a goal at which a round ends: the rest is for rounding, and for what laws then change.
+const SHARE_OF_GOAL: f64 = 0.5;
 
 /// One system of linear equations.
 #[derive(Debug)]
@@ -28,7 +29,7 @@ pub(super) struct Task<'a> {
     pub x: &'a mut [DVec3],
     /// Right side less product, exactly; zero by a factor.
     pub left: &'a mut [DVec3],
-    /// The size that `left` may have (eq. 15), √J.
+    /// The size that `left` may have (eq. 15), √J; where it is larger, the operator's `still_m_s` ends the solve.
     pub goal: f64,
 }
 
@@ -37,6 +38,8 @@ pub(super) struct Task<'a> {
 pub(super) struct Operator<'a> {
     pub members: &'a Members,
     pub contacts: Option<Stiffness<'a>>,
+    /// What changes no block by more than this by itself may be left, m/s.
+    pub still_m_s: f64,
 }
 
 /// Jᵀ G J.
@@ -51,8 +54,9 @@ pub(super) struct Stiffness<'a> {
 /// The preconditioner and the storage of conjugate gradients.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gradients {
-    /// The blocks near the diagonal: one of a node, 6 × 6 of a rigid member. Nothing fills in.
+    /// Of ⊕ A/f what is near: all of members that lend a factor and of rigid ones, of others the blocks on the diagonal. With Jᵀ G J whole.
     near: Coupled,
+    blocks: Vec<Block>,
     pairs: Vec<Pair>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
@@ -61,6 +65,12 @@ pub(super) struct Gradients {
 }
 
 impl Operator<'_> {
+    /// Whether what is left is at this share of what may be.
+    fn is_done(&self, task: &Task<'_>, share: f64) -> bool {
+        let Size { squared, fastest_m_s } = self.members.measure(task.left);
+        squared <= (share * task.goal).powi(2) || fastest_m_s <= share * self.still_m_s
+    }
+
     fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
         self.members.multiply(x, out);
         let Some(Stiffness { rows, gains, .. }) = self.contacts else { return };
@@ -78,27 +88,28 @@ impl Gradients {
     ///
     /// # Errors
     /// A block that is not positive definite.
-    pub fn take_members(&mut self, members: &Members, threads: &dyn ParallelFor) -> Result<(), usize> {
+    pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
         let size = members.size();
         self.products = 0;
         for list in [&mut self.direction, &mut self.image] {
             list.clear();
             list.resize(size, DVec3::ZERO);
         }
-        self.pairs.clear();
-        for row in 0..size {
-            self.pairs.push(Pair { row, column: row });
-            let owner = members.owners[row];
-            if members.rigid[owner] && row > 0 && members.owners[row - 1] == owner {
-                self.pairs.push(Pair { row, column: row - 1 });
-            }
-        }
-        self.near.take(size, &members.blocks, &mut self.pairs, None);
-        self.near.factor_members(threads)
+        let is_near = |block: &&Block| {
+            let owner = members.owners[block.row];
+            block.row == block.column || members.rigid[owner] || members.lends[owner]
+        };
+        self.blocks.clear();
+        self.blocks.extend(members.blocks.iter().filter(is_near));
+        let of_nodes = members.mobilities.iter().position(|mobility| !mobility.is_finite());
+        of_nodes.map_or(Ok(()), Err)
     }
 
     /// Takes up which blocks the rows move.
-    pub fn couple(&mut self, rows: &Rows) {
+    pub fn couple(&mut self, rows: &Rows, size: usize) {
+        self.pairs.clear();
+        self.pairs.extend(self.blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
+        self.near.take(size, &self.blocks, &mut self.pairs, Some(rows));
         self.near.meet(rows);
     }
 
@@ -116,7 +127,7 @@ impl Gradients {
         }
         for _ in 0..ROUNDS {
             self.measure(operator, task);
-            if operator.members.size_squared(task.left) <= task.goal * task.goal {
+            if operator.is_done(task, 1.0) {
                 return;
             }
             self.descend(operator, task);
@@ -137,7 +148,6 @@ impl Gradients {
     /// One round of conjugate gradients.
     fn descend(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         let members = operator.members;
-        let goal = (SHARE_OF_GOAL * task.goal).powi(2);
         let most = (PRODUCTS_BASE + PRODUCTS_PER_BLOCK * members.size()).min(PRODUCTS_MAX);
         let mut power = f64::INFINITY;
         self.direction.fill(DVec3::ZERO);
@@ -164,7 +174,7 @@ impl Gradients {
                 task.x[k] += self.direction[k] * along;
                 task.left[k] -= *image * along;
             }
-            if members.size_squared(task.left) <= goal {
+            if operator.is_done(task, SHARE_OF_GOAL) {
                 return;
             }
         }

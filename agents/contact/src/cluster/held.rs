@@ -31,7 +31,7 @@ impl Solver {
             for axis in 0..3 {
                 right[start + pushed] = DVec3::AXES[axis];
                 x.fill(DVec3::ZERO);
-                let goal = LEFT_SHARE * system.members.size_squared(right).sqrt();
+                let goal = LEFT_SHARE * system.members.measure(right).root();
                 let mut task = Task { right, x, left, goal };
                 if !system.step(Stiffness { rows, gains, threads: &PlainLoop }, &mut task) {
                     return false;

@@ -16,8 +16,6 @@ use metachron_core::ParallelFor;
 
 /// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
 const LOOK_SHARE: f64 = 0.01;
-/// The share of what velocities may leave unanswered that the last step leaves: the rest is for what laws then change.
-const FINAL_SHARE: f64 = 0.5;
 /// The share of impulses from which on unanswered ones are not rounding that keeps a solve from its goal.
 const UNANSWERED: f64 = 1e-6;
 /// The share of what an inexact step may leave that friction may be off by from what its pressure allows.
@@ -29,7 +27,7 @@ pub(super) struct State {
     pub lambda: Vec<DVec3>,
     pub change: Vec<DVec3>,
     pub velocity: Vec<DVec3>,
-    /// Jᵀ λ − ⊕A/f Δv: the momentum that no velocity answers yet. Zero by a factor.
+    /// Jᵀ λ + r − ⊕A/f Δv: the momentum that no velocity answers yet, r that which free velocities leave. Zero by a factor.
     pub left: Vec<DVec3>,
 }
 
@@ -46,6 +44,8 @@ pub(super) struct Iterate {
     /// What friction that follows pressure adds to G of each row.
     pub skews: Vec<Skew>,
     residuals: Residuals,
+    /// What free velocities leave unanswered, N·s; empty where they answer all.
+    pub unanswered: Vec<DVec3>,
     /// λ + c of each row: the impulse it would have if no velocity changed.
     pub pull: Vec<DVec3>,
     /// Whether velocities are those that the impulses make, and not those of a step.
@@ -69,8 +69,8 @@ pub(super) enum Refined {
     Kept,
     /// Some changed, and velocities answer them.
     Changed,
-    /// Velocities do not answer them yet: a step that leaves no more than this, √J, makes them.
-    Unanswered { goal: f64 },
+    /// Velocities do not answer them yet: a step to the end makes them.
+    Unanswered,
 }
 
 /// Where the impulses that a velocity asks for would lead.
@@ -130,6 +130,25 @@ impl Iterate {
         self.steps = 0;
     }
 
+    /// Takes up what the members' free velocities leave unanswered.
+    pub fn take_unanswered(&mut self, members: &[Member<'_>]) {
+        self.unanswered.clear();
+        if members.iter().all(|member| member.unanswered.is_empty()) {
+            return;
+        }
+        for member in members {
+            let none = member.free.len() - member.unanswered.len();
+            self.unanswered.extend(member.unanswered.iter().chain(std::iter::repeat_n(&DVec3::ZERO, none)));
+        }
+    }
+
+    /// Jᵀ λ + r of the impulses as they are, into `scratch`.
+    fn scatter_given(&mut self) {
+        let Self { rows, state, unanswered, scratch, .. } = self;
+        rows.scatter(&state.lambda, scratch);
+        scratch.iter_mut().zip(&*unanswered).for_each(|(given, more)| *given += *more);
+    }
+
     /// Starts from where members go on as they were.
     pub fn guess(&mut self, members: &[Member<'_>]) {
         let mut start = 0;
@@ -142,8 +161,8 @@ impl Iterate {
 
     /// Velocities that a Newton step may start from: as the impulses make them where that takes a factor alone, else as members go on.
     pub fn begin(&mut self, members: &[Member<'_>]) {
-        let Self { rows, system, state, scratch, .. } = self;
-        rows.scatter(&state.lambda, scratch);
+        self.scatter_given();
+        let Self { system, state, scratch, .. } = self;
         system.begin(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal: 0.0 });
         self.exact = self.state.left.iter().all(|left| *left == DVec3::ZERO);
         self.update_velocities();
@@ -151,10 +170,9 @@ impl Iterate {
 
     /// Velocities as the impulses make them: momentum to rounding by a factor, else to the share of it that is wanted (eq. 17).
     pub fn respond(&mut self, members: &[Member<'_>]) {
-        let Self { rows, system, state, scratch, .. } = self;
-        rows.scatter(&state.lambda, scratch);
-        let goal = system.response_share * system.members.size_squared(scratch).sqrt();
-        system.respond(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal });
+        self.scatter_given();
+        let Self { system, state, scratch, .. } = self;
+        system.respond(members, &mut Task { right: scratch, x: &mut state.change, left: &mut state.left, goal: 0.0 });
         self.exact = true;
         self.update_velocities();
     }
@@ -168,17 +186,16 @@ impl Iterate {
             self.respond(members);
             return Refined::Changed;
         }
-        let Self { rows, state, scratch, .. } = &mut *self;
-        rows.scatter(&state.lambda, scratch);
+        self.scatter_given();
+        let Self { state, scratch, .. } = &mut *self;
         state.left.iter_mut().zip(&*scratch).for_each(|(left, before)| *left -= *before);
         let changed = self.obey(form);
-        let Self { rows, system, state, scratch, .. } = &mut *self;
-        rows.scatter(&state.lambda, scratch);
+        self.scatter_given();
+        let Self { system, state, scratch, .. } = &mut *self;
         state.left.iter_mut().zip(&*scratch).for_each(|(left, now)| *left += *now);
-        let most = system.response_share * system.members.size_squared(scratch).sqrt();
-        self.exact = system.members.size_squared(&state.left).sqrt() <= most;
+        self.exact = system.members.measure(&state.left).fastest_m_s <= system.still_m_s;
         match (self.exact, changed) {
-            (false, _) => Refined::Unanswered { goal: FINAL_SHARE * most },
+            (false, _) => Refined::Unanswered,
             (true, true) => Refined::Changed,
             (true, false) => Refined::Kept,
         }
@@ -209,10 +226,11 @@ impl Iterate {
 
     /// Whether velocities answer the impulses: not where a matrix is none of a body.
     pub fn answered(&mut self) -> bool {
-        let Self { rows, system, state, scratch, .. } = self;
-        rows.scatter(&state.lambda, scratch);
-        let given = system.members.size_squared(scratch).sqrt();
-        system.members.size_squared(&state.left).sqrt() <= given * system.response_share.max(UNANSWERED)
+        self.scatter_given();
+        let Self { system, state, scratch, .. } = self;
+        let given = system.members.measure(scratch).root();
+        let left = system.members.measure(&state.left);
+        left.fastest_m_s <= system.still_m_s || left.root() <= UNANSWERED * given
     }
 
     /// Stores what [`Self::restore`] goes back to.
@@ -268,10 +286,11 @@ impl Iterate {
         }
     }
 
-    /// Jᵀ (λ + c) − ⊕A/f Δv into `scratch`.
+    /// Jᵀ (λ + c) + r − ⊕A/f Δv into `scratch`.
     fn pull_on_members(&mut self) {
-        let Self { rows, system, state, step, scratch, .. } = self;
+        let Self { rows, system, state, step, unanswered, scratch, .. } = self;
         rows.scatter(&self.pull, scratch);
+        scratch.iter_mut().zip(&*unanswered).for_each(|(given, more)| *given += *more);
         // `left` serves as storage
         system.members.multiply(&state.change, &mut step.left);
         scratch.iter_mut().zip(&step.left).for_each(|(right, av)| *right -= *av);
@@ -280,18 +299,18 @@ impl Iterate {
     /// Where the pulls as impulses would lead from here: `step` has the change of velocities. The first look is a rough one.
     pub fn look_ahead(&mut self, members: &[Member<'_>], exactly: bool) -> Led {
         self.rows.scatter(&self.pull, &mut self.scratch);
-        let pulled = self.system.members.size_squared(&self.scratch).sqrt();
+        let pulled = self.system.members.measure(&self.scratch).root();
         self.pull_on_members();
         let Self { rows, system, step, scratch, .. } = self;
-        let gradient = system.members.size_squared(scratch).sqrt();
-        let exact = system.response_share * pulled.max(gradient);
-        let goal = if exactly { exact } else { exact.max(LOOK_SHARE * gradient) };
+        let gradient = system.members.measure(scratch).root();
+        let goal = if exactly { 0.0 } else { LOOK_SHARE * gradient };
         if !exactly {
             step.change.fill(DVec3::ZERO);
         }
         system.respond(members, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
         rows.velocities(&step.change, &mut step.velocity);
-        let answered = system.members.size_squared(&step.left).sqrt() <= goal.max(UNANSWERED * pulled);
+        let left = system.members.measure(&step.left);
+        let answered = left.fastest_m_s <= system.still_m_s || left.root() <= goal.max(UNANSWERED * pulled);
         Led { off: step.velocity.iter().fold(DVec3::ZERO, |worst, u| worst.max(u.abs())), gradient, answered }
     }
 
@@ -335,16 +354,31 @@ impl Iterate {
 
     /// The energy of the members along the step; Δvᵀ A Δv is the same everywhere and left out.
     pub fn quadratic(&mut self) -> Quadratic {
-        let Self { system, state, step, scratch, .. } = self;
+        let Self { system, state, step, unanswered, scratch, .. } = self;
         system.members.multiply(&step.change, scratch);
-        let against = |list: &[DVec3]| list.iter().zip(&*scratch).map(|(x, ad)| x.dot(*ad)).sum();
-        Quadratic { cross: against(&state.change), curve: against(&step.change) }
+        let dot = |a: &[DVec3], b: &[DVec3]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
+        let cross = dot(&state.change, scratch) - dot(unanswered, &step.change);
+        Quadratic { cross, curve: dot(&step.change, scratch) }
     }
 
-    /// A share of all impulses, of what they changed and of what they left.
+    /// A⁻¹ r of what free velocities leave unanswered, as the storage of a step; what that leaves too.
+    pub fn complete(&mut self, members: &[Member<'_>]) {
+        let Self { system, step, unanswered, .. } = self;
+        step.change.fill(DVec3::ZERO);
+        step.left.fill(DVec3::ZERO);
+        if !unanswered.is_empty() {
+            let State { change: x, left, .. } = step;
+            system.respond(members, &mut Task { right: unanswered, x, left, goal: 0.0 });
+        }
+    }
+
+    /// A share of all impulses, and of what they changed and left beside what [`Self::complete`] found.
     pub fn shorten(&mut self, share: f64) {
         let State { lambda, change, left, .. } = &mut self.state;
-        lambda.iter_mut().chain(change).chain(left).for_each(|value| *value *= share);
+        lambda.iter_mut().for_each(|impulse| *impulse *= share);
+        for (list, own) in [(change, &self.step.change), (left, &self.step.left)] {
+            list.iter_mut().zip(own).for_each(|(value, own)| *value = *own + (*value - *own) * share);
+        }
         self.update_velocities();
     }
 

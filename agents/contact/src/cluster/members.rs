@@ -23,6 +23,22 @@ pub(super) struct Members {
     pub lends: Vec<bool>,
 }
 
+/// How large impulses on blocks are.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Size {
+    /// ‖r‖², J (eq. 15).
+    pub squared: f64,
+    /// The largest velocity that they would give to blocks by themselves, m/s.
+    pub fastest_m_s: f64,
+}
+
+impl Size {
+    /// ‖r‖, √J.
+    pub fn root(self) -> f64 {
+        self.squared.sqrt()
+    }
+}
+
 impl Members {
     /// Takes up the members of a problem, the first block of each being at its offset.
     pub fn take(&mut self, problem: &Problem<'_>, offsets: &[usize]) {
@@ -59,15 +75,15 @@ impl Members {
         super::problem::multiply(&self.blocks, x, out);
     }
 
-    /// ‖r‖² of impulses on all blocks, J (eq. 15).
-    pub fn size_squared(&self, impulses: &[DVec3]) -> f64 {
-        self.mobilities.iter().zip(impulses).map(|(m, r)| r.dot(*m * *r)).sum()
-    }
-
-    /// The largest velocity that impulses would give to blocks by themselves, m/s.
-    pub fn largest_velocity(&self, impulses: &[DVec3]) -> f64 {
-        let speeds = self.mobilities.iter().zip(impulses).map(|(m, r)| (*m * *r).abs().max_element());
-        speeds.fold(0.0, worse)
+    /// How large impulses on all blocks are.
+    pub fn measure(&self, impulses: &[DVec3]) -> Size {
+        let mut size = Size::default();
+        for (mobility, impulse) in self.mobilities.iter().zip(impulses) {
+            let velocity = *mobility * *impulse;
+            size.squared += impulse.dot(velocity);
+            size.fastest_m_s = worse(size.fastest_m_s, velocity.abs().max_element());
+        }
+        size
     }
 }
 

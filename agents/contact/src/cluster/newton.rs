@@ -70,9 +70,9 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
                     }
                 }
                 // what is left and the contacts are solved together, to the end
-                Refined::Unanswered { goal } => {
+                Refined::Unanswered => {
                     linearise(iterate, aim.form);
-                    most_left = goal;
+                    most_left = 0.0;
                 }
             }
         }
@@ -109,7 +109,7 @@ pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
 
 /// Gains and pulls of all rows; returns the largest miss, that of momentum among them.
 pub(super) fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
-    let mut largest = iterate.system.members.largest_velocity(&iterate.state.left);
+    let mut largest = iterate.system.members.measure(&iterate.state.left).fastest_m_s;
     for k in 0..iterate.rows.len() {
         let (row, at) = (&iterate.rows.rows[k], iterate.state.point(k));
         let (image, scale) = (row.natural_map(form, at), row.scale);

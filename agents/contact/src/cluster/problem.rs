@@ -56,6 +56,9 @@ pub struct Member<'a> {
     pub blocks: &'a [Block],
     /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that moves as it is told.
     pub free: &'a [DVec3],
+    /// The momentum that those velocities do not answer yet, A (v − v̂) of the velocity v that the body would have: kg m/s. Empty for none;
+    /// what is given is solved for together with the contacts.
+    pub unanswered: &'a [DVec3],
     /// Its velocities when the step began, near which gradients look for the answer first; empty where nothing is known.
     pub now: &'a [DVec3],
     /// How much of its own step an impulse moves it by, in fine steps: f ≥ 1 where its step is longer than h, else 1.

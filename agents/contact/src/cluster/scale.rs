@@ -9,17 +9,16 @@ use super::problem::Member;
 use super::rows::{Rows, Term};
 use super::system::System;
 use glam::{DMat3, DVec3};
+use std::ops::Range;
 
 /// Contacts of a member whose exact compliance is compared with the estimate of its diagonal.
 const SAMPLES: usize = 4;
-/// The directions, in the frames of rows, along which they are. All axes are in each: a sum over these is one over axes, as what
-/// joins two axes has both signs.
+/// The directions, in the frames of rows, along which they are. A sum over these is one over axes, as what joins two axes has both signs;
+/// and their own sum is as long as they are together, so that what moves a whole member counts as if each were alone.
 const DIRECTIONS: [DVec3; SAMPLES] =
     [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)];
-/// The most that an iterative solve may leave of a sample's impulses, in shares of them, and how many times what responses may leave: a
-/// compliance is off by about the square.
-const SAMPLE_SHARE: f64 = 0.1;
-const COARSER: f64 = 1e8;
+/// Up to so many blocks there is a solve for each sample; of more, one for all: they are far apart then, and each solve is dear.
+const APART_MAX: usize = 500;
 
 /// Storage for the samples.
 #[derive(Debug, Clone, Default)]
@@ -50,7 +49,10 @@ impl Scales {
         self.samples.resize(system.members.rigid.len(), Sample::default());
         if system.members.blocks.iter().any(|block| block.row != block.column) {
             self.choose(&system.members, rows);
-            (0..SAMPLES).for_each(|sample| self.sample(system, members, rows, sample));
+            let at_once = if system.members.size() > APART_MAX { SAMPLES } else { 1 };
+            for from in (0..SAMPLES).step_by(at_once) {
+                self.sample(system, members, rows, from..from + at_once);
+            }
         }
         let members = &system.members;
         for row in 0..rows.len() {
@@ -89,28 +91,24 @@ impl Scales {
         }
     }
 
-    /// Adds the mobility of every member at one row of its own, along one direction; all members share a solution.
-    fn sample(&mut self, system: &mut System, members: &[Member<'_>], rows: &Rows, sample: usize) {
+    /// Adds the mobility of every member at some of its rows, each along a direction of its own; all members and rows share a solution.
+    fn sample(&mut self, system: &mut System, members: &[Member<'_>], rows: &Rows, which: Range<usize>) {
         let Self { samples, right, x, left } = self;
-        let direction = DIRECTIONS[sample];
         for list in [&mut *right, &mut *x, &mut *left] {
             list.clear();
             list.resize(system.members.size(), DVec3::ZERO);
         }
         for (member, at) in samples.iter_mut().enumerate() {
-            let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
-            for term in terms.filter(|t| system.members.owners[t.block] == member) {
+            for (direction, term) in at.terms(&which, member, &system.members, rows) {
                 let given = term.map.mul_transpose_vec3(direction);
                 right[term.block] += given;
                 at.estimate += given.dot(system.members.mobilities[term.block] * given);
             }
         }
-        let share = (COARSER * system.response_share).min(SAMPLE_SHARE);
-        let goal = share * system.members.size_squared(right).sqrt();
+        let goal = system.sample_share * system.members.measure(right).root();
         system.respond(members, &mut Task { right, x, left, goal });
         for (member, at) in samples.iter_mut().enumerate() {
-            let terms = at.chosen[sample].iter().flat_map(|&row| rows.terms(row));
-            for term in terms.filter(|t| system.members.owners[t.block] == member) {
+            for (direction, term) in at.terms(&which, member, &system.members, rows) {
                 at.exact += direction.dot(term.map * x[term.block]);
             }
         }
@@ -129,6 +127,20 @@ impl Sample {
             }
         }
         self.seen += 1;
+    }
+
+    /// The terms of some of its rows on the member, with the direction of each.
+    fn terms<'a>(
+        self,
+        which: &Range<usize>,
+        member: usize,
+        members: &'a Members,
+        rows: &'a Rows,
+    ) -> impl Iterator<Item = (DVec3, &'a Term)> {
+        let chosen = DIRECTIONS.into_iter().zip(self.chosen).skip(which.start).take(which.len());
+        let terms =
+            chosen.filter_map(|(direction, row)| Some(rows.terms(row?).iter().map(move |term| (direction, term))));
+        terms.flatten().filter(move |(_, term)| members.owners[term.block] == member)
     }
 
     /// Exact over estimated mobility; 1 where nothing was sampled.

@@ -15,6 +15,12 @@ use super::system::StepForm;
 use super::validate::validate;
 use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
+use std::ops::Range;
+
+/// The most that an iterative solve may leave of a sample's impulses, in shares of them, and that by the velocity that responses may leave,
+/// s/m: a scale is off by about the square.
+const SAMPLE_SHARE: f64 = 0.1;
+const SAMPLE_FINER: f64 = 2e6;
 
 /// What a solve aims at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,15 +35,15 @@ pub struct Settings {
     pub convex_only: bool,
     /// How the equations of a step are solved.
     pub form: StepForm,
-    /// The share of the impulses given that velocities may leave unanswered in the iterative form, > 0 (eq. 17): momentum is balanced
-    /// to it. By factors it is balanced to rounding.
-    pub response_share: f64,
+    /// The velocity by which what velocities leave unanswered in the iterative form may change a block by itself, m/s, > 0 (eq. 17). By
+    /// factors momentum is balanced to rounding.
+    pub still_m_s: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
         let form = StepForm::Direct;
-        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 60, convex_only: false, form, response_share: 1e-9 }
+        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 60, convex_only: false, form, still_m_s: 5e-8 }
     }
 }
 
@@ -92,16 +98,29 @@ pub struct Solution {
     /// What the solve took.
     pub report: Report,
     velocities: Vec<DVec3>,
+    unanswered: Vec<DVec3>,
     pub(super) offsets: Vec<usize>,
 }
 
 impl Solution {
+    /// The momentum that the velocity of each block of a member does not answer, N·s: with the next impulses it is solved for again. None where
+    /// there is no such member.
+    #[must_use]
+    pub fn unanswered(&self, member: usize) -> &[DVec3] {
+        &self.unanswered[self.range(member)]
+    }
+
     /// The velocity of each block of a member: v̂ + f A⁻¹ Jᵀ λ (eq. 1), by which its places move. None where there is no such member.
     #[must_use]
     pub fn velocities(&self, member: usize) -> &[DVec3] {
-        let Some(&start) = self.offsets.get(member) else { return &[] };
-        let end = self.offsets.get(member + 1).copied().unwrap_or(self.velocities.len());
-        &self.velocities[start..end]
+        &self.velocities[self.range(member)]
+    }
+
+    /// The blocks of a member.
+    fn range(&self, member: usize) -> Range<usize> {
+        let all = self.velocities.len();
+        let at = |place: usize| self.offsets.get(place).copied().unwrap_or(all);
+        at(member)..at(member + 1)
     }
 }
 
@@ -138,7 +157,12 @@ impl Solver {
     pub fn solve(&mut self, problem: &Problem<'_>) -> Result<&Solution, ProblemError> {
         validate(problem)?;
         self.set_up(problem)?;
-        self.solution.report = if self.iterate.rows.len() > 0 { self.run(problem) } else { Report::resting() };
+        self.solution.report = if self.iterate.rows.len() > 0 {
+            self.run(problem)
+        } else {
+            self.iterate.respond(problem.members);
+            Report::resting()
+        };
         self.hand_out(problem);
         Ok(&self.solution)
     }
@@ -166,7 +190,8 @@ impl Solver {
             velocities.extend_from_slice(member.free);
         }
         let Iterate { rows, system, .. } = &mut self.iterate;
-        (system.form, system.response_share) = (self.settings.form, self.settings.response_share);
+        (system.form, system.still_m_s) = (self.settings.form, self.settings.still_m_s);
+        system.sample_share = (SAMPLE_FINER * self.settings.still_m_s).min(SAMPLE_SHARE);
         system.take_members(problem, offsets)?;
         rows.gather(problem, offsets, velocities);
         system.scale_rows(problem.members, rows);
@@ -180,6 +205,7 @@ impl Solver {
             self.compliances.push(row.compliance_under(warm, yield_m_s));
         }
         self.iterate.reset(self.solution.velocities.len());
+        self.iterate.take_unanswered(problem.members);
         Ok(())
     }
 
@@ -213,7 +239,7 @@ impl Solver {
             self.compliances.clear();
             self.compliances.extend(self.iterate.rows.rows.iter().map(|row| row.compliance));
         };
-        let ray = passivity::guard(&mut self.iterate, &self.solution.velocities);
+        let ray = passivity::guard(&mut self.iterate, problem.members, &self.solution.velocities);
         (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
         report.residual_m_s = newton::largest_miss(&self.iterate, Form::Disc);
@@ -289,6 +315,7 @@ impl Solver {
             solution.compliances_per_kg.push(row.compliance);
             solution.rebounds.push(row.calm.is_some());
         }
+        solution.unanswered.clone_from(&iterate.state.left);
         solution.velocities.iter_mut().zip(&iterate.state.change).for_each(|(v, change)| *v += *change);
     }
 }

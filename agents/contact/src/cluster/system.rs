@@ -29,8 +29,9 @@ pub enum StepForm {
 pub(super) struct System {
     /// The form in which the next members are taken up.
     pub form: StepForm,
-    /// The share of impulses that velocities handed out may leave unanswered (eq. 17).
-    pub response_share: f64,
+    /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17), and the share of a sample that may be left.
+    pub still_m_s: f64,
+    pub sample_share: f64,
     pub members: Members,
     direct: Direct,
     gradients: Gradients,
@@ -50,7 +51,7 @@ impl System {
         self.coupled = false;
         let taken = match self.form {
             StepForm::Direct => self.direct.take_members(&self.members, problem.threads),
-            StepForm::Iterative => self.gradients.take_members(&self.members, problem.threads),
+            StepForm::Iterative => self.gradients.take_members(&self.members),
         };
         taken.map_err(|block| {
             let member = self.members.owners[block];
@@ -77,7 +78,7 @@ impl System {
         if self.form == StepForm::Direct {
             return self.respond(members, task);
         }
-        let operator = Operator { members: &self.members, contacts: None };
+        let operator = Operator { members: &self.members, contacts: None, still_m_s: self.still_m_s };
         self.gradients.measure(&operator, task);
         self.lend(members, task);
     }
@@ -103,7 +104,7 @@ impl System {
             self.right[range.clone()].fill(DVec3::ZERO);
             task.x[range].fill(DVec3::ZERO);
         }
-        let operator = Operator { members: &self.members, contacts: None };
+        let operator = Operator { members: &self.members, contacts: None, still_m_s: self.still_m_s };
         let Task { x, left, goal, .. } = task;
         self.gradients.solve(&operator, &mut Task { right: &self.right, x, left, goal: *goal });
     }
@@ -113,7 +114,7 @@ impl System {
         if !self.coupled {
             match self.form {
                 StepForm::Direct => self.direct.couple(&self.members, contacts.rows),
-                StepForm::Iterative => self.gradients.couple(contacts.rows),
+                StepForm::Iterative => self.gradients.couple(contacts.rows, self.members.size()),
             }
             self.coupled = true;
         }
@@ -130,7 +131,7 @@ impl System {
                 if !self.gradients.precondition(contacts) {
                     return false;
                 }
-                let operator = Operator { members: &self.members, contacts: Some(contacts) };
+                let operator = Operator { members: &self.members, contacts: Some(contacts), still_m_s: self.still_m_s };
                 self.gradients.solve(&operator, task);
             }
         }

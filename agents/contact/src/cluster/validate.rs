@@ -46,6 +46,12 @@ fn member_fault(member: &Member<'_>) -> Option<&'static str> {
     if !member.free.iter().all(|v| v.is_finite()) {
         return Some("a free velocity is not finite");
     }
+    if !(member.unanswered.is_empty() || member.unanswered.len() == size) {
+        return Some("what its free velocities leave unanswered must be one momentum for each of them, or none");
+    }
+    if !member.unanswered.iter().all(|r| r.is_finite()) {
+        return Some("what a free velocity leaves unanswered is not finite");
+    }
     if member.blocks.iter().any(|b| b.row >= size || b.column > b.row) {
         return Some("a block lies outside the lower half of its matrix");
     }

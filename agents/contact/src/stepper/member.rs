@@ -38,11 +38,22 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// The velocity of each block at the end of the step begun, if nothing touched the body.
+    /// The velocity of each block at the end of the step begun, if nothing touched the body; or near it, and [`Self::unanswered`].
     fn free(&self) -> &[DVec3];
+
+    /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.
+    /// Empty for none.
+    fn unanswered(&self) -> &[DVec3] {
+        &[]
+    }
 
     /// The velocity of each block now.
     fn velocities(&self) -> &[DVec3];
+
+    /// Hears before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
+    fn leave(&mut self, unanswered: &[DVec3]) {
+        let _ = unanswered;
+    }
 
     /// Its skin where it is now; `None` where nothing can touch it.
     fn skin(&self) -> Option<PlacedShape<'_>>;

@@ -477,11 +477,11 @@ impl ClusterStepper {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
                 state.begun_s = 0.0;
-                state.start(one.member.velocities(), one.member.free());
+                state.start(&*one.member);
                 state.push(self.outside.answer(place, one.member, own_s / self.macro_s));
             }
             state.part += 1;
-            state.look();
+            state.look(&*one.member);
         }
         Ok(())
     }
@@ -557,6 +557,7 @@ impl ClusterStepper {
             if state.part < state.share {
                 one.member.move_to(&state.before, since_s);
             } else {
+                one.member.leave(&state.unanswered);
                 state.failure = one.member.end(&state.before, since_s, state.touched).err();
                 if !state.held && state.failure.is_none() && !state.late.is_empty() {
                     one.member.carry(&state.late);

@@ -31,11 +31,13 @@ pub(super) struct Progress {
     pub known: Vec<DVec3>,
     /// û: the velocity at which its place moves in this fine step, without the impulses sought.
     pub seen: Vec<DVec3>,
+    /// The momentum that it does not answer yet (clusters.md, eq. 16a): what is solved for together with the impulses sought. Empty for none.
+    pub unanswered: Vec<DVec3>,
     /// û with the impulses that the last solve found, and the velocity at which its place moves by it: in the mean of the fine step, of a
     /// body that flies.
     pub solved: Vec<DVec3>,
     pub going: Vec<DVec3>,
-    /// Its place in the problem; `None` where no row touches it.
+    /// Its place in the problem; `None` where no row touches it and it answers all momentum.
     pub place: Option<usize>,
     /// Whether anything has acted on it for a while since its step began, whether a contact or row of the problem has, and whether one does
     /// by the last solve.
@@ -57,8 +59,9 @@ impl Progress {
         self.work += member.work();
     }
 
-    /// Begins a step from velocities `now` that would be `free` at its end.
-    pub fn start(&mut self, now: &[DVec3], free: &[DVec3]) {
+    /// Begins the step that a member has begun.
+    pub fn start(&mut self, member: &dyn ClusterMember) {
+        let (now, free) = (member.velocities(), member.free());
         self.start.clear();
         self.start.extend_from_slice(now);
         self.gain.clear();
@@ -67,6 +70,8 @@ impl Progress {
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
         self.late.clear();
+        self.unanswered.clear();
+        self.unanswered.resize(member.unanswered().len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
     }
 
@@ -83,9 +88,11 @@ impl Progress {
         self.touched |= !change.is_empty();
     }
 
-    /// Finds v̄(p) and û of the fine step that begins (eq. 24).
-    pub fn look(&mut self) {
-        let Self { share, part, start, gain, given, before, known, seen, .. } = self;
+    /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
+    pub fn look(&mut self, member: &dyn ClusterMember) {
+        let Self { share, part, start, gain, given, before, known, seen, unanswered, .. } = self;
+        let each = f64::from(*share).recip();
+        unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
         let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
         known.clear();
         known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
@@ -106,8 +113,11 @@ impl Progress {
         self.before.clone_from(&self.known);
     }
 
-    /// Takes the velocities at which its place moves with the impulses found (eq. 25).
-    pub fn take(&mut self) {
+    /// Takes the velocities at which its place moves with the impulses found (eq. 25), which leave this unanswered.
+    pub fn take(&mut self, left: &[DVec3]) {
+        if !self.unanswered.is_empty() {
+            self.unanswered.copy_from_slice(left);
+        }
         let p = f64::from(self.part);
         for (at, moved) in self.solved.iter().enumerate() {
             let change = (*moved - self.seen[at]) / p;

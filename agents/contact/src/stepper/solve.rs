@@ -41,7 +41,8 @@ impl ClusterStepper {
     ) -> Result<(), StepError> {
         report.contacts = 0;
         self.joints_ask = 1;
-        if self.search.contacts.is_empty() && self.ties.rows.is_empty() {
+        let is_open = |state: &Progress| !state.unanswered.is_empty();
+        if self.search.contacts.is_empty() && self.ties.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
@@ -107,9 +108,9 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         let Self { solver, search, ties, progress, members, .. } = self;
-        // what no row touches moves as it would, and makes no problem larger
+        // what no row touches and knows how it would move does so, and makes no problem larger
         let mut count = 0..;
-        progress.iter_mut().for_each(|state| state.place = None);
+        progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
         let sides = search.contacts.iter().flat_map(|c| &c.sides).chain(ties.rows.iter().flat_map(|row| &row.sides));
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
@@ -120,6 +121,7 @@ impl ClusterStepper {
             blocks: one.member.blocks(),
             response: one.member.response(),
             free: &state.seen,
+            unanswered: &state.unanswered,
             now: &state.before,
             share: f64::from(state.part),
         }));
@@ -178,7 +180,10 @@ impl ClusterStepper {
     /// Gives every member the impulses found.
     fn give(&mut self, report: &mut ClusterReport) {
         let Self { solver, search, progress, rebounds, .. } = self;
-        progress.iter_mut().for_each(Progress::take);
+        for state in &mut *progress {
+            let left = state.place.map_or(&[][..], |place| solver.solution().unanswered(place));
+            state.take(left);
+        }
         rebounds.note_late(search, &solver.solution().contacts_n_s, progress);
         progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;

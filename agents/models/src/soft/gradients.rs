@@ -25,6 +25,17 @@ pub(super) struct Gradients {
 }
 
 impl Gradients {
+    /// Moves `x` as a whole, which is all that a free fall needs; returns what that leaves of the right side of A x = `right`.
+    pub fn approach(&mut self, blocks: &[Block], right: &[DVec3], x: &mut [DVec3]) -> &[DVec3] {
+        let Self { left, image, products, .. } = self;
+        image.resize(x.len(), DVec3::ZERO);
+        measure(blocks, right, x, image, left);
+        shift(x, together(blocks).inverse(), left);
+        measure(blocks, right, x, image, left);
+        *products = 2;
+        left
+    }
+
     /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places.
     ///
     /// # Errors
@@ -36,16 +47,11 @@ impl Gradients {
         right: &[DVec3],
         x: &mut [DVec3],
     ) -> Result<(), &'static str> {
+        self.approach(blocks, right, x);
         let Self { mobilities, left, direction, image, products } = self;
         mobilities.clear();
         mobilities.extend(diagonal.iter().map(|at| blocks[*at as usize].value.inverse()));
-        image.resize(x.len(), DVec3::ZERO);
         let together = together(blocks).inverse();
-        measure(blocks, right, x, image, left);
-        // what falls freely needs no more than this
-        shift(x, together, left);
-        measure(blocks, right, x, image, left);
-        *products = 2;
         direction.clear();
         direction.resize(x.len(), DVec3::ZERO);
         let mut power = f64::INFINITY;
@@ -96,7 +102,7 @@ fn shift(x: &mut [DVec3], together: DMat3, left: &[DVec3]) {
 }
 
 /// The matrix of all vertices moving alike.
-fn together(blocks: &[Block]) -> DMat3 {
+pub(super) fn together(blocks: &[Block]) -> DMat3 {
     let of = |Block { row, column, value }: &Block| if row == column { *value } else { *value + value.transpose() };
     blocks.iter().map(of).fold(DMat3::ZERO, |sum, value| sum + value)
 }

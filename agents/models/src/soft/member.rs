@@ -24,6 +24,8 @@ pub(super) struct Unknowns {
     now: Vec<DVec3>,
     /// Positions at the start of the step begun, of all vertices.
     start: Vec<DVec3>,
+    /// The velocity of all vertices that answers, in sum, what the step leaves unanswered, m/s.
+    owed_m_s: DVec3,
     kept: Kept,
 }
 
@@ -48,6 +50,22 @@ impl SoftBody {
                 *position += v[row as usize] * factor;
             }
         }
+    }
+
+    /// Adds what momentum is kept to rounding by to the velocities and places at the end of a step.
+    fn pay_owed(&mut self, h_s: f64) {
+        let Self { system, positions, velocities, unknowns, .. } = self;
+        let owed_m_s = std::mem::take(&mut unknowns.owed_m_s);
+        if owed_m_s == DVec3::ZERO {
+            return;
+        }
+        for ((position, velocity), _) in
+            positions.iter_mut().zip(velocities).zip(system.rows()).filter(|(_, row)| row.is_some())
+        {
+            *velocity += owed_m_s;
+            *position += owed_m_s * h_s;
+        }
+        unknowns.now.iter_mut().for_each(|velocity| *velocity += owed_m_s);
     }
 
     /// The side of what is carried so.
@@ -96,8 +114,16 @@ impl ClusterMember for SoftBody {
         &self.unknowns.free
     }
 
+    fn unanswered(&self) -> &[DVec3] {
+        self.system.unanswered()
+    }
+
     fn velocities(&self) -> &[DVec3] {
         &self.unknowns.now
+    }
+
+    fn leave(&mut self, unanswered: &[DVec3]) {
+        self.unknowns.owed_m_s = self.system.together(unanswered);
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -191,13 +217,14 @@ impl ClusterMember for SoftBody {
         for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
             *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
         }
-        self.follow();
         let Self { unknowns, .. } = self;
         let quiet = v
             .iter()
             .zip(&unknowns.now)
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
         unknowns.now.copy_from_slice(v);
+        self.pay_owed(h_s);
+        self.follow();
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;

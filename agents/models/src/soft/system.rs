@@ -3,7 +3,7 @@
 //! In: the contributions of each element, always in the same order. Out: velocities. Never here: the elements themselves.
 //! Theory: docs/theory/soft.md, eq. 1, 2, 4.
 
-use super::gradients::Gradients;
+use super::gradients::{Gradients, together};
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
@@ -14,7 +14,7 @@ const PRODUCTS_LEAST: f64 = 16.0;
 const PRODUCTS_PER_ROOT: f64 = 4.0;
 const PER_BLOCK: f64 = 18.0;
 /// How many solutions a problem that the body shares with others takes by gradients, and by factors.
-const SHARED_SOLUTIONS: f64 = 20.0;
+const SHARED_SOLUTIONS: f64 = 3.0;
 const SHARED_FACTORS: f64 = 2.0;
 /// What fills a volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
 const FACTOR_VERTICES_MAX: usize = 3000;
@@ -32,6 +32,8 @@ pub(super) struct System {
     factor_cost: Option<f64>,
     /// Whether the last solution was made by the factor.
     by_factor: bool,
+    /// What it leaves of the right side where it is left to others to find, moving vertices alone; else empty.
+    unanswered: Vec<DVec3>,
     /// The row of each vertex; none for held ones. Rows rise with the vertices.
     rows: Vec<Option<u32>>,
     /// How many vertices move.
@@ -59,7 +61,7 @@ pub(super) struct System {
 pub(super) enum Purpose {
     /// The body alone.
     Own,
-    /// A problem that it shares with others, which takes its factor where there is one.
+    /// A problem that it shares with others, which takes its factor where there is one, and else finds the solution itself.
     Shared,
 }
 
@@ -167,14 +169,15 @@ impl System {
         }
     }
 
-    /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s); held vertices stay
-    /// still.
+    /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s), or by what is near it
+    /// where others find it; held vertices stay still.
     ///
     /// # Errors
     /// What is wrong where there is no solution.
     pub fn solve(&mut self, impulses: &[DVec3], x: &mut [DVec3], purpose: Purpose) -> Result<(), &'static str> {
         self.by_factor = self.takes_factor(purpose);
-        let Self { factor, gradients, rows, moving, blocks, diagonal, right, solution, .. } = self;
+        let Self { factor, gradients, unanswered, rows, moving, blocks, diagonal, right, solution, .. } = self;
+        unanswered.clear();
         let moved = |list: &[DVec3], into: &mut Vec<DVec3>| {
             into.clear();
             into.extend(rows.iter().zip(list).filter_map(|(row, value)| row.map(|_| *value)));
@@ -187,12 +190,32 @@ impl System {
             made.map(|()| factor.respond(solution))
         } else {
             moved(x, solution);
-            gradients.solve(blocks, diagonal, right, solution)
+            match purpose {
+                Purpose::Own => gradients.solve(blocks, diagonal, right, solution),
+                Purpose::Shared => {
+                    unanswered.extend_from_slice(gradients.approach(blocks, right, solution));
+                    Ok(())
+                }
+            }
         };
         for (x, row) in x.iter_mut().zip(rows) {
             *x = row.map_or(DVec3::ZERO, |row| solution[row as usize]);
         }
         solved
+    }
+
+    /// What the last solution leaves of the right side, moving vertices alone; empty where it was solved for.
+    pub fn unanswered(&self) -> &[DVec3] {
+        &self.unanswered
+    }
+
+    /// The velocity of all moving vertices alike that answers impulses on them in sum, m/s; zero for none.
+    pub fn together(&self, impulses: &[DVec3]) -> DVec3 {
+        if impulses.is_empty() {
+            DVec3::ZERO
+        } else {
+            together(&self.blocks).inverse() * impulses.iter().sum::<DVec3>()
+        }
     }
 
     /// The factor of the last solution, where it was made by one.

@@ -75,7 +75,7 @@ fn slopes_are_those_of_differences() {
 /// A point of 1 kg that meets the floor at 1 m/s, the floor asking for `push_m_s` more.
 fn falling(push_m_s: f64) -> Iterate {
     let blocks = [diagonal(0, DVec3::ONE)];
-    let members = [Member { blocks: &blocks, free: &FALL, now: &[], share: 1.0, response: None }];
+    let members = [Member { blocks: &blocks, free: &FALL, unanswered: &[], now: &[], share: 1.0, response: None }];
     let h_s = 0.01;
     let gap_m = -push_m_s * h_s / 0.2;
     let contacts = [Contact { gap_m, ..contact([Side::node(0, 0), Side::FIXED], DVec3::Z) }];
@@ -97,7 +97,7 @@ fn an_answer_that_makes_energy_is_shortened_to_one_that_does_not() {
     iterate.state.lambda[0] = DVec3::X * 5.0;
     iterate.state.change[0] = DVec3::Z * 5.0;
     iterate.update_velocities();
-    let ray = guard(&mut iterate, &FALL);
+    let ray = guard(&mut iterate, &[], &FALL);
     assert!((ray.share - 0.2).abs() < 1e-15 && (iterate.state.lambda[0].x - 1.0).abs() < 1e-15);
     assert!((ray.work_j + 0.5).abs() < 1e-15);
 }
@@ -110,7 +110,7 @@ fn the_guard_counts_what_an_inexact_response_made() {
     iterate.state.change[0] = DVec3::Z * 2.2;
     iterate.state.left[0] = DVec3::Z * (0.5 - 2.2);
     iterate.update_velocities();
-    let ray = guard(&mut iterate, &FALL);
+    let ray = guard(&mut iterate, &[], &FALL);
     let change = iterate.state.change[0].z;
     let made = 0.5 * (change - 1.0).powi(2) - 0.5 - 0.2 * iterate.state.lambda[0].x;
     assert!((ray.share - 2.3 / 4.84).abs() < 1e-12 && (change - 2.2 * ray.share).abs() < 1e-12, "{ray:?}");

@@ -1,8 +1,8 @@
 //! The iterative form against the direct one and against a slow method: answers, momentum, energy, products, storage.
 
-use super::Case;
 use super::random::{COUNT, Comparison, FINE, compare_with_slow, distance, miss, random_case, solved, velocities};
 use super::scenes::{Stack, momentum_gained, plate_on_soft_block};
+use super::{Case, Seeded};
 use crate::cluster::{Block, Settings, Side, Solution, Solver, StepForm};
 use glam::{DMat3, DVec3};
 
@@ -11,7 +11,7 @@ fn iterative() -> Settings {
 }
 
 /// A depth so large that compliance is the same share of the scale in both forms, whatever the load on the way.
-const EQUAL: Settings = Settings { depth_m: 10.0, response_share: 1e-13, ..FINE };
+const EQUAL: Settings = Settings { depth_m: 10.0, still_m_s: 1e-13, ..FINE };
 
 /// How far apart velocities of both forms are, and the larger miss; `None` where either was cut or compliances are not the same.
 fn apart(case: &Case) -> Option<(f64, f64)> {
@@ -105,7 +105,10 @@ fn a_soft_lattice_of_a_thousand_nodes_takes_a_bounded_count_of_products() {
         assert!(scales < most / 2, "{scales}"); // nothing is given, so there is no step and no response
         let floor: DVec3 = cold.contacts_n_s[..100].iter().sum();
         let off = momentum_gained(&case, &cold, 1000).distance(floor);
-        assert!(off < 1e-7 * floor.length(), "{off} of {floor}"); // what responses may leave, over a thousand nodes
+        // what responses may leave, over a thousand nodes
+        let blocks = case.bodies.iter().flat_map(|body| &body.blocks).filter(|block| block.row == block.column);
+        let most = iterative().still_m_s * blocks.map(|block| block.value.x_axis.x).sum::<f64>();
+        assert!(off < most, "{off} of {floor}, {most}");
     }
 }
 
@@ -121,7 +124,7 @@ fn product(blocks: &[Block], x: &[DVec3]) -> Vec<DVec3> {
     out
 }
 
-/// The share of all impulses that velocities do not answer, over the diagonal blocks, and the energy made beyond biases.
+/// The most that a block would change by for the impulses that velocities do not answer, m/s, and the energy made beyond biases.
 fn unanswered_and_made(case: &Case, solution: &Solution) -> [f64; 2] {
     let mut given: Vec<_> = case.bodies.iter().map(|body| vec![DVec3::ZERO; body.free.len()]).collect();
     let mut give = |sides: &[Side; 2], impulse: DVec3| {
@@ -140,7 +143,7 @@ fn unanswered_and_made(case: &Case, solution: &Solution) -> [f64; 2] {
         give(&r.sides, *p);
         made -= p.dot(r.target_m_s);
     }
-    let [mut left, mut all] = [0.0; 2];
+    let mut left = 0.0_f64;
     for (member, body) in case.bodies.iter().enumerate() {
         let after = solution.velocities(member);
         let change: Vec<_> = after.iter().zip(&body.free).map(|(v, free)| *v - *free).collect();
@@ -148,15 +151,14 @@ fn unanswered_and_made(case: &Case, solution: &Solution) -> [f64; 2] {
             made += gained.dot(after[k] + body.free[k]) * 0.5;
             let diagonal = body.blocks.iter().filter(|b| (b.row, b.column) == (k, k));
             let inverse = diagonal.fold(DMat3::ZERO, |sum, b| sum + b.value).inverse();
-            let (p, off) = (given[member][k], given[member][k] - *gained);
-            (left, all) = (left + off.dot(inverse * off), all + p.dot(inverse * p));
+            left = left.max((inverse * (given[member][k] - *gained)).abs().max_element());
         }
     }
-    [if all > 0.0 { (left / all).sqrt() } else { 0.0 }, made]
+    [left, made]
 }
 
 #[test]
-fn velocities_answer_all_impulses_but_the_share_that_is_told() {
+fn velocities_answer_all_impulses_but_what_is_told() {
     let (mut products, mut cut) = (0, 0);
     for seed in 0..COUNT {
         let case = random_case(seed);
@@ -165,7 +167,7 @@ fn velocities_answer_all_impulses_but_the_share_that_is_told() {
         cut += usize::from(solution.report.cut);
         let [left, made] = unanswered_and_made(&case, &solution);
         // rounding of sums of joules
-        assert!(left < 1.01e-9 && made < 1e-11, "seed {seed}: {left}, {made} J");
+        assert!(left < 5.01e-8 && made < 1e-11, "seed {seed}: {left}, {made} J");
     }
     println!("{products} products, {cut} cut");
     assert!(cut <= 10, "{cut} cut"); // as many as by factors
@@ -175,7 +177,7 @@ fn velocities_answer_all_impulses_but_the_share_that_is_told() {
 fn inner_solves_that_are_cut_make_no_energy() {
     let (mut roughest, mut shortened) = (0.0_f64, 0);
     for (tolerance_m_s, convex_only) in [(0.1, false), (5e-6, false), (0.1, true)] {
-        let settings = Settings { tolerance_m_s, convex_only, response_share: 1e-2, ..iterative() };
+        let settings = Settings { tolerance_m_s, convex_only, still_m_s: 1e-2, ..iterative() };
         for seed in 0..COUNT {
             let case = random_case(seed);
             let solution = solved(&case, settings);
@@ -188,6 +190,51 @@ fn inner_solves_that_are_cut_make_no_energy() {
     }
     println!("up to {roughest:.1e} unanswered, {shortened} shortened");
     assert!(roughest > 1e-3, "{roughest}: nothing was cut");
+}
+
+/// The same problem from free velocities that are off by up to 0.1 m/s, which say so.
+fn unfinished(case: &Case, seed: u64) -> Case {
+    let mut rough = case.clone();
+    let mut random = Seeded::new(seed);
+    for body in &mut rough.bodies {
+        let off: Vec<_> = body.free.iter().map(|_| random.vector() * 0.1).collect();
+        body.unanswered = product(&body.blocks, &off);
+        body.free.iter_mut().zip(&off).for_each(|(free, off)| *free -= *off);
+    }
+    rough
+}
+
+#[test]
+fn free_velocities_that_are_not_finished_are_finished_with_the_contacts() {
+    let mut comparison = Comparison::default();
+    for seed in 0..COUNT {
+        let case = random_case(seed);
+        let rough = unfinished(&case, seed);
+        for form in [StepForm::Direct, StepForm::Iterative] {
+            let [exact, other] = [&case, &rough].map(|case| solved(case, Settings { form, ..EQUAL }));
+            if !exact.report.cut && !other.report.cut {
+                let apart = distance(&velocities(&case, &exact), &velocities(&rough, &other));
+                comparison.add(apart, miss(&case, &exact).max(miss(&case, &other)));
+            }
+        }
+    }
+    comparison.tell();
+    let Comparison { compared, ambiguous, .. } = comparison;
+    assert!(compared > COUNT as usize * 3 / 2 && ambiguous <= 4, "{compared}, {ambiguous}");
+}
+
+#[test]
+fn what_is_not_finished_makes_no_energy() {
+    for (still_m_s, convex_only) in [(1e-2, false), (1e-2, true), (5e-8, false)] {
+        let settings = Settings { convex_only, still_m_s, ..iterative() };
+        for seed in 0..COUNT {
+            let case = random_case(seed);
+            let solution = solved(&unfinished(&case, seed), settings);
+            let [left, made] = unanswered_and_made(&case, &solution);
+            // rounding of sums of joules
+            assert!(left < 1.01 * still_m_s && made < 1e-11, "seed {seed}: {left}, {made} J");
+        }
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ const SPIN: usize = 1;
 
 /// Joints as hard as they become: they give way by a ten-millionth of what they hold.
 fn hard(form: StepForm) -> Settings {
-    Settings { tolerance_m_s: 1e-10, depth_m: 1e-12, form, response_share: 1e-12, ..Settings::default() }
+    Settings { tolerance_m_s: 1e-10, depth_m: 1e-12, form, still_m_s: 1e-12, ..Settings::default() }
 }
 
 fn solved(bodies: &[Body], rows: Vec<JointRow>) -> Solution {

@@ -36,7 +36,14 @@ fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
     let response = |k: usize| (lends && k.is_multiple_of(2)).then(|| &lent[k] as &dyn Response);
     let bodies = case.bodies.iter().enumerate();
     let members: Vec<_> = bodies
-        .map(|(k, body)| Member { blocks: &body.blocks, free: &body.free, now: &[], share: 1.5, response: response(k) })
+        .map(|(k, body)| Member {
+            blocks: &body.blocks,
+            free: &body.free,
+            unanswered: &[],
+            now: &[],
+            share: 1.5,
+            response: response(k),
+        })
         .collect();
     let (contacts, rows) = (&case.contacts, &case.rows);
     let problem = Problem { h_s: case.h_s, members: &members, contacts, rows, threads: &PlainLoop };
@@ -48,7 +55,7 @@ fn solved(case: &Case, settings: Settings, lends: bool) -> (Solution, usize) {
 fn members_that_lend_a_factor_get_the_velocities_of_those_that_do_not() {
     for form in [StepForm::Direct, StepForm::Iterative] {
         // a depth so large that compliance is the same share of the scale, whatever the load on the way
-        let settings = Settings { form, depth_m: 10.0, response_share: 1e-13, ..FINE };
+        let settings = Settings { form, depth_m: 10.0, still_m_s: 1e-13, ..FINE };
         let (mut compared, mut asked) = (0, 0);
         for seed in 0..COUNT / 4 {
             let case = random_case(seed);

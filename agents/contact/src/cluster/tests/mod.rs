@@ -51,6 +51,8 @@ impl Seeded {
 pub struct Body {
     pub blocks: Vec<Block>,
     pub free: Vec<DVec3>,
+    /// What these leave unanswered; empty for nothing.
+    pub unanswered: Vec<DVec3>,
 }
 
 /// A problem that owns its data.
@@ -68,7 +70,14 @@ impl Case {
         let members: Vec<_> = self
             .bodies
             .iter()
-            .map(|b| Member { blocks: &b.blocks, free: &b.free, now: &[], share: 1.0, response: None })
+            .map(|b| Member {
+                blocks: &b.blocks,
+                free: &b.free,
+                unanswered: &b.unanswered,
+                now: &[],
+                share: 1.0,
+                response: None,
+            })
             .collect();
         work(&Problem {
             h_s: self.h_s,
@@ -88,7 +97,11 @@ pub fn diagonal(block: usize, value: DVec3) -> Block {
 pub fn rigid(mass: f64, half: DVec3) -> Body {
     let (x, y, z) = (half.x * half.x, half.y * half.y, half.z * half.z);
     let inertia = DVec3::new(y + z, z + x, x + y) * (mass / 3.0);
-    Body { blocks: vec![diagonal(0, DVec3::splat(mass)), diagonal(1, inertia)], free: vec![DVec3::ZERO; 2] }
+    Body {
+        blocks: vec![diagonal(0, DVec3::splat(mass)), diagonal(1, inertia)],
+        free: vec![DVec3::ZERO; 2],
+        unanswered: Vec::new(),
+    }
 }
 
 /// A lattice of points with springs to all neighbours, as implicit Euler sees it: A = M + h² K.
@@ -124,7 +137,7 @@ impl Lattice {
                 }
             }
         }
-        Body { blocks, free: vec![DVec3::ZERO; places.len()] }
+        Body { blocks, free: vec![DVec3::ZERO; places.len()], unanswered: Vec::new() }
     }
 }
 

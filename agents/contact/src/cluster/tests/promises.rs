@@ -116,6 +116,7 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
         let members = [crate::cluster::Member {
             blocks: &case.bodies[0].blocks,
             free: &case.bodies[0].free,
+            unanswered: &[],
             now: &[],
             share,
             response: None,

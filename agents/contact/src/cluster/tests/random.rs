@@ -117,7 +117,7 @@ pub const FINE: Settings = Settings {
     passes: 200,
     convex_only: false,
     form: StepForm::Direct,
-    response_share: 1e-12,
+    still_m_s: 1e-12,
 };
 
 #[test]

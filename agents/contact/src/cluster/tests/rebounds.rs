@@ -11,7 +11,7 @@ const HARD: Settings = Settings {
     passes: 200,
     convex_only: false,
     form: crate::cluster::StepForm::Direct,
-    response_share: 1e-12,
+    still_m_s: 1e-12,
 };
 
 fn solved(case: &Case) -> Solution {
