@@ -25,7 +25,7 @@ struct Played {
     seconds: f64,
 }
 
-const LIST: [Played; 14] = [
+const LIST: [Played; 15] = [
     Played { name: "ten boxes", table: || scenes::scene("ten boxes"), seconds: 1.5 },
     Played { name: "box, two ropes, slab", table: || scenes::scene("box on two ropes on a slab"), seconds: 1.5 },
     Played { name: "three cloths, cube", table: || scenes::scene("cube on three cloths"), seconds: 1.5 },
@@ -42,6 +42,18 @@ const LIST: [Played; 14] = [
         name: "soft cube of 1331, plate",
         table: || Table::new(vec![organ(10), block(DVec3::Z * 0.1056, DVec3::new(0.05, 0.05, 0.005), 0.2, 0.0)]),
         seconds: 0.7,
+    },
+    Played {
+        name: "soft cube of 1331, slides",
+        table: || {
+            let spec = solid(DVec3::Z * 0.0502, DVec3::splat(0.1), [10; 3], 12e3);
+            let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
+            Table::new(vec![placed(
+                SoftBody::new(SoftSpec { matter, velocity: DVec3::X * 1.0, ..spec }).unwrap(),
+                false,
+            )])
+        },
+        seconds: 0.4,
     },
     Played { name: "caged bar held, ball", table: caged, seconds: 0.7 },
 ];

@@ -26,7 +26,7 @@ const DECREASE: f64 = 0.2;
 
 /// The share of what is missed that an inexact step may leave (eq. 16), and the least that it comes down to, by the last factor, while
 /// steps do not halve what is missed: rough steps serve as well as exact ones until the laws' kinks are near.
-const LEAVE_MOST: f64 = 0.3;
+const LEAVE_MOST: f64 = 0.1;
 const LEAVE_LEAST: f64 = 1e-3;
 const LEAVE_LESS: f64 = 0.1;
 
