@@ -1,4 +1,4 @@
-//! Every built-in scene, 120 frames in lockstep: the bits of its last state and its whole report stay as they were recorded.
+//! Every built-in scene, 60 frames in lockstep: the bits of its last state and its whole report stay as they were recorded.
 //!
 //! The file says nothing about whether they are right; other tests do. It is what lets structure and names change safely: a commit
 //! that only moves or renames leaves `tests/reference/golden.json` as it is, and one that changes it says old, new and why.
@@ -8,7 +8,7 @@ use crate::play::{lockstep, metachron};
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-const FRAMES: &str = "120";
+const FRAMES: &str = "60";
 /// Keys of a report whose values are measured, whatever the executor.
 const MEASURED: [&str; 1] = ["cpu_s"];
 
