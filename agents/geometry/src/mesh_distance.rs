@@ -97,6 +97,22 @@ impl MeshField {
         });
     }
 
+    /// Whether a triangle meets both a box and the ball around it.
+    pub fn is_in(&self, region: crate::Aabb) -> bool {
+        let (middle, half) = ((region.low + region.high) * 0.5, (region.high - region.low) * 0.5);
+        let mut is_in = false;
+        self.face_tree.traverse(|node| {
+            if misses(node, middle, half) {
+                return TraversalAction::Prune;
+            }
+            let Some(leaf) = node.leaf_data() else { return TraversalAction::Continue };
+            let near = near_triangle(middle, self.faces[leaf as usize].corners);
+            is_in = near.distance_squared(middle) <= half.length_squared();
+            if is_in { TraversalAction::EarlyExit } else { TraversalAction::Continue }
+        });
+        is_in
+    }
+
     /// Every wall within `reach_m` of `centre`, nearest first (eq. 2).
     pub fn touches(&self, centre: DVec3, reach_m: f64, found: &mut Touches) {
         let mut planes = [(DVec3::ZERO, DVec3::ZERO); crate::signed_distance::TOUCHES_MAX];
@@ -110,6 +126,11 @@ impl MeshField {
         }
     }
 
+    /// The nearest wall within `reach_m` of `centre`.
+    pub fn touch(&self, centre: DVec3, reach_m: f64) -> Option<Touch> {
+        self.nearest(centre, reach_m, &[]).map(|place| place.touch(centre))
+    }
+
     /// The nearest surface point in front of all `planes`.
     fn nearest(&self, centre: DVec3, reach_m: f64, planes: &[(DVec3, DVec3)]) -> Option<Place> {
         let front_m = FRONT_SHARE * reach_m;
@@ -117,7 +138,7 @@ impl MeshField {
         self.face_tree.traverse(|node| {
             let bound = best.map_or(reach_m, |b| b.distance * (1.0 + SAME_SHARE));
             let hidden = |&(point, normal): &(DVec3, DVec3)| front_of_box(node, point, normal) <= front_m;
-            if distance_to_box(node, centre) > bound || planes.iter().any(hidden) {
+            if distance2_to_box(node, centre) > bound * bound || planes.iter().any(hidden) {
                 return TraversalAction::Prune;
             }
             if let Some(leaf) = node.leaf_data() {
@@ -311,9 +332,9 @@ fn tree<'a>(items: impl Iterator<Item = &'a [DVec3]>) -> Bvh {
     Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes)
 }
 
-fn distance_to_box(node: &BvhNode, point: DVec3) -> f64 {
+fn distance2_to_box(node: &BvhNode, point: DVec3) -> f64 {
     let (low, high) = (node.mins().as_dvec3(), node.maxs().as_dvec3());
-    (low - point).max(point - high).max(DVec3::ZERO).length()
+    (low - point).max(point - high).max(DVec3::ZERO).length_squared()
 }
 
 /// Extent of the box in front of a plane.
