@@ -188,8 +188,13 @@ impl Field {
 
     /// The nearest contact point of `point` within `reach_m`: the first of [`Self::touches`].
     pub fn touch(&self, point: DVec3, reach_m: f64) -> Option<Touch> {
+        self.touch_by(point, reach_m, &mut None)
+    }
+
+    /// The same, after one of a point near by, and before others: `last` is the triangle of a mesh that was nearest last.
+    pub fn touch_by(&self, point: DVec3, reach_m: f64, last: &mut Option<u32>) -> Option<Touch> {
         match &self.kind {
-            Kind::Mesh(mesh) if mesh.distance_from_bounds(point) <= reach_m => mesh.touch(point, reach_m),
+            Kind::Mesh(mesh) if mesh.distance_from_bounds(point) <= reach_m => mesh.touch(point, reach_m, last),
             Kind::Mesh(_) => None,
             _ => Some(self.nearest(point)).filter(|touch| touch.distance_m <= reach_m),
         }

@@ -74,11 +74,12 @@ impl SurfaceQuery<'_> {
             self.corners_over_skin(block, half_m, into);
             return;
         }
+        let mut last = None;
         for triangle in self.triangles() {
             if self.corners(&triangle, block, field, into) {
                 continue;
             }
-            let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, field) else { continue };
+            let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, &mut last) else { continue };
             let share = if field.corners(DVec3::Z).is_some() { BETTER_SHARE } else { ROUNDING_SHARE };
             if triangle.corners.into_iter().all(|corner| touch.distance_m + share * size_m < apart(corner)) {
                 let key = TouchKey::new(TouchKind::Triangle, [triangle.number, 0]);
@@ -170,14 +171,15 @@ impl SurfaceQuery<'_> {
         Some(if turned { -across } else { across })
     }
 
-    /// The point of a triangle that is nearest to a block, if it is inside the triangle.
-    fn project(&self, triangle: &Triangle, block: &Block<'_>, field: &Field) -> Option<Projected> {
-        let corners = triangle.corners;
+    /// The point of a triangle that is nearest to a block, if it is inside the triangle; `last` is as for [`Field::touch_by`].
+    fn project(&self, triangle: &Triangle, block: &Block<'_>, last: &mut Option<u32>) -> Option<Projected> {
+        let (field, corners) = (block.field?, triangle.corners);
         let radius_m = self.surface.form.radius_m;
         let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
         let size_m = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
         let look_m = radius_m + self.reach_m + 2.0 * size_m;
-        let nearest = |point: DVec3| field.touch(block.inward(Ball { centre: point, radius_m }).centre, look_m);
+        let mut nearest =
+            |point: DVec3| field.touch_by(block.inward(Ball { centre: point, radius_m }).centre, look_m, last);
         let mut touch = nearest(point)?;
         if touch.distance_m - size_m > radius_m + self.reach_m {
             return None; // and so is every point of it
