@@ -71,13 +71,13 @@ impl OwnSkin<'_> {
         triangle.contains(&vertex) || near_triangle(at(vertex), triangle.map(at)).distance(at(vertex)) < self.apart_m
     }
 
-    /// Whether two edges never touch.
-    fn is_crossed(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
+    /// Whether two edges without a common vertex never touch.
+    fn is_crossed(&self, first: [u32; 2], second: [u32; 2]) -> bool {
         let at = |vertex: u32| self.rest[vertex as usize];
-        let (first, second) = ([a, b].map(at), [c, d].map(at));
+        let (first, second) = (first.map(at), second.map(at));
         let (s, t) = near_segments(first, second);
         let apart_m = first[0].lerp(first[1], s).distance(second[0].lerp(second[1], t));
-        [a, b].iter().any(|vertex| [c, d].contains(vertex)) || apart_m < self.apart_m
+        apart_m < self.apart_m
     }
 }
 
@@ -145,8 +145,9 @@ impl<'a> SkinPair<'a> {
         for edge in here.edges() {
             let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
             there.surface.each_edge(around.grown(self.within_m()), |other| {
-                // of two edges of one skin the lower number comes first
-                if self.own.is_some() && edge.number >= other.number {
+                // of two edges of one skin the lower number comes first; most that are near have a vertex in common
+                let is_joined = || edge.vertices.iter().any(|vertex| other.vertices.contains(vertex));
+                if self.own.is_some() && (edge.number >= other.number || is_joined()) {
                     return;
                 }
                 let (s, t) = near_segments(edge.ends, other.ends);
@@ -283,10 +284,11 @@ impl SurfaceQuery<'_> {
             }
         };
         self.surface.each_triangle(region, |Triangle { number, vertices, corners }| {
+            if !counts(vertices) {
+                return;
+            }
             let Some(face) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { return };
-            if (self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING))
-                || !counts(vertices)
-            {
+            if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
                 return;
             }
             let at = near_triangle(point, corners);
