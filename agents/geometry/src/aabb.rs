@@ -2,7 +2,7 @@
 //!
 //! In: points. Out: the box around them. Never here: speeds ([`metachron_core::Bounds`] has them).
 
-use glam::DVec3;
+use glam::{DMat3, DQuat, DVec3};
 
 /// An axis-aligned box, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,5 +50,14 @@ impl Aabb {
     #[must_use]
     pub fn grown(self, by_m: f64) -> Self {
         Self { low: self.low - by_m, high: self.high + by_m }
+    }
+
+    /// The box around this one in axes with this origin and this rotation to those of the box.
+    #[must_use]
+    pub fn seen_from(self, origin: DVec3, rotation: DQuat) -> Self {
+        let back = DMat3::from_quat(rotation.conjugate());
+        let (middle, half) = (back * ((self.low + self.high) * 0.5 - origin), (self.high - self.low) * 0.5);
+        let half = back.x_axis.abs() * half.x + back.y_axis.abs() * half.y + back.z_axis.abs() * half.z;
+        Self { low: middle - half, high: middle + half }
     }
 }

@@ -40,6 +40,8 @@ struct Edge {
 /// The nearest point of one triangle.
 #[derive(Debug, Clone, Copy)]
 struct Place {
+    /// The number of the triangle.
+    face: u32,
     point: DVec3,
     distance: f64,
     /// Sine of the angle between the direction to the query point and the triangle's plane; negative behind it.
@@ -97,12 +99,28 @@ impl MeshField {
         });
     }
 
+    /// Whether a triangle meets both a box and the ball around it.
+    pub fn is_in(&self, region: crate::Aabb) -> bool {
+        let (middle, half) = ((region.low + region.high) * 0.5, (region.high - region.low) * 0.5);
+        let mut is_in = false;
+        self.face_tree.traverse(|node| {
+            if misses(node, middle, half) {
+                return TraversalAction::Prune;
+            }
+            let Some(leaf) = node.leaf_data() else { return TraversalAction::Continue };
+            let near = near_triangle(middle, self.faces[leaf as usize].corners);
+            is_in = near.distance_squared(middle) <= half.length_squared();
+            if is_in { TraversalAction::EarlyExit } else { TraversalAction::Continue }
+        });
+        is_in
+    }
+
     /// Every wall within `reach_m` of `centre`, nearest first (eq. 2).
     pub fn touches(&self, centre: DVec3, reach_m: f64, found: &mut Touches) {
         let mut planes = [(DVec3::ZERO, DVec3::ZERO); crate::signed_distance::TOUCHES_MAX];
         let mut count = 0;
         while !found.is_full() {
-            let Some(place) = self.nearest(centre, reach_m, &planes[..count]) else { return };
+            let Some(place) = self.nearest(centre, reach_m, &planes[..count], None) else { return };
             let touch = place.touch(centre);
             planes[count] = (place.point, touch.normal);
             count += 1;
@@ -110,30 +128,47 @@ impl MeshField {
         }
     }
 
-    /// The nearest surface point in front of all `planes`.
-    fn nearest(&self, centre: DVec3, reach_m: f64, planes: &[(DVec3, DVec3)]) -> Option<Place> {
+    /// The nearest wall within `reach_m` of `centre`. `last` is the triangle that was nearest to a point near by, if any, and then that of
+    /// this one: the search is shorter, with the same end.
+    pub fn touch(&self, centre: DVec3, reach_m: f64, last: &mut Option<u32>) -> Option<Touch> {
+        let place = self.nearest(centre, reach_m, &[], *last)?;
+        *last = Some(place.face);
+        Some(place.touch(centre))
+    }
+
+    /// The nearest surface point in front of all `planes`. Where there are none, it is no farther than that of the triangle `last`.
+    fn nearest(&self, centre: DVec3, reach_m: f64, planes: &[(DVec3, DVec3)], last: Option<u32>) -> Option<Place> {
         let front_m = FRONT_SHARE * reach_m;
+        let counts = |place: &Place| !place.behind_rim(&self.faces[place.face as usize]) && place.distance <= reach_m;
+        let known = last.map(|face| self.place(face, centre)).filter(counts);
+        let far_m = known.map_or(reach_m, |place| place.distance * (1.0 + SAME_SHARE));
         let mut best: Option<Place> = None;
         self.face_tree.traverse(|node| {
-            let bound = best.map_or(reach_m, |b| b.distance * (1.0 + SAME_SHARE));
+            let bound = best.map_or(far_m, |b| b.distance * (1.0 + SAME_SHARE));
             let hidden = |&(point, normal): &(DVec3, DVec3)| front_of_box(node, point, normal) <= front_m;
-            if distance_to_box(node, centre) > bound || planes.iter().any(hidden) {
+            if distance2_to_box(node, centre) > bound * bound || planes.iter().any(hidden) {
                 return TraversalAction::Prune;
             }
             if let Some(leaf) = node.leaf_data() {
-                let place = self.faces[leaf as usize].place(centre);
+                let place = self.place(leaf, centre);
                 let seen = |&(point, normal): &(DVec3, DVec3)| (place.point - point).dot(normal) > front_m;
-                if !place.behind_rim(&self.faces[leaf as usize])
-                    && place.distance <= reach_m
-                    && planes.iter().all(seen)
-                    && best.is_none_or(|b| place.before(&b))
-                {
+                if counts(&place) && planes.iter().all(seen) && best.is_none_or(|b| place.before(&b)) {
                     best = Some(place);
                 }
             }
             TraversalAction::Continue
         });
         best
+    }
+
+    /// The point of a triangle that is nearest to `centre`.
+    fn place(&self, face: u32, centre: DVec3) -> Place {
+        let Face { corners, normal, .. } = self.faces[face as usize];
+        let point = near_triangle(centre, corners);
+        let way = centre - point;
+        let distance = way.length();
+        let side = if distance > 0.0 { way.dot(normal) / distance } else { 1.0 };
+        Place { face, point, distance, side, normal }
     }
 
     /// The convex or border edge nearest to the inside of a span, and the fraction of the span at which it is.
@@ -192,14 +227,6 @@ fn misses(node: &BvhNode, middle: DVec3, half: DVec3) -> bool {
 }
 
 impl Face {
-    fn place(&self, centre: DVec3) -> Place {
-        let point = near_triangle(centre, self.corners);
-        let way = centre - point;
-        let distance = way.length();
-        let side = if distance > 0.0 { way.dot(self.normal) / distance } else { 1.0 };
-        Place { point, distance, side, normal: self.normal }
-    }
-
     /// The nearest points of a segment and this triangle: the segment's, and the triangle's.
     fn near_span(&self, span: [DVec3; 2]) -> (DVec3, DVec3) {
         let [a, b] = span;
@@ -311,9 +338,9 @@ fn tree<'a>(items: impl Iterator<Item = &'a [DVec3]>) -> Bvh {
     Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes)
 }
 
-fn distance_to_box(node: &BvhNode, point: DVec3) -> f64 {
+fn distance2_to_box(node: &BvhNode, point: DVec3) -> f64 {
     let (low, high) = (node.mins().as_dvec3(), node.maxs().as_dvec3());
-    (low - point).max(point - high).max(DVec3::ZERO).length()
+    (low - point).max(point - high).max(DVec3::ZERO).length_squared()
 }
 
 /// Extent of the box in front of a plane.

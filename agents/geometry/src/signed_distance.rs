@@ -5,7 +5,7 @@
 
 use super::mesh_distance::MeshField;
 use super::parry_shapes::{hull_triangles, mesh_triangles};
-use super::{Obstacle, ShapeError, Solid};
+use super::{Aabb, Obstacle, ShapeError, Solid};
 use glam::{DQuat, DVec2, DVec3};
 
 /// A point of an obstacle's surface near a query point.
@@ -186,6 +186,42 @@ impl Field {
         found
     }
 
+    /// The nearest contact point of `point` within `reach_m`: the first of [`Self::touches`].
+    pub fn touch(&self, point: DVec3, reach_m: f64) -> Option<Touch> {
+        self.touch_by(point, reach_m, &mut None)
+    }
+
+    /// The same, after one of a point near by, and before others: `last` is the triangle of a mesh that was nearest last.
+    pub fn touch_by(&self, point: DVec3, reach_m: f64, last: &mut Option<u32>) -> Option<Touch> {
+        match &self.kind {
+            Kind::Mesh(mesh) if mesh.distance_from_bounds(point) <= reach_m => mesh.touch(point, reach_m, last),
+            Kind::Mesh(_) => None,
+            _ => Some(self.nearest(point)).filter(|touch| touch.distance_m <= reach_m),
+        }
+    }
+
+    /// Whether the surface may be in a box, or the box is inside it; of a mesh that, only where a point counts as inside to the depth `deep_m`.
+    pub fn is_in(&self, around: Aabb, deep_m: f64) -> bool {
+        let (middle, half) = ((around.low + around.high) * 0.5, (around.high - around.low) * 0.5);
+        match &self.kind {
+            Kind::Mesh(mesh) => mesh.is_in(around) || self.inside(middle, deep_m).is_some(),
+            _ => {
+                // a convex solid is in front of its tangent plane
+                let touch = self.nearest(middle);
+                touch.distance_m <= touch.normal.abs().dot(half)
+            }
+        }
+    }
+
+    /// The contact point of a point that is inside by at most `deep_m`.
+    pub fn inside(&self, point: DVec3, deep_m: f64) -> Option<Touch> {
+        let is_apart = |mesh: &MeshField| mesh.distance_from_bounds(point) > 0.0;
+        if self.mesh().is_some_and(is_apart) {
+            return None;
+        }
+        self.touch(point, deep_m).filter(|touch| touch.distance_m < 0.0)
+    }
+
     /// Whether the inside of a span can come nearer than both of its ends: never with an infinite plane.
     pub fn needs_span_tests(&self) -> bool {
         !matches!(self.kind, Kind::Plane)
@@ -232,7 +268,7 @@ impl Field {
     /// overlaps the bound is up to half a span deeper than necessary.
     pub fn gap_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<Touch> {
         let at_end = |ball: Ball| {
-            let near = self.touches(ball.centre, ball.radius_m + reach_m).iter().next()?;
+            let near = self.touch(ball.centre, ball.radius_m + reach_m)?;
             Some(Touch { distance_m: near.distance_m - ball.radius_m, ..near })
         };
         let inside = if let Kind::Mesh(mesh) = &self.kind {

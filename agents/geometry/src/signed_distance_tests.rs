@@ -2,7 +2,7 @@
 
 use super::closest_points::{near_segments, near_triangle};
 use super::signed_distance::{Ball, Field};
-use super::{Obstacle, Solid};
+use super::{Aabb, Obstacle, Solid};
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
@@ -50,6 +50,18 @@ proptest! {
             let surface = first(&field, point - touch.normal * touch.distance_m);
             // f64: coordinates near 1 and tens of roundings
             prop_assert!(surface.distance_m.abs() < 1e-12, "{solid:?}: {} m off", surface.distance_m);
+        }
+    }
+
+    /// A box is left out only where all of it is in front of the surface, and is where the surface is beyond the ball around it.
+    #[test]
+    fn a_box_with_a_point_inside_is_in_and_one_far_outside_is_not(middle in vector(1.5), half in 0.01_f64..0.3) {
+        for solid in primitives().into_iter().chain([hull(HALF)]) {
+            let (field, around) = (place(solid.clone()), Aabb::about(middle, half));
+            let places = corners(DVec3::splat(half)).into_iter().chain([DVec3::ZERO]).map(|by| middle + by);
+            let is_in = field.is_in(around, 10.0);
+            prop_assert!(is_in || places.into_iter().all(|place| first(&field, place).distance_m > 0.0), "{solid:?}");
+            prop_assert!(!is_in || first(&field, middle).distance_m <= 3.0_f64.sqrt() * half + 1e-9, "{solid:?}");
         }
     }
 

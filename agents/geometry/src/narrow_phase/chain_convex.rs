@@ -78,8 +78,7 @@ impl StrandOnBlock<'_> {
         let mut places = self.field.touches(ball.centre, ball.radius_m + self.reach_m);
         if places.iter().next().is_none() {
             // a hull or mesh is searched as deep as the reach; for a node deeper inside the nearest way out is added
-            let deep = self.field.touches(ball.centre, self.block.deep_m).iter().next();
-            deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
+            self.field.inside(ball.centre, self.block.deep_m).into_iter().for_each(|touch| places.push(touch));
         }
         for (place, touch) in (0..).zip(places.iter()) {
             let key = key(node, place);
@@ -131,7 +130,7 @@ impl StrandOnBlock<'_> {
         }
         let at = |share: f64| {
             let ball = ends[0].toward(ends[1], share);
-            let touch = self.field.touches(ball.centre, ball.radius_m + self.reach_m).iter().next();
+            let touch = self.field.touch(ball.centre, ball.radius_m + self.reach_m);
             touch.filter(|touch| touch.distance_m - ball.radius_m <= level_m).map(|touch| (share, touch))
         };
         let toward = (to - from).signum();

@@ -17,6 +17,7 @@ mod mesh_convex;
 mod primitives;
 mod self_chain;
 mod shape_cache;
+mod skin_tree;
 mod static_solid;
 mod surface;
 mod swept;
@@ -72,7 +73,7 @@ pub fn touches(
 ) {
     into.clear();
     let NarrowPhaseScratch { known, searches, .. } = scratch;
-    known.prepare(a.form, b.form);
+    known.prepare(a, b);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
         for (j, other) in second.iter() {
@@ -165,6 +166,7 @@ pub fn self_touches(
             }
         }
         (ShapePose::Surface(positions), RestShape::Surface(rest)) if positions.len() == rest.len() => {
+            known.prepare_pieces(placed);
             for (_, piece) in Pieces::of(placed, known).iter() {
                 if let Piece::Surface(surface) = piece {
                     searches.surfaces.self_touches(surface, rest, reach_m, into);
@@ -201,7 +203,7 @@ pub fn gap(
     scratch: &mut NarrowPhaseScratch,
 ) -> Option<(DVec3, f64)> {
     let NarrowPhaseScratch { known, searches, .. } = scratch;
-    known.prepare(a.form, b.form);
+    known.prepare(a, b);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;
     for (_, piece) in first.iter() {

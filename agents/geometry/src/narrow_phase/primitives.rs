@@ -4,6 +4,7 @@
 
 use super::shape_cache::{PARTS, ShapeCache};
 use super::skin;
+use super::skin_tree::PlacedSkin;
 use crate::Solid;
 use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
@@ -29,6 +30,8 @@ pub(super) struct Surface<'a> {
     pub positions: &'a [DVec3],
     /// Lowest and highest coordinates of the vertices.
     pub bounds: Aabb,
+    /// Its features by place, and its normals.
+    pub skin: &'a PlacedSkin,
 }
 
 /// Balls joined by spans.
@@ -109,9 +112,9 @@ impl<'a> Pieces<'a> {
                     *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces }));
                 }
             }
-            (ShapeKind::Surface(form), ShapePose::Surface(positions)) if !positions.is_empty() => {
-                let bounds = Aabb::of(positions);
-                pieces.0[0] = Some(Piece::Surface(Surface { form, positions, bounds }));
+            (ShapeKind::Surface(form), ShapePose::Surface(positions)) => {
+                let surface = |skin: &'a PlacedSkin| Surface { form, positions, bounds: skin.bounds(), skin };
+                pieces.0[0] = known.skins.placed(form, positions).map(surface).map(Piece::Surface);
             }
             _ => {}
         }
@@ -164,6 +167,17 @@ impl Piece<'_> {
         }
     }
 
+    /// Whether a part of it may be in a box, or, of a block, around it.
+    pub fn is_in(&self, around: Aabb) -> bool {
+        match self {
+            Self::Strand(strand) => strand.is_in(around),
+            Self::Block(block) => block
+                .field
+                .is_some_and(|field| field.is_in(around.seen_from(block.origin, block.rotation), block.deep_m)),
+            Self::Surface(surface) => surface.skin.meets(around.grown(surface.form.radius_m)),
+        }
+    }
+
     /// A ball around it.
     pub fn around(&self) -> Ball {
         if let Self::Block(block) = self {
@@ -184,6 +198,15 @@ impl Piece<'_> {
 }
 
 impl Strand<'_> {
+    /// Whether a span may be in a box: with what is behind it by its thickness.
+    fn is_in(&self, around: Aabb) -> bool {
+        let is_near = |span: usize| {
+            let [a, b] = self.ends(span);
+            Aabb::of(&[a.centre, b.centre]).grown(2.0 * a.radius_m.max(b.radius_m)).meets(around)
+        };
+        (0..self.spans()).any(is_near)
+    }
+
     /// The nodes, metres.
     pub fn positions(&self) -> &[DVec3] {
         match &self.nodes {

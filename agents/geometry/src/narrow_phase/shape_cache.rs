@@ -1,9 +1,10 @@
-//! Cache of per-form geometry: fields of solids, and the solids that make up a tool.
+//! Cache of per-form geometry: fields of solids, the solids that make up a tool, skins where they are.
 //!
-//! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
+//! In: forms at their places. Out: fields and parts in their own axes, and skins in the world's. Never here: contacts.
 
+use super::skin_tree::SkinCache;
 use crate::signed_distance::{Ball, Field};
-use crate::{Aabb, CollisionShape, ShapeKind, SolidShape};
+use crate::{Aabb, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
@@ -20,6 +21,8 @@ pub(super) struct ShapeCache {
     fields: Vec<(Solid, Option<Field>)>,
     hulls: Vec<(Solid, Option<SharedShape>)>,
     tools: Vec<(ToolShape, Option<[ToolSolid; PARTS]>)>,
+    /// Skins where they were last.
+    pub skins: SkinCache,
 }
 
 /// A part of a tool as a solid.
@@ -32,22 +35,23 @@ pub(super) struct ToolSolid {
 
 impl ShapeCache {
     /// Caches the data that a search between `a` and `b` needs.
-    pub fn prepare(&mut self, a: &CollisionShape, b: &CollisionShape) {
-        for (form, other) in [(a, b), (b, a)] {
-            match &form.kind {
-                ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.kind) => self.prepare_solid(solid),
-                _ => self.prepare_pieces(form),
+    pub fn prepare(&mut self, a: &PlacedShape<'_>, b: &PlacedShape<'_>) {
+        for (placed, other) in [(a, b), (b, a)] {
+            match &placed.form.kind {
+                ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.form.kind) => self.prepare_solid(solid),
+                _ => self.prepare_pieces(placed),
             }
         }
     }
 
     /// Caches the data that the pieces of a form need where its own field is not asked.
-    pub fn prepare_pieces(&mut self, form: &CollisionShape) {
-        match &form.kind {
-            ShapeKind::Solid(SolidShape { solid, shape, .. }) if shape.as_trimesh().is_some() => {
+    pub fn prepare_pieces(&mut self, placed: &PlacedShape<'_>) {
+        match (&placed.form.kind, placed.view) {
+            (ShapeKind::Solid(SolidShape { solid, shape, .. }), _) if shape.as_trimesh().is_some() => {
                 self.prepare_hull(solid)
             }
-            ShapeKind::Tool(shape) => self.prepare_tool(shape),
+            (ShapeKind::Tool(shape), _) => self.prepare_tool(shape),
+            (ShapeKind::Surface(form), ShapePose::Surface(positions)) => self.skins.prepare(form, positions),
             _ => {}
         }
     }

@@ -110,13 +110,13 @@ impl StaticSolid {
         match &self.mesh {
             Some(_) => {
                 into.clear();
-                scratch.known.prepare_pieces(body.form);
+                scratch.known.prepare_pieces(body);
                 self.touch_mesh(body, reach_m, scratch, into);
                 finish(into);
             }
             None if self.is_plane() && is_rigid => {
                 into.clear();
-                scratch.known.prepare_pieces(body.form);
+                scratch.known.prepare_pieces(body);
                 self.touch_slab(body, reach_m, scratch, into);
                 finish(into);
             }
@@ -161,7 +161,7 @@ impl StaticSolid {
             let placed = PlacedShape { form: &self.form, view };
             return first_share(body, &SweptShape { start: placed, end: placed }, reach_m, &mut scratch.known, swept);
         }
-        scratch.known.prepare_pieces(body.start.form);
+        scratch.known.prepare_pieces(&body.start);
         let elements = Elements::of(body, &scratch.known)?;
         let mut earliest: Option<f64> = None;
         let mut meet = |number: usize, other: Element<'_>, face: DVec3| {
@@ -177,7 +177,7 @@ impl StaticSolid {
             if let Some(Element::HalfSpace { point, up }) = plane {
                 meet(number, Element::HalfSpace { point, up }, up);
             } else if let Some(field) = field {
-                field.triangles_in(self.inward(around), |_, corners, face| {
+                field.triangles_in(around.seen_from(self.position, self.rotation), |_, corners, face| {
                     let start = corners.map(|corner| self.position + self.rotation * corner);
                     let other = Element::Corners { start, ways: [DVec3::ZERO; 3], radii_m: [0.0; 3] };
                     meet(number, other, self.rotation * face);
@@ -185,14 +185,6 @@ impl StaticSolid {
             }
         }
         earliest
-    }
-
-    /// A box around a box of the world, in this solid's axes.
-    fn inward(&self, Aabb { low, high }: Aabb) -> Aabb {
-        let back = DMat3::from_quat(self.rotation.conjugate());
-        let (middle, half) = (back * ((low + high) * 0.5 - self.position), (high - low) * 0.5);
-        let half = back.x_axis.abs() * half.x + back.y_axis.abs() * half.y + back.z_axis.abs() * half.z;
-        Aabb { low: middle - half, high: middle + half }
     }
 
     const fn is_plane(&self) -> bool {

@@ -16,7 +16,7 @@ use super::touch_key::{TouchKey, TouchKind};
 use super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
 use crate::signed_distance::Ball;
-use crate::{Aabb, BoxGrid, Place, Touch};
+use crate::{Aabb, Place, SurfaceShape, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use surface_surface::SkinPair;
@@ -24,56 +24,10 @@ use surface_surface::SkinPair;
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 
-/// Scratch storage for searches.
+/// Scratch storage for searches: the patches of either surface that are near the other.
 #[derive(Default)]
 pub(super) struct SurfaceScratch {
-    /// For a closed surface the outward normal at each vertex, of any length; `others` holds those of the other surface.
-    normals: Vec<DVec3>,
-    others: Vec<DVec3>,
-    /// The triangles and edges of both surfaces by place, where many are asked for.
-    indices: [SkinIndex; 2],
-}
-
-/// From so many vertices near another skin on its triangles and edges are sorted by place.
-const MANY: usize = 32;
-
-/// The triangles and edges of a skin within a region, by place.
-#[derive(Default)]
-struct SkinIndex {
-    triangles: FeatureIndex,
-    edges: FeatureIndex,
-}
-
-/// Features of one kind within a region, by place.
-#[derive(Default)]
-struct FeatureIndex {
-    numbers: Vec<u32>,
-    grid: BoxGrid,
-}
-
-impl FeatureIndex {
-    /// Sorts the features with these boxes, numbered from 0, that meet the region.
-    fn fill(&mut self, boxes: impl Iterator<Item = Aabb> + Clone, region: Aabb, cell_m: f64) {
-        let near = (0..).zip(boxes).filter(|(_, around)| around.meets(region));
-        self.numbers.clear();
-        self.numbers.extend(near.clone().map(|(number, _)| number));
-        self.grid.fill(near.map(|(_, around)| around), cell_m);
-    }
-
-    fn visit(&self, region: Aabb, mut visit: impl FnMut(u32)) {
-        self.grid.visit(region, |at| visit(self.numbers[at as usize]));
-    }
-}
-
-impl SkinIndex {
-    /// Sorts the features of a surface that meet the region.
-    fn fill(&mut self, surface: &Surface<'_>, region: Aabb) {
-        let cell_m = surface.form.edge_m.max(f64::MIN_POSITIVE);
-        let triangles = surface.form.triangles.iter().map(|corners| Aabb::of(&surface.corners(*corners)));
-        self.triangles.fill(triangles, region, cell_m);
-        let edges = surface.form.edges.iter().map(|ends| Aabb::of(&ends.map(|vertex| surface.at(vertex))));
-        self.edges.fill(edges, region, cell_m);
-    }
+    patches: [Vec<u32>; 2],
 }
 
 /// A point of a surface: three vertices with shares.
@@ -216,27 +170,28 @@ impl Surface<'_> {
         Triangle { number, vertices, corners: self.corners(vertices) }
     }
 
-    /// The edges within `region`.
-    fn edges_in(&self, region: Aabb) -> impl Iterator<Item = Edge> {
-        let Aabb { low, high } = region;
-        let all = (0..self.form.edges.len() as u32).map(|number| self.edge(number));
-        all.filter(move |Edge { ends: [a, b], .. }| a.min(*b).cmple(high).all() && a.max(*b).cmpge(low).all())
+    /// Visits the edges that meet a region, in any order.
+    fn each_edge(&self, region: Aabb, visit: impl FnMut(Edge)) {
+        let patches = self.skin.patches(|around| around.meets(region));
+        self.edges_of(patches, region).for_each(visit);
     }
 
-    /// The triangles within `region`.
-    fn triangles_in(&self, region: Aabb) -> impl Iterator<Item = Triangle> {
-        let Aabb { low, high } = region;
-        let all = (0..self.form.triangles.len() as u32).map(|number| self.triangle(number));
-        all.filter(move |Triangle { corners: [a, b, c], .. }| {
-            a.min(*b).min(*c).cmple(high).all() && a.max(*b).max(*c).cmpge(low).all()
-        })
+    /// Visits the triangles that meet a region, in any order.
+    fn each_triangle(&self, region: Aabb, visit: impl FnMut(Triangle)) {
+        let patches = self.skin.patches(|around| around.meets(region));
+        self.triangles_of(patches, region).for_each(visit);
     }
 
-    /// The vertices of the skin within `region`, and where they are.
-    fn vertices_in(&self, region: Aabb) -> impl Iterator<Item = (u32, DVec3)> {
-        let Aabb { low, high } = region;
-        let all = self.form.vertices.iter().map(|vertex| (*vertex, self.at(*vertex)));
-        all.filter(move |(_, at)| at.cmple(high).all() && at.cmpge(low).all())
+    /// The edges of patches that meet a region.
+    fn edges_of(&self, patches: impl Iterator<Item = u32>, region: Aabb) -> impl Iterator<Item = Edge> {
+        let edges = patches.flat_map(|patch| self.skin.edges(patch)).map(|number| self.edge(*number));
+        edges.filter(move |edge| Aabb::of(&edge.ends).meets(region))
+    }
+
+    /// The triangles of patches that meet a region.
+    fn triangles_of(&self, patches: impl Iterator<Item = u32>, region: Aabb) -> impl Iterator<Item = Triangle> {
+        let triangles = patches.flat_map(|patch| self.skin.triangles(patch)).map(|number| self.triangle(*number));
+        triangles.filter(move |triangle| Aabb::of(&triangle.corners).meets(region))
     }
 }
 
@@ -251,20 +206,15 @@ fn shares(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
 impl SurfaceScratch {
     /// Every place within `reach_m`, with normals towards the surface.
     pub(super) fn touches(&mut self, surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64, into: &mut Vec<Touch>) {
-        let within_m = reach_m + surface.form.radius_m;
-        let region = other.bounds().grown(within_m);
-        compute_normals(surface, &mut self.normals);
-        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals, index: None };
+        let [first, second] = &mut self.patches;
+        let region = other.bounds().grown(reach_m + surface.form.radius_m);
+        let look_m = look_m(surface, other, reach_m);
+        let near = surface.skin.patches(|around| other.is_in(around.grown(look_m)));
+        first.clear();
+        first.extend(near);
+        let query = SurfaceQuery { surface, reach_m, region, patches: first };
         match other {
-            Piece::Strand(strand) => {
-                let mut query = query;
-                let [index, _] = &mut self.indices;
-                if strand.count() > 1 && query.is_many() {
-                    index.fill(surface, region.grown(2.0 * strand.widest_m));
-                    query.index = Some(&*index);
-                }
-                query.strand(strand, into);
-            }
+            Piece::Strand(strand) => query.strand(strand, into),
             Piece::Block(block) => {
                 let Some(field) = block.field else { return };
                 match field.half_extents_m() {
@@ -273,17 +223,11 @@ impl SurfaceScratch {
                 }
             }
             Piece::Surface(there) => {
-                compute_normals(there, &mut self.others);
-                let region = surface.bounds.grown(within_m + there.form.radius_m);
-                let mut back = SurfaceQuery { surface: there, reach_m, region, normals: &self.others, index: None };
-                let mut query = query;
-                let look_m = SkinPair::new(&query, &back).look_m();
-                let [first, second] = &mut self.indices;
-                if query.is_many() || back.is_many() {
-                    first.fill(surface, there.bounds.grown(look_m));
-                    second.fill(there, surface.bounds.grown(look_m));
-                    (query.index, back.index) = (Some(&*first), Some(&*second));
-                }
+                let region = surface.bounds.grown(reach_m + surface.form.radius_m + there.form.radius_m);
+                let near = there.skin.patches(|around| surface.skin.meets(around.grown(look_m)));
+                second.clear();
+                second.extend(near);
+                let back = SurfaceQuery { surface: there, reach_m, region, patches: second };
                 SkinPair::new(&query, &back).touches(into);
             }
         }
@@ -291,26 +235,22 @@ impl SurfaceScratch {
 
     /// Every place within `reach_m` of a surface with itself; `rest` holds its vertices at rest.
     pub(super) fn self_touches(&mut self, surface: &Surface<'_>, rest: &[DVec3], reach_m: f64, into: &mut Vec<Touch>) {
-        compute_normals(surface, &mut self.normals);
-        let [index, _] = &mut self.indices;
-        index.fill(surface, surface.bounds);
-        let region = surface.bounds;
-        let query = SurfaceQuery { surface, reach_m, region, normals: &self.normals, index: Some(index) };
+        let [patches, _] = &mut self.patches;
+        patches.clear();
+        patches.extend(surface.skin.patches(|_| true));
+        let query = SurfaceQuery { surface, reach_m, region: surface.bounds, patches };
         SkinPair::with_itself(&query, rest).self_touches(into);
     }
 }
 
-/// Computes the normals of the vertices of a closed surface; none for an open one.
-fn compute_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
-    into.clear();
-    if !surface.form.closed {
-        return;
-    }
-    into.resize(surface.positions.len(), DVec3::ZERO);
-    for triangle in surface.form.triangles.iter() {
-        let [a, b, c] = surface.corners(*triangle);
-        let normal = (b - a).cross(c - a);
-        triangle.iter().for_each(|vertex| into[*vertex as usize] += normal);
+/// How far from a part of the other the vertices, edges and triangles of a surface are tested, beyond what [`Piece::is_in`] allows, metres.
+fn look_m(surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64) -> f64 {
+    let SurfaceShape { radius_m, edge_m, .. } = *surface.form;
+    match other {
+        Piece::Strand(_) => radius_m + reach_m,
+        // a corner of the block may be that deep behind a triangle
+        Piece::Block(_) => radius_m + reach_m.max(DEEP_SHARE * edge_m) + LEAN_SHARE * edge_m,
+        Piece::Surface(there) => SkinPair::look_m([surface.form, there.form], reach_m),
     }
 }
 
@@ -327,51 +267,41 @@ pub(super) fn gap(surface: &Surface<'_>, other: &Piece<'_>) -> (DVec3, f64) {
 struct SurfaceQuery<'a> {
     surface: &'a Surface<'a>,
     reach_m: f64,
-    /// Nothing outside this box is near.
+    /// Nothing outside this box and these patches is near.
     region: Aabb,
-    normals: &'a [DVec3],
-    /// Its triangles and edges by place, as far as they are near the other one.
-    index: Option<&'a SkinIndex>,
+    patches: &'a [u32],
 }
 
 impl SurfaceQuery<'_> {
-    /// Whether many of its vertices are near the other.
-    fn is_many(&self) -> bool {
-        self.surface.vertices_in(self.region).take(MANY).count() == MANY
+    /// For a closed surface the outward normal at each vertex, of any length; none for an open one.
+    fn normals(&self) -> &[DVec3] {
+        self.surface.skin.normals()
     }
 
-    /// Visits the triangles within a region, in any order.
-    fn each_triangle(&self, region: Aabb, mut visit: impl FnMut(Triangle)) {
-        match self.index {
-            Some(index) => index.triangles.visit(region, |number| {
-                let triangle = self.surface.triangle(number);
-                if Aabb::of(&triangle.corners).meets(region) {
-                    visit(triangle);
-                }
-            }),
-            None => self.surface.triangles_in(region).for_each(visit),
-        }
+    /// The vertices near the other, and where they are.
+    fn vertices(&self) -> impl Iterator<Item = (u32, DVec3)> {
+        let Aabb { low, high } = self.region;
+        let all = self.patches.iter().flat_map(|patch| self.surface.skin.vertices(*patch));
+        let placed = all.map(|vertex| (*vertex, self.surface.at(*vertex)));
+        placed.filter(move |(_, at)| at.cmple(high).all() && at.cmpge(low).all())
     }
 
-    /// Visits the edges within a region, in any order.
-    fn each_edge(&self, region: Aabb, mut visit: impl FnMut(Edge)) {
-        match self.index {
-            Some(index) => index.edges.visit(region, |number| {
-                let edge = self.surface.edge(number);
-                if Aabb::of(&edge.ends).meets(region) {
-                    visit(edge);
-                }
-            }),
-            None => self.surface.edges_in(region).for_each(visit),
-        }
+    /// The edges near the other.
+    fn edges(&self) -> impl Iterator<Item = Edge> {
+        self.surface.edges_of(self.patches.iter().copied(), self.region)
+    }
+
+    /// The triangles near the other.
+    fn triangles(&self) -> impl Iterator<Item = Triangle> {
+        self.surface.triangles_of(self.patches.iter().copied(), self.region)
     }
 
     fn strand(&self, strand: &Strand<'_>, into: &mut Vec<Touch>) {
-        for (vertex, at) in self.surface.vertices_in(self.region) {
+        for (vertex, at) in self.vertices() {
             let nearest = nearest_on(strand, at);
             let core = ball_at(strand, nearest).centre;
             // a point behind the skin of a closed body is pushed out by its triangles
-            let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
+            let outside = self.normals().get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
             let (key, point) = (vertex_key(vertex), SkinPoint::vertex(vertex, at));
             if self.is_rope() {
                 into.extend(self.beside_rope(key, point, strand, nearest));
@@ -383,7 +313,7 @@ impl SurfaceQuery<'_> {
         for span in 0..strand.spans() {
             let [a, b] = strand.ends(span);
             let around = Aabb::of(&[a.centre, b.centre]).grown(within_m + a.radius_m.max(b.radius_m));
-            self.each_edge(around, |edge| into.extend(self.edge_beside(&edge, strand, span)));
+            self.surface.each_edge(around, |edge| into.extend(self.edge_beside(&edge, strand, span)));
         }
         for node in 0..strand.count() {
             self.node_over(strand, node, into);
@@ -399,7 +329,7 @@ impl SurfaceQuery<'_> {
         let here = StrandPoint { span, share };
         let (point, ball) = (edge.at(at), ball_at(strand, here));
         let way = ball.centre - point.position;
-        let faces = |vertex: &u32| self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0);
+        let faces = |vertex: &u32| self.normals().get(*vertex as usize).is_none_or(|normal| normal.dot(way) >= 0.0);
         let outside = edge.vertices.iter().all(faces);
         let key = TouchKey::new(TouchKind::Edge, [edge.number, span as u32]);
         let is_nearest = outside && edge.feature().is_nearest(self.surface, way);
@@ -413,7 +343,7 @@ impl SurfaceQuery<'_> {
         let key = |triangle: u32| TouchKey::new(TouchKind::Triangle, [triangle, node as u32]);
         // of two lines as near as each other that of the lesser triangle, in whatever order they are visited
         let (mut is_over, mut beside) = (false, None::<(f64, u32, SkinPoint)>);
-        self.each_triangle(Aabb::about(centre, within_m), |triangle| {
+        self.surface.each_triangle(Aabb::about(centre, within_m), |triangle| {
             if let Some(point) = triangle.inside(centre) {
                 is_over = true;
                 into.extend(self.strand_contact(key(triangle.number), point, strand, strand.node(node)));
@@ -451,7 +381,7 @@ impl SurfaceQuery<'_> {
         let way = point - ball.centre;
         let out = if spot.is_of_triangle() && self.surface.form.closed { self.out_of(spot) } else { None };
         // a core that lies exactly in the skin of a closed body counts as outside it
-        let inward = || spot.out(self.normals).and_then(DVec3::try_normalize).map(|out| -out);
+        let inward = || spot.out(self.normals()).and_then(DVec3::try_normalize).map(|out| -out);
         let across = || self.out_of(spot).or_else(inward).unwrap_or(DVec3::Z);
         let length = way.length();
         let (mut normal, mut distance) = if length > CROSSING_M { (way / length, length) } else { (across(), 0.0) };
@@ -487,7 +417,7 @@ impl SurfaceQuery<'_> {
     /// Whether a point is in front of a triangle that is nearer than `within_m`.
     fn is_before(&self, point: DVec3, within_m: f64) -> bool {
         let mut is_before = false;
-        self.each_triangle(Aabb::about(point, within_m), |Triangle { corners: [a, b, c], .. }| {
+        self.surface.each_triangle(Aabb::about(point, within_m), |Triangle { corners: [a, b, c], .. }| {
             let way = point - near_triangle(point, [a, b, c]);
             is_before |= way.length() < within_m * (1.0 - LEAN_SHARE) && (b - a).cross(c - a).dot(way) > 0.0;
         });

@@ -93,7 +93,7 @@ pub(super) fn first_share(
     known: &mut ShapeCache,
     scratch: &mut SweptScratch,
 ) -> Option<f64> {
-    known.prepare(a.start.form, b.start.form);
+    known.prepare(&a.start, &b.start);
     let [first, second] = [a, b].map(|shape| Elements::of(shape, known));
     let (first, second) = (first?, second?);
     let SweptScratch { hull, grid, boxes, .. } = scratch;

@@ -86,10 +86,10 @@ impl SurfaceQuery<'_> {
     pub(super) fn box_touches(&self, block: &Block<'_>, half_m: DVec3, into: &mut Vec<Touch>) {
         let cuboid = PlacedBox::of(block, half_m);
         self.corners_over(&cuboid, into);
-        for (vertex, at) in self.surface.vertices_in(self.region) {
+        for (vertex, at) in self.vertices() {
             into.extend(self.vertex_on(&cuboid, vertex, at));
         }
-        for edge in self.surface.edges_in(self.region) {
+        for edge in self.edges() {
             for rim in cuboid.rims() {
                 into.extend(self.edge_across(&cuboid, &edge, &rim));
             }
@@ -119,7 +119,7 @@ impl SurfaceQuery<'_> {
     /// A vertex over or under a face that looks against the skin: of several the one that it is least deep under. One that is deep has
     /// come in sideways where that way out is much shorter.
     fn vertex_on(&self, cuboid: &PlacedBox, vertex: u32, at: DVec3) -> Option<Touch> {
-        let out = self.normals[vertex as usize].try_normalize()?;
+        let out = self.normals()[vertex as usize].try_normalize()?;
         let (local, rim_m) = (cuboid.local(at), LEAN_SHARE * self.surface.form.edge_m);
         let beyond = local.abs() - cuboid.half_m;
         let mut nearest: Option<(f64, DVec3)> = None;
@@ -179,21 +179,24 @@ impl SurfaceQuery<'_> {
         let radius_m = self.surface.form.radius_m;
         let around = Aabb::about(at, radius_m + self.reach_m.max(self.deep_m()));
         let mut nearest: Option<(f64, DVec3, SkinPoint, u32)> = None;
-        for Triangle { vertices, corners, number } in self.surface.triangles_in(around) {
+        self.surface.each_triangle(around, |Triangle { vertices, corners, number }| {
             let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize();
-            let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { continue };
+            let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { return };
             let gap_m = out.dot(at - corners[0]);
             let position = at - out * gap_m;
-            let is_near = nearest.is_none_or(|(least_m, ..)| gap_m.abs() < least_m.abs());
+            // of those as near as each other the lesser number counts
+            let is_near = nearest.is_none_or(|(least_m, _, _, first)| {
+                gap_m.abs() < least_m.abs() || (gap_m.abs() == least_m.abs() && number < first)
+            });
             if !is_near || gap_m < -self.deep_m() || faces.iter().any(|face| face.dot(-out) < -HALF) {
-                continue;
+                return;
             }
-            let Some(shares) = shares(position, corners) else { continue };
+            let Some(shares) = shares(position, corners) else { return };
             if shares.iter().all(|share| *share >= -LEAN_SHARE) {
                 let point = SkinPoint { spot: BarycentricPoint { vertices, shares }, position };
                 nearest = Some((gap_m, -out, point, number));
             }
-        }
+        });
         let (gap_m, normal, point, triangle) = nearest?;
         self.place_on_box(TouchKey::new(TouchKind::Triangle, [triangle, bits as u32]), point, normal, gap_m - radius_m)
     }

@@ -44,11 +44,11 @@ impl SurfaceQuery<'_> {
         let radius_m = self.surface.form.radius_m;
         let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
         let nearest = |at: DVec3| {
-            let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
+            let near = field.touch(inward(at).centre, radius_m + self.reach_m);
             // a hull or mesh is searched as deep as the reach; for a point deeper inside the nearest way out is used
-            near.or_else(|| field.touches(inward(at).centre, block.deep_m).iter().next().filter(|t| t.distance_m < 0.0))
+            near.or_else(|| field.inside(inward(at).centre, block.deep_m))
         };
-        for (vertex, at) in self.surface.vertices_in(self.region) {
+        for (vertex, at) in self.vertices() {
             let touch = nearest(at).and_then(|touch| self.out(Feature::Vertex(vertex), block, touch));
             if let Some(touch) = touch {
                 let key = vertex_key(vertex);
@@ -59,7 +59,7 @@ impl SurfaceQuery<'_> {
             return;
         }
         let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
-        for edge in self.surface.edges_in(self.region) {
+        for edge in self.edges() {
             let ends = edge.ends;
             let Some((share, touch)) = field.lowest_of_span(ends.map(inward), self.reach_m) else { continue };
             let better_m = ROUNDING_SHARE * ends[0].distance(ends[1]);
@@ -74,11 +74,12 @@ impl SurfaceQuery<'_> {
             self.corners_over_skin(block, half_m, into);
             return;
         }
-        for triangle in self.surface.triangles_in(self.region) {
+        let mut last = None;
+        for triangle in self.triangles() {
             if self.corners(&triangle, block, field, into) {
                 continue;
             }
-            let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, field) else { continue };
+            let Some(Projected { point, touch, size_m }) = self.project(&triangle, block, &mut last) else { continue };
             let share = if field.corners(DVec3::Z).is_some() { BETTER_SHARE } else { ROUNDING_SHARE };
             if triangle.corners.into_iter().all(|corner| touch.distance_m + share * size_m < apart(corner)) {
                 let key = TouchKey::new(TouchKind::Triangle, [triangle.number, 0]);
@@ -109,7 +110,7 @@ impl SurfaceQuery<'_> {
         let field = block.field?;
         let here = block.inward(Ball { centre: self.surface.at(vertex), radius_m: 0.0 }).centre;
         let beside = here + (local - touch.normal).normalize_or_zero() * (BESIDE_SHARE * self.surface.form.edge_m);
-        let there = field.touches(beside, self.surface.form.radius_m + self.reach_m).iter().next()?;
+        let there = field.touch(beside, self.surface.form.radius_m + self.reach_m)?;
         (there.normal.dot(touch.normal) > FLAT).then_some(touch)
     }
 
@@ -150,15 +151,17 @@ impl SurfaceQuery<'_> {
 
     /// Whether a line crosses the skin.
     fn crosses(&self, [from, to]: [DVec3; 2]) -> bool {
-        self.surface.triangles_in(Aabb::of(&[from, to])).any(|Triangle { corners, .. }| {
+        let mut crosses = false;
+        self.surface.each_triangle(Aabb::of(&[from, to]), |Triangle { corners, .. }| {
             let [a, b, c] = corners;
             let across = (b - a).cross(c - a);
             let [before, after] = [from, to].map(|end| across.dot(end - a));
             let cut = from.lerp(to, before / (before - after));
-            before * after <= 0.0
+            crosses |= before * after <= 0.0
                 && before != after
-                && shares(cut, corners).is_some_and(|shares| shares.iter().all(|share| *share > -ROUNDING_SHARE))
-        })
+                && shares(cut, corners).is_some_and(|shares| shares.iter().all(|share| *share > -ROUNDING_SHARE));
+        });
+        crosses
     }
 
     /// The normal of a triangle towards a block: out of a closed skin, and of an open one on the side of the block's middle.
@@ -168,25 +171,34 @@ impl SurfaceQuery<'_> {
         Some(if turned { -across } else { across })
     }
 
-    /// The point of a triangle that is nearest to a block, if it is inside the triangle.
-    fn project(&self, triangle: &Triangle, block: &Block<'_>, field: &Field) -> Option<Projected> {
-        let corners = triangle.corners;
+    /// The point of a triangle that is nearest to a block, if it is inside the triangle; `last` is as for [`Field::touch_by`].
+    fn project(&self, triangle: &Triangle, block: &Block<'_>, last: &mut Option<u32>) -> Option<Projected> {
+        let (field, corners) = (block.field?, triangle.corners);
         let radius_m = self.surface.form.radius_m;
-        if let Some(projected) = self.nearest_of_hull(triangle, block) {
-            return Some(projected);
-        }
         let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
         let size_m = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
         let look_m = radius_m + self.reach_m + 2.0 * size_m;
-        let mut found = None;
-        for _ in 0..PROJECTIONS {
-            found = Some(field.touches(block.inward(Ball { centre: point, radius_m }).centre, look_m).iter().next()?);
-            let touch = found?;
+        let mut nearest =
+            |point: DVec3| field.touch_by(block.inward(Ball { centre: point, radius_m }).centre, look_m, last);
+        let mut touch = nearest(point)?;
+        if touch.distance_m - size_m > radius_m + self.reach_m {
+            return None; // and so is every point of it
+        }
+        if let Some(projected) = self.nearest_of_hull(triangle, block) {
+            return Some(projected);
+        }
+        for left in (0..PROJECTIONS).rev() {
             let foot = point - block.rotation * touch.normal * touch.distance_m;
-            point = near_triangle(foot, corners);
+            let next = near_triangle(foot, corners);
+            if next == point {
+                break;
+            }
+            point = next;
+            if left > 0 {
+                touch = nearest(point)?;
+            }
         }
         let point = triangle.inside(point)?;
-        let mut touch = found?;
         if touch.distance_m >= -BETTER_SHARE * self.surface.form.edge_m {
             touch.normal = block.rotation.conjugate() * -self.facing(corners, block)?;
         }
@@ -230,8 +242,12 @@ impl SurfaceQuery<'_> {
     /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there: through every
     /// face that meets there.
     fn is_pierced(&self, spot: BarycentricPoint, normal: DVec3) -> bool {
-        let mut faces = self.surface.form.triangles.iter().filter(|triangle| spot.is_on(triangle));
-        let faces_it = |triangle: &[u32; 3]| self.surface.out(*triangle).is_some_and(|out| out.dot(normal) <= PIERCED);
-        self.surface.form.closed && !faces.any(faces_it)
+        let (surface, mut is_faced) = (self.surface, false);
+        let corner = spot.vertices.into_iter().zip(spot.shares).find(|(_, share)| *share != 0.0);
+        let at = corner.map_or(DVec3::NAN, |(vertex, _)| surface.at(vertex));
+        surface.each_triangle(Aabb::about(at, 0.0), |Triangle { vertices, .. }| {
+            is_faced |= spot.is_on(&vertices) && surface.out(vertices).is_some_and(|out| out.dot(normal) <= PIERCED);
+        });
+        surface.form.closed && !is_faced
     }
 }

@@ -7,7 +7,7 @@ use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
 use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::capsule_chain::CROSSING_M;
-use crate::{Aabb, Touch};
+use crate::{Aabb, SurfaceShape, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -71,13 +71,13 @@ impl OwnSkin<'_> {
         triangle.contains(&vertex) || near_triangle(at(vertex), triangle.map(at)).distance(at(vertex)) < self.apart_m
     }
 
-    /// Whether two edges never touch.
-    fn is_crossed(&self, [a, b]: [u32; 2], [c, d]: [u32; 2]) -> bool {
+    /// Whether two edges without a common vertex never touch.
+    fn is_crossed(&self, first: [u32; 2], second: [u32; 2]) -> bool {
         let at = |vertex: u32| self.rest[vertex as usize];
-        let (first, second) = ([a, b].map(at), [c, d].map(at));
+        let (first, second) = (first.map(at), second.map(at));
         let (s, t) = near_segments(first, second);
         let apart_m = first[0].lerp(first[1], s).distance(second[0].lerp(second[1], t));
-        [a, b].iter().any(|vertex| [c, d].contains(vertex)) || apart_m < self.apart_m
+        apart_m < self.apart_m
     }
 }
 
@@ -99,9 +99,10 @@ impl<'a> SkinPair<'a> {
         Self { here: query, there: query, thick_m: 2.0 * form.radius_m, deep_m, own }
     }
 
-    /// No feature farther than this from a place of the other is asked for, metres.
-    pub fn look_m(&self) -> f64 {
-        self.within_m().max(self.deep_m) + CROSSING_M
+    /// No feature of two skins farther than this from a place of the other is asked for, metres.
+    pub fn look_m([a, b]: [&SurfaceShape; 2], reach_m: f64) -> f64 {
+        let deep_m = DEEP_SHARE * a.edge_m.min(b.edge_m);
+        reach_m.max(deep_m) + a.radius_m + b.radius_m + CROSSING_M
     }
 
     /// Every place of a skin with itself within reach.
@@ -121,7 +122,7 @@ impl<'a> SkinPair<'a> {
 
     fn vertices_here(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
-        for (vertex, at) in here.surface.vertices_in(here.region) {
+        for (vertex, at) in here.vertices() {
             let Some(SkinContact { spot, normal, distance_m }) = self.vertex(here, there, vertex, at) else { continue };
             let (on_a, on_b) = (BarycentricPoint::vertex(vertex).place(), spot.place());
             into.push(Touch { key: vertex_key(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
@@ -130,7 +131,7 @@ impl<'a> SkinPair<'a> {
 
     fn vertices_there(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
-        for (vertex, at) in there.surface.vertices_in(there.region) {
+        for (vertex, at) in there.vertices() {
             let Some(SkinContact { spot, normal, distance_m }) = self.vertex(there, here, vertex, at) else { continue };
             let (on_a, on_b, gap_m) = (spot.place(), BarycentricPoint::vertex(vertex).place(), distance_m - thick_m);
             let key = TouchKey::new(TouchKind::SecondVertex, [vertex, 0]);
@@ -141,11 +142,12 @@ impl<'a> SkinPair<'a> {
     fn edges(&self, into: &mut Vec<Touch>) {
         let Self { here, there, thick_m, .. } = *self;
         let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
-        for edge in here.surface.edges_in(here.region) {
+        for edge in here.edges() {
             let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
-            there.each_edge(around.grown(self.within_m()), |other| {
-                // of two edges of one skin the lower number comes first
-                if self.own.is_some() && edge.number >= other.number {
+            there.surface.each_edge(around.grown(self.within_m()), |other| {
+                // of two edges of one skin the lower number comes first; most that are near have a vertex in common
+                let is_joined = || edge.vertices.iter().any(|vertex| other.vertices.contains(vertex));
+                if self.own.is_some() && (edge.number >= other.number || is_joined()) {
                     return;
                 }
                 let (s, t) = near_segments(edge.ends, other.ends);
@@ -171,7 +173,7 @@ impl<'a> SkinPair<'a> {
 
     /// Where a vertex of the skin `a` touches the skin `b`.
     fn vertex(&self, a: &SurfaceQuery<'_>, b: &SurfaceQuery<'_>, vertex: u32, at: DVec3) -> Option<SkinContact> {
-        let out = BarycentricPoint::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
+        let out = BarycentricPoint::vertex(vertex).out(a.normals()).and_then(DVec3::try_normalize);
         let others = |triangle: [u32; 3]| self.own.is_none_or(|own| !own.is_one(vertex, triangle));
         let near = b.nearest(at, self.within_m(), None, others)?;
         // it is pushed out through a face that it can have come in by
@@ -230,7 +232,7 @@ impl<'a> SkinPair<'a> {
     fn crossing(&self, points: [SkinPoint; 2], ridges: [Feature; 2]) -> Option<(DVec3, f64)> {
         let [a, b] = points.map(|point| point.position);
         let [here, there] = [self.here, self.there];
-        let out = [points[0].spot.out(here.normals), points[1].spot.out(there.normals)];
+        let out = [points[0].spot.out(here.normals()), points[1].spot.out(there.normals())];
         let across = along(ridges[0]).cross(along(ridges[1]));
         if across.length() < PARALLEL {
             return None;
@@ -281,11 +283,12 @@ impl SurfaceQuery<'_> {
                 best = Some((distance2, number, near));
             }
         };
-        self.each_triangle(region, |Triangle { number, vertices, corners }| {
+        self.surface.each_triangle(region, |Triangle { number, vertices, corners }| {
+            if !counts(vertices) {
+                return;
+            }
             let Some(face) = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize() else { return };
-            if (self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING))
-                || !counts(vertices)
-            {
+            if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
                 return;
             }
             let at = near_triangle(point, corners);
@@ -293,7 +296,7 @@ impl SurfaceQuery<'_> {
             offer(number, NearestPoint { spot: BarycentricPoint { vertices, shares }, at, face: Some(face) });
         });
         if self.surface.form.triangles.is_empty() {
-            self.each_edge(region, |edge| {
+            self.surface.each_edge(region, |edge| {
                 let along = edge.ends[1] - edge.ends[0];
                 let foot = (point - edge.ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
                 let SkinPoint { spot, position } = edge.at(foot.clamp(0.0, 1.0));
@@ -305,7 +308,7 @@ impl SurfaceQuery<'_> {
 
     /// Whether a point is inside the closed skin whose nearest place this is.
     fn is_behind(&self, near: NearestPoint, point: DVec3) -> bool {
-        near.spot.out(self.normals).is_some_and(|out| out.dot(point - near.at) < 0.0)
+        near.spot.out(self.normals()).is_some_and(|out| out.dot(point - near.at) < 0.0)
     }
 
     /// Whether a point is inside the skin, at a depth in this range, metres; for an open skin always true.
