@@ -205,7 +205,8 @@ impl ClusterMember for SoftBody {
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
-        self.move_to(v, h_s);
+        self.positions.clone_from(&self.unknowns.start);
+        self.add_moving(v, h_s);
         let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
         if !finite {
             self.positions.clone_from(&self.unknowns.start);
