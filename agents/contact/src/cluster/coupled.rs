@@ -6,7 +6,7 @@
 use super::factor::{Cholesky, Pair, Place};
 use super::gradients::Stiffness;
 use super::problem::Block;
-use super::rows::Rows;
+use super::rows::{Rows, Term};
 use glam::DMat3;
 use glam::DVec3;
 
@@ -34,6 +34,13 @@ pub(super) struct Coupled {
     changes: Vec<bool>,
 }
 
+/// Rows, and what their matrix calls the blocks that they are about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PlacedRows<'a> {
+    pub rows: &'a Rows,
+    pub places: &'a [usize],
+}
+
 /// Two terms of one row, counted over all rows, and where their product goes.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
@@ -44,21 +51,18 @@ struct Meeting {
 }
 
 impl Coupled {
-    /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and, where `whole`, for those of the rows.
-    pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, whole: Option<&Rows>) {
+    /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and those of the rows.
+    pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, rows: PlacedRows<'_>) {
         for row in (0..self.active.len()).filter(|&row| self.active[row]) {
             self.fronts[self.starts[row]..self.starts[row + 1]].iter().for_each(|&front| self.factor.spoil(front));
         }
         self.gains.fill(DMat3::ZERO);
         self.active.fill(false);
-        let known = whole.is_none_or(|rows| self.knows(rows));
-        if !(known && self.factor.fits(size, pairs)) {
-            pairs.extend(whole.iter().flat_map(|rows| couplings(rows)));
+        if !(self.knows(rows) && self.factor.fits(size, pairs)) {
+            pairs.extend(rows.couplings());
             self.changes.clear();
-            if let Some(rows) = whole {
-                self.changes.resize(size, false);
-                rows.all_terms().iter().for_each(|term| self.changes[term.block] = true);
-            }
+            self.changes.resize(size, false);
+            rows.rows.all_terms().iter().for_each(|term| self.changes[rows.places[term.block]] = true);
             if self.factor.shape(size, pairs, &self.changes) {
                 self.forget();
             }
@@ -67,10 +71,11 @@ impl Coupled {
     }
 
     /// Finds where the rows add to the matrix.
-    pub fn meet(&mut self, rows: &Rows) {
-        if self.knows(rows) {
+    pub fn meet(&mut self, placed: PlacedRows<'_>) {
+        if self.knows(placed) {
             return;
         }
+        let PlacedRows { rows, places } = placed;
         self.forget();
         self.gains.resize(rows.len(), DMat3::ZERO);
         self.active.resize(rows.len(), false);
@@ -78,10 +83,11 @@ impl Coupled {
         let terms = rows.all_terms();
         for row in 0..rows.len() {
             self.starts.push(self.fronts.len());
-            self.blocks.extend(rows.terms(row).iter().map(|term| term.block));
+            self.blocks.extend(rows.terms(row).iter().map(|term| places[term.block]));
             for left in rows.range(row) {
                 for right in rows.range(row).start..=left {
-                    let place = self.factor.place(Pair { row: terms[left].block, column: terms[right].block });
+                    let pair = [left, right].map(|term| places[terms[term].block]);
+                    let place = self.factor.place(Pair { row: pair[0], column: pair[1] });
                     self.fronts.extend(place.map(|place| place.front));
                     self.unsorted.extend(place.map(|place| Meeting { row, left, right, place }));
                 }
@@ -94,9 +100,9 @@ impl Coupled {
     }
 
     /// Whether the meetings are those of rows on these blocks.
-    fn knows(&self, rows: &Rows) -> bool {
+    fn knows(&self, PlacedRows { rows, places }: PlacedRows<'_>) -> bool {
         let blocks = (0..rows.len())
-            .flat_map(|row| rows.terms(row).iter().map(|term| term.block).chain(std::iter::once(usize::MAX)));
+            .flat_map(|row| rows.terms(row).iter().map(|term| places[term.block]).chain(std::iter::once(usize::MAX)));
         !self.starts.is_empty() && self.blocks.iter().copied().eq(blocks)
     }
 
@@ -165,13 +171,14 @@ impl Coupled {
     }
 }
 
-/// Where terms of one row meet.
-fn couplings(rows: &Rows) -> impl Iterator<Item = Pair> {
-    (0..rows.len()).flat_map(|row| {
-        let terms = rows.terms(row);
-        terms
-            .iter()
-            .enumerate()
-            .flat_map(|(left, term)| terms[..=left].iter().map(|other| Pair { row: term.block, column: other.block }))
-    })
+impl<'a> PlacedRows<'a> {
+    /// Where terms of one row meet.
+    fn couplings(self) -> impl Iterator<Item = Pair> + 'a {
+        let Self { rows, places } = self;
+        let pair = |term: &Term, other: &Term| Pair { row: places[term.block], column: places[other.block] };
+        (0..rows.len()).flat_map(move |row| {
+            let terms = rows.terms(row).iter().enumerate();
+            terms.flat_map(move |(left, term)| rows.terms(row)[..=left].iter().map(move |other| pair(term, other)))
+        })
+    }
 }

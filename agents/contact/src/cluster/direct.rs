@@ -3,7 +3,7 @@
 //! In: members, rows, and a gain of each row. Out: solutions to rounding. Never here: which form is used, laws of contact.
 //! Theory: `docs/theory/clusters.md`, eq. 8.
 
-use super::coupled::Coupled;
+use super::coupled::{Coupled, PlacedRows};
 use super::factor::{Cholesky, Pair};
 use super::gradients::Stiffness;
 use super::members::Members;
@@ -22,6 +22,8 @@ pub(super) struct Direct {
     blocks: Vec<Block>,
     x: Vec<DVec3>,
     coupled: Coupled,
+    /// What each block is called in `coupled`.
+    places: Vec<usize>,
     pairs: Vec<Pair>,
     /// Factors of the coupled matrix since the members were taken up.
     pub factors: usize,
@@ -59,7 +61,10 @@ impl Direct {
     pub fn couple(&mut self, members: &Members, rows: &Rows) {
         self.pairs.clear();
         self.pairs.extend(members.blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
-        self.coupled.take(members.size(), &members.blocks, &mut self.pairs, Some(rows));
+        self.places.clear();
+        self.places.extend(0..members.size());
+        let rows = PlacedRows { rows, places: &self.places };
+        self.coupled.take(members.size(), &members.blocks, &mut self.pairs, rows);
         self.coupled.meet(rows);
     }
 

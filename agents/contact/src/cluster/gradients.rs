@@ -3,7 +3,7 @@
 //! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6.
 
-use super::coupled::Coupled;
+use super::coupled::{Coupled, PlacedRows};
 use super::factor::Pair;
 use super::members::{Members, Size};
 use super::problem::Block;
@@ -19,6 +19,9 @@ const PRODUCTS_PER_BLOCK: usize = 12;
 const PRODUCTS_MAX: usize = 3000;
 /// The share of a goal at which a round ends: the rest is for rounding, and for what laws then change.
 const SHARE_OF_GOAL: f64 = 0.5;
+
+/// The place of a block that is not near.
+const NOWHERE: usize = usize::MAX;
 
 /// One system of linear equations.
 #[derive(Debug)]
@@ -54,10 +57,15 @@ pub(super) struct Stiffness<'a> {
 /// The preconditioner and the storage of conjugate gradients.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gradients {
-    /// Of ⊕ A/f what is near: all of members that lend a factor and of rigid ones, of others the blocks on the diagonal. With Jᵀ G J whole.
+    /// Of ⊕ A/f what is near, with Jᵀ G J whole: all of members that lend a factor and of rigid ones, of others the blocks on the diagonal
+    /// that rows touch. What is not in it is a block by itself.
     near: Coupled,
+    /// The blocks in `near`, and what each of all blocks is called there.
+    met: Vec<usize>,
+    places: Vec<usize>,
     blocks: Vec<Block>,
     pairs: Vec<Pair>,
+    nearby: Vec<DVec3>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
     /// Products since the members were taken up.
@@ -84,33 +92,45 @@ impl Operator<'_> {
 }
 
 impl Gradients {
-    /// Makes room for the members. That a whole matrix is positive definite is seen of rigid members only, else of its nodes.
+    /// Makes room for the members. Whether a matrix is positive definite is seen of its diagonal only.
     ///
     /// # Errors
-    /// A block that is not positive definite.
+    /// A block that has no inverse.
     pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
-        let size = members.size();
         self.products = 0;
         for list in [&mut self.direction, &mut self.image] {
             list.clear();
-            list.resize(size, DVec3::ZERO);
+            list.resize(members.size(), DVec3::ZERO);
         }
-        let is_near = |block: &&Block| {
-            let owner = members.owners[block.row];
-            block.row == block.column || members.rigid[owner] || members.lends[owner]
-        };
-        self.blocks.clear();
-        self.blocks.extend(members.blocks.iter().filter(is_near));
-        let of_nodes = members.mobilities.iter().position(|mobility| !mobility.is_finite());
-        of_nodes.map_or(Ok(()), Err)
+        let singular = members.mobilities.iter().position(|mobility| !mobility.is_finite());
+        singular.map_or(Ok(()), Err)
     }
 
     /// Takes up which blocks the rows move.
-    pub fn couple(&mut self, rows: &Rows, size: usize) {
-        self.pairs.clear();
-        self.pairs.extend(self.blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
-        self.near.take(size, &self.blocks, &mut self.pairs, Some(rows));
-        self.near.meet(rows);
+    pub fn couple(&mut self, members: &Members, rows: &Rows) {
+        let Self { near, met, places, blocks, pairs, nearby, .. } = self;
+        let is_whole = |block: usize| members.rigid[members.owners[block]] || members.lends[members.owners[block]];
+        places.clear();
+        places.extend((0..members.size()).map(|block| if is_whole(block) { 0 } else { NOWHERE }));
+        rows.all_terms().iter().for_each(|term| places[term.block] = 0);
+        met.clear();
+        for (block, place) in places.iter_mut().enumerate().filter(|(_, place)| **place == 0) {
+            *place = met.len();
+            met.push(block);
+        }
+        blocks.clear();
+        blocks.extend(members.blocks.iter().filter_map(|block| {
+            let [row, column] = [block.row, block.column].map(|block| places[block]);
+            let is_near = row != NOWHERE && (block.row == block.column || is_whole(block.row));
+            is_near.then_some(Block { row, column, ..*block })
+        }));
+        pairs.clear();
+        pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
+        nearby.clear();
+        nearby.resize(met.len(), DVec3::ZERO);
+        let rows = PlacedRows { rows, places };
+        near.take(met.len(), blocks, pairs, rows);
+        near.meet(rows);
     }
 
     /// Makes the preconditioner that of ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without an inverse.
@@ -145,6 +165,14 @@ impl Gradients {
         }
     }
 
+    /// Solves what is near for `left`, into the image.
+    fn solve_near(&mut self, left: &[DVec3]) {
+        let Self { near, met, nearby, image, .. } = self;
+        nearby.iter_mut().zip(&*met).for_each(|(x, &block)| *x = left[block]);
+        near.solve(nearby);
+        nearby.iter().zip(&*met).for_each(|(x, &block)| image[block] = *x);
+    }
+
     /// One round of conjugate gradients.
     fn descend(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         let members = operator.members;
@@ -153,10 +181,10 @@ impl Gradients {
         self.direction.fill(DVec3::ZERO);
         for _ in 0..most {
             // `image` serves as storage for what the preconditioner makes of the residual
-            self.image.copy_from_slice(task.left);
-            match operator.contacts {
-                Some(_) => self.near.solve(&mut self.image),
-                None => self.image.iter_mut().zip(&members.mobilities).for_each(|(z, m)| *z = *m * *z),
+            let by_themselves = self.image.iter_mut().zip(&members.mobilities).zip(&*task.left);
+            by_themselves.for_each(|((z, mobility), left)| *z = *mobility * *left);
+            if operator.contacts.is_some() {
+                self.solve_near(task.left);
             }
             let before = std::mem::replace(&mut power, dot(task.left, &self.image));
             if power <= 0.0 || power.is_nan() {

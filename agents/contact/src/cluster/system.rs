@@ -114,7 +114,7 @@ impl System {
         if !self.coupled {
             match self.form {
                 StepForm::Direct => self.direct.couple(&self.members, contacts.rows),
-                StepForm::Iterative => self.gradients.couple(contacts.rows, self.members.size()),
+                StepForm::Iterative => self.gradients.couple(&self.members, contacts.rows),
             }
             self.coupled = true;
         }
