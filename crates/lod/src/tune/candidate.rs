@@ -50,6 +50,7 @@ impl Candidate {
                 control.set_prices(Prices {
                     frame_s: plant.line.intercept.max(0.0),
                     pixel_s: 0.0,
+                    enlarge_s: 0.0,
                     shading: [object; 4],
                     areas: None,
                 });

@@ -1,0 +1,251 @@
+//! The scale of the picture: how many of its pixels are drawn, where everything else is as coarse as it may be and frames are still late.
+//!
+//! In: the time that a frame would have taken with all else at its coarsest, and what drawing it at another scale would take by the prices.
+//! Out: one of [`SCALES`]. Never here: levels of objects, drawing, enlarging. Theory: `docs/theory/control.md`, section 11.
+//!
+//! Pixels are the last to be taken and the first to be given back. What a scale saves is known from the prices, and its error is learnt from
+//! the time before and after each change; whether a frame is late is decided by the mean of the frames since the last change and its
+//! uncertainty, so that a machine that trembles does not move the picture.
+
+/// Fractions of the picture's width and height that can be drawn: steps of a twentieth, which are not seen.
+pub const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0];
+
+/// Frames of the means, in seconds …
+const WINDOW_S: f64 = 1.0;
+/// … and at least.
+const WINDOW_FRAMES: f64 = 16.0;
+/// Fewest frames that pixels are taken after.
+const FRAMES_MIN: f64 = 3.0;
+/// Standard errors by which a mean must be past a threshold, and what few frames add to that, over their number less one: near Student's
+/// 0.975 quantile.
+const CERTAIN: (f64, f64) = (2.0, 4.6);
+/// A scale is taken if it is predicted to need this fraction of the time, or less …
+const TAKE: f64 = 0.97;
+/// … and given back if the larger one is predicted to need this, or less: less than a step of scale lies between.
+const GIVE: f64 = 0.9;
+/// Seconds after any change before pixels are given back; doubled, up to the second, each time that they have to be taken again within
+/// four times as long.
+const PATIENCE_S: (f64, f64) = (0.5, 16.0);
+/// Variance of what is not known of the pixels' part at first, as a square of a factor; and what each change adds to it, because scenes move.
+const DOUBT: (f64, f64) = (0.25, 0.02);
+/// The range of the learnt factor.
+const FACTOR: (f64, f64) = (0.25, 4.0);
+
+/// One frame, as the controller of the scale sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ScaledFrame {
+    /// Time that it would have taken with all else at its coarsest, seconds, > 0.
+    pub coarsest_s: f64,
+    /// The part of that spent on drawing, seconds, ≥ 0.
+    pub draw_s: f64,
+    /// Whether nothing but pixels is left to take.
+    pub spent: bool,
+    /// Time that it should take, seconds, > 0.
+    pub set_s: f64,
+    /// Time between frames, seconds, > 0.
+    pub period_s: f64,
+}
+
+/// Mean and variance of the newest frames since a change.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Window {
+    frames: f64,
+    mean: f64,
+    variance: f64,
+}
+
+impl Window {
+    fn add(&mut self, x: f64, most: f64) {
+        self.frames = (self.frames + 1.0).min(most);
+        let share = 1.0 / self.frames;
+        let error = x - self.mean;
+        self.mean += share * error;
+        self.variance = (1.0 - share) * (self.variance + share * error * error);
+    }
+
+    /// Standard error of the mean.
+    fn error(&self) -> f64 {
+        libm::sqrt(self.variance / (self.frames - 1.0).max(1.0))
+    }
+
+    /// By how much the mean may be wrong.
+    fn doubt(&self) -> f64 {
+        (CERTAIN.0 + CERTAIN.1 / (self.frames - 1.0).max(1.0)) * self.error()
+    }
+}
+
+/// The times before a change, kept until those after it are known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Change {
+    before: Window,
+    /// By how much the time was to change by the prices.
+    priced_s: f64,
+}
+
+/// Chooses the scale of every picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct RenderScale {
+    /// Numbers of the least and the most of [`SCALES`] allowed.
+    range: (usize, usize),
+    at: usize,
+    /// Times of the frames at this scale.
+    window: Window,
+    draw: Window,
+    /// Seconds at this scale, and since pixels were given back.
+    held_s: f64,
+    given_s: f64,
+    patience_s: f64,
+    change: Option<Change>,
+    /// Whether frames are late by their mean.
+    late: bool,
+    /// How much more the pixels' part changes than by the prices, and the variance of that.
+    factor: f64,
+    doubt: f64,
+}
+
+impl Default for RenderScale {
+    /// Every pixel, always.
+    fn default() -> Self {
+        Self::new((1.0, 1.0))
+    }
+}
+
+impl RenderScale {
+    /// A controller that stays inside `range`, to the scales nearest to its ends.
+    pub fn new(range: (f64, f64)) -> Self {
+        let nearest = |wanted: f64| {
+            let from = |scale: f64| (scale - wanted).abs();
+            let better =
+                |best: usize, (at, scale): (usize, &f64)| if from(*scale) < from(SCALES[best]) { at } else { best };
+            SCALES.iter().enumerate().fold(SCALES.len() - 1, better)
+        };
+        let (least, most) = (nearest(range.0), nearest(range.1));
+        let range = (least.min(most), most);
+        Self {
+            range,
+            at: range.1,
+            window: Window::default(),
+            draw: Window::default(),
+            held_s: 0.0,
+            given_s: f64::INFINITY,
+            patience_s: PATIENCE_S.0,
+            change: None,
+            late: false,
+            factor: 1.0,
+            doubt: DOUBT.0,
+        }
+    }
+
+    /// The scale of the next picture.
+    pub fn scale(&self) -> f64 {
+        SCALES[self.at]
+    }
+
+    /// Whether pixels are taken: what else there is may not take the time that they need.
+    pub fn is_reduced(&self) -> bool {
+        self.at < self.range.1
+    }
+
+    /// The scale of a picture from which no pixels are taken.
+    pub fn most(&self) -> f64 {
+        SCALES[self.range.1]
+    }
+
+    /// Whether pixels are taken, and frames are in time.
+    pub fn helps(&self) -> bool {
+        self.is_reduced() && !self.late
+    }
+
+    /// Forgets the frames at this scale: they were unlike those to come.
+    pub fn disturb(&mut self) {
+        (self.window, self.draw, self.change) = (Window::default(), Window::default(), None);
+    }
+
+    /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture at a scale by the prices, with all else at its coarsest.
+    pub fn observe(&mut self, frame: ScaledFrame, priced_s: impl Fn(f64) -> f64) {
+        let ScaledFrame { coarsest_s, draw_s, spent, set_s, period_s } = frame;
+        let sound = [coarsest_s, set_s, period_s].iter().all(|s| s.is_finite() && *s > 0.0) && draw_s.is_finite();
+        if self.range.0 == self.range.1 || !sound {
+            return;
+        }
+        (self.held_s, self.given_s) = (self.held_s + period_s, self.given_s + period_s);
+        if !spent && !self.is_reduced() {
+            return self.disturb();
+        }
+        let most = (WINDOW_S / period_s).max(WINDOW_FRAMES);
+        self.window.add(coarsest_s, most);
+        self.draw.add(draw_s, most);
+        self.learn(set_s);
+        let Window { mean, frames, .. } = self.window;
+        let doubt = self.window.doubt();
+        self.late = mean > set_s;
+        if frames < FRAMES_MIN {
+            return;
+        }
+        if spent && mean - doubt > set_s {
+            self.take(set_s, &priced_s);
+        } else if self.held_s >= self.patience_s && mean + doubt <= GIVE * set_s {
+            self.give(GIVE * set_s - doubt, &priced_s);
+        }
+    }
+
+    /// Goes to the next larger scale that is predicted to need `most_s` or less: one step, unless enlarging itself costs more than a step.
+    fn give(&mut self, most_s: f64, priced_s: &impl Fn(f64) -> f64) {
+        let mut larger = self.at + 1..=self.range.1;
+        if let Some(to) = larger.find(|at| self.predicted_s(*at, priced_s) <= most_s) {
+            self.given_s = 0.0;
+            self.go(to, priced_s);
+        }
+    }
+
+    /// Goes to the largest scale that is predicted to be in time; to the fastest if there is none.
+    fn take(&mut self, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
+        let predicted = |at: usize| self.predicted_s(at, priced_s);
+        let smaller = (self.range.0..self.at).rev();
+        let fits = smaller.clone().find(|at| predicted(*at) <= TAKE * set_s);
+        let fastest = smaller.min_by(|a, b| predicted(*a).total_cmp(&predicted(*b)));
+        let Some(to) = fits.or(fastest).filter(|to| predicted(*to) < self.window.mean) else { return };
+        if self.given_s < 4.0 * self.patience_s {
+            self.patience_s = (2.0 * self.patience_s).min(PATIENCE_S.1);
+        } else {
+            self.patience_s = PATIENCE_S.0;
+        }
+        self.go(to, priced_s);
+    }
+
+    /// The time of a frame at another scale: drawing changes as by the prices, times what was learnt.
+    fn predicted_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
+        self.window.mean + self.factor * self.priced_change_s(at, priced_s)
+    }
+
+    fn priced_change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
+        let here_s = priced_s(self.scale());
+        if here_s > 0.0 { self.draw.mean * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
+    }
+
+    fn go(&mut self, to: usize, priced_s: &impl Fn(f64) -> f64) {
+        let change = Change { before: self.window, priced_s: self.priced_change_s(to, priced_s) };
+        (self.at, self.held_s) = (to, 0.0);
+        self.disturb();
+        self.change = Some(change);
+    }
+
+    /// Learns the factor from the last change, once as many frames are known after it as patience needs.
+    fn learn(&mut self, set_s: f64) {
+        let Some(Change { before, priced_s }) = self.change.filter(|_| self.held_s >= PATIENCE_S.0) else { return };
+        self.change = None;
+        // a mean of few frames is no better known than to a part of the time
+        let least = 0.01 * set_s;
+        let noise_s2 = [before, self.window].map(|w| w.error() * w.error() + least * least).iter().sum::<f64>();
+        self.doubt += DOUBT.1;
+        let gain = self.doubt / (self.doubt + noise_s2 / (priced_s * priced_s));
+        let measured = (self.window.mean - before.mean) / priced_s;
+        if measured.is_finite() && gain.is_finite() {
+            self.factor = crate::within(self.factor + gain * (measured - self.factor), FACTOR.0, FACTOR.1);
+            self.doubt *= 1.0 - gain;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
