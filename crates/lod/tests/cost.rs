@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-const MACHINE: Stages = Stages { setup: 20.0, polygon: 0.9, vertex: 0.5, pixel: 0.02 };
+const MACHINE: Stages = Stages { setup: 20.0, polygon: 0.9, vertex: 0.5, pixel: 0.02, serial: 0.0 };
 
 /// Draws of all sizes on a machine that trembles by 3 % and takes three times as long once in twenty draws.
 fn benchmark(seed: u64, count: usize, wild: f64, ratio: Option<f64>) -> Vec<Sample> {
@@ -60,6 +60,19 @@ fn fit_finds_the_machine_among_outliers() {
             // 3 % of tremble over some hundred draws of each stage
             assert!((got / want - 1.0).abs() < part, "{name}: {got}, seed {seed}");
         }
+    }
+}
+
+#[test]
+fn stages_one_after_the_other_are_told_from_stages_beside_each_other() {
+    let serial = |seed, serial: f64| {
+        let machine = Stages { serial, ..MACHINE };
+        let draws = benchmark(seed, 200, 0.05, None).into_iter();
+        let slower = draws.map(|s| Sample { time: s.time * machine.time(s.work) / MACHINE.time(s.work), ..s });
+        fit(&slower.collect::<Vec<_>>()).unwrap().stages.serial
+    };
+    for seed in 1..5 {
+        assert_eq!([0.0, 1.0].map(|of| serial(seed, of)), [0.0, 1.0], "seed {seed}");
     }
 }
 

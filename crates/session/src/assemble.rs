@@ -187,6 +187,7 @@ pub fn prices(draw: &DrawPrice) -> Prices {
         polygon: price.triangle_us * 1e-6,
         vertex: price.vertex_us * 1e-6,
         pixel: price.pixel_ns * 1e-9,
+        serial: 0.0,
     };
     Prices {
         frame_s: draw.setup_ms * 1e-3,

@@ -64,7 +64,7 @@ pub struct Backdrop {
 impl Default for Prices {
     /// Two cores with Mesa, from one measurement: the assumption until better prices are known.
     fn default() -> Self {
-        let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
+        let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
         Self { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
     }
 }
@@ -80,6 +80,7 @@ impl Prices {
             polygon: of(s.polygon, p.polygon),
             vertex: of(s.vertex, p.vertex),
             pixel: of(s.pixel, p.pixel),
+            serial: crate::within(s.serial, 0.0, 1.0),
         };
         Self {
             frame_s: of(self.frame_s, usual.frame_s),
@@ -210,7 +211,7 @@ mod tests {
 
     #[test]
     fn held_out_pictures_are_predicted_within_a_tenth_in_nineteen_of_twenty() {
-        let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel };
+        let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel, serial: 0.0 };
         let machine = Prices {
             frame_s: 1.4e-3,
             pixel_s: 6e-9,
@@ -238,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_slower_stage_counts() {
-        let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5 };
+        let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5, serial: 0.0 };
         let prices = Prices { frame_s: 0.0, pixel_s: 0.0, enlarge_s: 0.0, shading: [stages; 4], areas: None };
         // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);

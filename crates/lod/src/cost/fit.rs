@@ -35,7 +35,13 @@ const WILD: f64 = 1.345 * 1.4826;
 /// Least number of samples for a fit.
 const LEAST: usize = 8;
 
-/// Fits setup + max(c₁ polygons + c₂ vertices, c₃ pixels) to samples of both stages; `None` with fewer than eight valid ones.
+/// Parts of the faster stage that may show: a fit chooses among these …
+const SERIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// … and takes a larger one where its median error is below this part of the best before.
+const BETTER: f64 = 0.9;
+
+/// Fits setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels to samples of both stages; `None` with fewer than eight valid
+/// ones.
 ///
 /// The samples should span polygons where pixels are few, and pixels where polygons are few. If the ratio of vertices to polygons is
 /// constant throughout, the two cannot be separated: then c₂ is 0 and c₁ covers both.
@@ -49,18 +55,32 @@ pub fn fit(samples: &[Sample]) -> Option<Fit> {
     if samples.len() < LEAST {
         return None;
     }
-    let mut stages = start(&samples);
-    let mut best = (f64::INFINITY, stages);
+    let all = SERIAL.map(|serial| descend(&samples, Stages { serial, ..start(&samples) }));
+    let Found { stages, .. } =
+        all.into_iter().reduce(|best, next| if next.typical < BETTER * best.typical { next } else { best })?;
+    let error95 = quantile(samples.iter().map(|s| (stages.time(s.work) / s.time - 1.0).abs()), 0.95);
+    Some(Fit { stages, error95, samples: samples.len() })
+}
+
+/// Coefficients, and the median of their relative errors.
+#[derive(Clone, Copy)]
+struct Found {
+    typical: f64,
+    stages: Stages,
+}
+
+/// The best of all rounds from `stages` on.
+fn descend(samples: &[Sample], mut stages: Stages) -> Found {
+    let mut best = Found { typical: f64::INFINITY, stages };
     for _ in 0..ROUNDS {
         let errors: Vec<_> = samples.iter().map(|s| stages.time(s.work) / s.time - 1.0).collect();
         let typical = quantile(errors.iter().map(|e| e.abs()), 0.5);
-        if typical < best.0 {
-            best = (typical, stages);
+        if typical < best.typical {
+            best = Found { typical, stages };
         }
-        stages = round(&samples, &errors, typical, stages);
+        stages = round(samples, &errors, typical, stages);
     }
-    let error95 = quantile(samples.iter().map(|s| (best.1.time(s.work) / s.time - 1.0).abs()), 0.95);
-    Some(Fit { stages: best.1, error95, samples: samples.len() })
+    best
 }
 
 /// Initial guess: both stages as if each were alone, from low quantiles of the time per polygon and per pixel, half the least time as
@@ -71,14 +91,15 @@ fn start(samples: &[Sample]) -> Stages {
         let many = samples.iter().filter(|s| count(&s.work) > 0.0 && s.time > 2.0 * least);
         quantile(many.map(|s| s.time / count(&s.work)), 0.1)
     };
-    Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels) }
+    Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels), serial: 0.0 }
 }
 
 /// One least-squares fit of the relative error, each sample in the stage that was slower by the previous fit (eq. 42).
 fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> Stages {
     let row = |s: &Sample| {
-        let w = s.work;
-        if before.is_filling(w) { [1.0, 0.0, 0.0, w.pixels] } else { [1.0, w.polygons, w.vertices, 0.0] }
+        let (w, hidden) = (s.work, before.serial);
+        let (geometry, fill) = if before.is_filling(w) { (hidden, 1.0) } else { (1.0, hidden) };
+        [1.0, geometry * w.polygons, geometry * w.vertices, fill * w.pixels]
     };
     let mut sums = [[0.0; 5]; 4];
     for (s, error) in samples.iter().zip(errors) {
@@ -97,6 +118,7 @@ fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> St
         polygon: if geometry { polygon } else { before.polygon },
         vertex: if geometry { vertex } else { before.vertex },
         pixel: if fill { pixel } else { before.pixel },
+        ..before
     }
 }
 

@@ -48,13 +48,8 @@ impl Loop {
             // a sum of twelve is nearly normal, of variance 4
             let tremble = (0..12).map(|_| self.random()).sum::<f64>() / 2.0;
             let took_s = self.plant.frame_s(before) * (1.0 + noise * tremble).max(0.1);
-            let frame = ScaledFrame {
-                coarsest_s: took_s,
-                draw_s: took_s,
-                spent: true,
-                set_s: PERIOD_S,
-                period_s: PERIOD_S,
-            };
+            let frame =
+                ScaledFrame { coarsest_s: took_s, draw_s: took_s, spent: true, set_s: PERIOD_S, period_s: PERIOD_S };
             let priced = self.priced;
             self.law.observe(frame, |scale| priced.frame_s(scale));
             self.time_s += PERIOD_S;

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 /// Prices of the plant of these tests: its pixels are the backdrop's.
 fn prices() -> Prices {
-    let object = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
+    let object = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
     Prices { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
 }
 
@@ -349,7 +349,7 @@ proptest! {
         let policy = Policy::ALL[which];
         let mut control = control(policy, 30.0);
         let at = |i: usize| numbers[i % numbers.len()];
-        let stages = crate::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3) };
+        let stages = crate::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3), serial: 0.0 };
         let shading = [stages, prices().of(Shading::Flat), stages, stages];
         control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), enlarge_s: at(5), shading, areas: None });
         let mut views: Vec<_> = (0..8).map(|i| if i % 2 == 0 { tube(i as u32) } else { mesh(i as u32, 1e3, 5000) }).collect();
@@ -376,7 +376,7 @@ proptest! {
 
 /// Six meshes near by on a machine whose pixels cost, at so many frames a second, with time that is left to be used or not.
 fn near_by(target_hz: f64, raise: bool) -> (PictureControl, Vec<ObjectView>) {
-    let stages = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 60e-9 };
+    let stages = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 60e-9, serial: 0.0 };
     let mut control = control(Policy::Adaptive, target_hz);
     control.set_prices(Prices { shading: [stages; 4], ..prices() });
     control.set_raise(raise);
