@@ -7,7 +7,7 @@
 use super::area::Areas;
 use super::plan::LevelDemand;
 use super::view::{ObjectView, Shading};
-use crate::cost::fit::{Sample, fit};
+use crate::cost::fit::{BETTER, SERIAL, Sample, fit};
 use crate::cost::stages::{Stages, Work};
 
 /// Vertices of a closed mesh per triangle (Euler: half as many and two more).
@@ -110,12 +110,16 @@ impl Prices {
             let of = plain.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
             of.map(move |p| (p.polygons, p.pixels, (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects))
         };
-        let object = |shading: Shading| {
-            let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
-            fit(&draws(shading).map(sample).collect::<Vec<_>>()).map(|found| found.stages)
+        let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
+        let samples = Shading::ALL.map(|shading| draws(shading).map(sample).collect::<Vec<_>>());
+        // whether stages work beside each other is the machine's, whatever the shading
+        let fits = |serial: f64| {
+            let [flat, gouraud, per_pixel, textured] = samples.each_ref().map(|of| fit(of, serial));
+            let all = [flat?, gouraud?, per_pixel?, textured?];
+            Some((all.iter().map(|fit| fit.error50).sum::<f64>(), all.map(|fit| fit.stages)))
         };
-        let [flat, gouraud, per_pixel, textured] = Shading::ALL.map(object);
-        let shading = [flat?, gouraud?, per_pixel?, textured?];
+        let best = SERIAL.into_iter().filter_map(fits);
+        let (_, shading) = best.reduce(|best, next| if next.0 < BETTER * best.0 { next } else { best })?;
         let [flat, gouraud, per_pixel, textured] =
             Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
         let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);

@@ -36,7 +36,7 @@ const FACTOR: (f64, f64) = (0.25, 4.0);
 pub(super) struct ScaledFrame {
     /// Time that it would have taken with all else at its coarsest, seconds, > 0.
     pub coarsest_s: f64,
-    /// The part of that spent on drawing, seconds, ≥ 0.
+    /// The part of that spent on drawing, seconds, > 0.
     pub draw_s: f64,
     /// Whether nothing but pixels is left to take.
     pub spent: bool,
@@ -46,7 +46,7 @@ pub(super) struct ScaledFrame {
     pub period_s: f64,
 }
 
-/// Mean and variance of the newest frames since a change.
+/// Mean and variance of logarithms of times of the newest frames since a change: a stall counts for less than in a mean of times.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Window {
     frames: f64,
@@ -55,7 +55,8 @@ struct Window {
 }
 
 impl Window {
-    fn add(&mut self, x: f64, most: f64) {
+    fn add(&mut self, seconds: f64, most: f64) {
+        let x = libm::log(seconds);
         self.frames = (self.frames + 1.0).min(most);
         let share = 1.0 / self.frames;
         let error = x - self.mean;
@@ -63,14 +64,19 @@ impl Window {
         self.variance = (1.0 - share) * (self.variance + share * error * error);
     }
 
+    fn mean_s(&self) -> f64 {
+        libm::exp(self.mean)
+    }
+
     /// Standard error of the mean.
     fn error(&self) -> f64 {
         libm::sqrt(self.variance / (self.frames - 1.0).max(1.0))
     }
 
-    /// By how much the mean may be wrong.
-    fn doubt(&self) -> f64 {
-        (CERTAIN.0 + CERTAIN.1 / (self.frames - 1.0).max(1.0)) * self.error()
+    /// The time that the frames surely take at least, and at most, seconds.
+    fn surely_s(&self) -> (f64, f64) {
+        let doubt = (CERTAIN.0 + CERTAIN.1 / (self.frames - 1.0).max(1.0)) * self.error();
+        (libm::exp(self.mean - doubt), libm::exp(self.mean + doubt))
     }
 }
 
@@ -164,7 +170,7 @@ impl RenderScale {
     /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture at a scale by the prices, with all else at its coarsest.
     pub fn observe(&mut self, frame: ScaledFrame, priced_s: impl Fn(f64) -> f64) {
         let ScaledFrame { coarsest_s, draw_s, spent, set_s, period_s } = frame;
-        let sound = [coarsest_s, set_s, period_s].iter().all(|s| s.is_finite() && *s > 0.0) && draw_s.is_finite();
+        let sound = [coarsest_s, draw_s, set_s, period_s].iter().all(|s| s.is_finite() && *s > 0.0);
         if self.range.0 == self.range.1 || !sound {
             return;
         }
@@ -175,36 +181,36 @@ impl RenderScale {
         let most = (WINDOW_S / period_s).max(WINDOW_FRAMES);
         self.window.add(coarsest_s, most);
         self.draw.add(draw_s, most);
-        self.learn(set_s);
-        let Window { mean, frames, .. } = self.window;
-        let doubt = self.window.doubt();
-        self.late = mean > set_s;
-        if frames < FRAMES_MIN {
+        self.learn();
+        self.late = self.window.mean_s() > set_s;
+        if self.window.frames < FRAMES_MIN {
             return;
         }
-        if spent && mean - doubt > set_s {
-            self.take(set_s, &priced_s);
-        } else if self.held_s >= self.patience_s && mean + doubt <= GIVE * set_s {
-            self.give(GIVE * set_s - doubt, &priced_s);
+        let (least_s, most_s) = self.window.surely_s();
+        if spent && least_s > set_s {
+            self.take(least_s, set_s, &priced_s);
+        } else if self.held_s >= self.patience_s && most_s <= GIVE * set_s {
+            self.give(most_s, set_s, &priced_s);
         }
     }
 
-    /// Goes to the next larger scale that is predicted to need `most_s` or less: one step, unless enlarging itself costs more than a step.
-    fn give(&mut self, most_s: f64, priced_s: &impl Fn(f64) -> f64) {
+    /// Goes to the next larger scale that frames of `most_s` are predicted to be early with: one step, unless enlarging itself costs more than
+    /// a step.
+    fn give(&mut self, most_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
         let mut larger = self.at + 1..=self.range.1;
-        if let Some(to) = larger.find(|at| self.predicted_s(*at, priced_s) <= most_s) {
+        if let Some(to) = larger.find(|at| most_s + self.change_s(*at, priced_s) <= GIVE * set_s) {
             self.given_s = 0.0;
             self.go(to, priced_s);
         }
     }
 
-    /// Goes to the largest scale that is predicted to be in time; to the fastest if there is none.
-    fn take(&mut self, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
-        let predicted = |at: usize| self.predicted_s(at, priced_s);
+    /// Goes to the largest scale that frames of `least_s` are predicted to be in time with; to the fastest if there is none.
+    fn take(&mut self, least_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
+        let change_s = |at: usize| self.change_s(at, priced_s);
         let smaller = (self.range.0..self.at).rev();
-        let fits = smaller.clone().find(|at| predicted(*at) <= TAKE * set_s);
-        let fastest = smaller.min_by(|a, b| predicted(*a).total_cmp(&predicted(*b)));
-        let Some(to) = fits.or(fastest).filter(|to| predicted(*to) < self.window.mean) else { return };
+        let fits = smaller.clone().find(|at| least_s + change_s(*at) <= TAKE * set_s);
+        let fastest = smaller.min_by(|a, b| change_s(*a).total_cmp(&change_s(*b)));
+        let Some(to) = fits.or(fastest).filter(|to| change_s(*to) < 0.0) else { return };
         if self.given_s < 4.0 * self.patience_s {
             self.patience_s = (2.0 * self.patience_s).min(PATIENCE_S.1);
         } else {
@@ -213,14 +219,14 @@ impl RenderScale {
         self.go(to, priced_s);
     }
 
-    /// The time of a frame at another scale: drawing changes as by the prices, times what was learnt.
-    fn predicted_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
-        self.window.mean + self.factor * self.priced_change_s(at, priced_s)
+    /// By how much a frame takes longer at another scale: as by the prices, times what was learnt.
+    fn change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
+        self.factor * self.priced_change_s(at, priced_s)
     }
 
     fn priced_change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
         let here_s = priced_s(self.scale());
-        if here_s > 0.0 { self.draw.mean * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
+        if here_s > 0.0 { self.draw.mean_s() * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
     }
 
     fn go(&mut self, to: usize, priced_s: &impl Fn(f64) -> f64) {
@@ -231,15 +237,15 @@ impl RenderScale {
     }
 
     /// Learns the factor from the last change, once as many frames are known after it as patience needs.
-    fn learn(&mut self, set_s: f64) {
+    fn learn(&mut self) {
         let Some(Change { before, priced_s }) = self.change.filter(|_| self.held_s >= PATIENCE_S.0) else { return };
         self.change = None;
-        // a mean of few frames is no better known than to a part of the time
-        let least = 0.01 * set_s;
-        let noise_s2 = [before, self.window].map(|w| w.error() * w.error() + least * least).iter().sum::<f64>();
+        // no mean is better known than to a hundredth
+        let square = |w: Window| (w.error() * w.error() + 1e-4) * w.mean_s() * w.mean_s();
+        let noise_s2 = square(before) + square(self.window);
         self.doubt += DOUBT.1;
         let gain = self.doubt / (self.doubt + noise_s2 / (priced_s * priced_s));
-        let measured = (self.window.mean - before.mean) / priced_s;
+        let measured = (self.window.mean_s() - before.mean_s()) / priced_s;
         if measured.is_finite() && gain.is_finite() {
             self.factor = crate::within(self.factor + gain * (measured - self.factor), FACTOR.0, FACTOR.1);
             self.doubt *= 1.0 - gain;

@@ -21,6 +21,8 @@ pub struct Sample {
 pub struct Fit {
     /// The coefficients.
     pub stages: Stages,
+    /// Half of the samples are predicted to within this fraction of their time.
+    pub error50: f64,
     /// 95 % of the samples are predicted to within this fraction of their time.
     pub error95: f64,
     /// Number of samples used: the valid ones.
@@ -35,18 +37,18 @@ const WILD: f64 = 1.345 * 1.4826;
 /// Least number of samples for a fit.
 const LEAST: usize = 8;
 
-/// Parts of the faster stage that may show: a fit chooses among these …
-const SERIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// … and takes a larger one where its median error is below this part of the best before.
-const BETTER: f64 = 0.9;
+/// Parts of the faster stage that may show, to choose among …
+pub const SERIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// … where a larger one counts if its error is below this part of the best before.
+pub const BETTER: f64 = 0.9;
 
-/// Fits setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels to samples of both stages; `None` with fewer than eight valid
-/// ones.
+/// Fits setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels to samples of both stages, for a given `serial`; `None` with fewer
+/// than eight valid ones.
 ///
 /// The samples should span polygons where pixels are few, and pixels where polygons are few. If the ratio of vertices to polygons is
 /// constant throughout, the two cannot be separated: then c₂ is 0 and c₁ covers both.
 #[must_use]
-pub fn fit(samples: &[Sample]) -> Option<Fit> {
+pub fn fit(samples: &[Sample], serial: f64) -> Option<Fit> {
     let number = |x: f64| x.is_finite() && x >= 0.0;
     let sound = |s: &Sample| {
         number(s.work.polygons) && number(s.work.vertices) && number(s.work.pixels) && number(s.time) && s.time > 0.0
@@ -55,11 +57,9 @@ pub fn fit(samples: &[Sample]) -> Option<Fit> {
     if samples.len() < LEAST {
         return None;
     }
-    let all = SERIAL.map(|serial| descend(&samples, Stages { serial, ..start(&samples) }));
-    let Found { stages, .. } =
-        all.into_iter().reduce(|best, next| if next.typical < BETTER * best.typical { next } else { best })?;
+    let Found { typical, stages } = descend(&samples, Stages { serial, ..start(&samples) });
     let error95 = quantile(samples.iter().map(|s| (stages.time(s.work) / s.time - 1.0).abs()), 0.95);
-    Some(Fit { stages, error95, samples: samples.len() })
+    Some(Fit { stages, error50: typical, error95, samples: samples.len() })
 }
 
 /// Coefficients, and the median of their relative errors.

@@ -11,6 +11,9 @@ use super::super::render_scale::ScaledFrame;
 use super::super::view::Shading;
 use super::PictureControl;
 
+/// Levels that take less than this part of a frame above their least are as good as at their coarsest.
+const LEVELS_LEAST: f64 = 0.05;
+
 /// An object of the frame with all else at its coarsest.
 #[derive(Debug, Clone, Copy)]
 struct Coarsest {
@@ -38,11 +41,19 @@ impl PictureControl {
         let frame = ScaledFrame {
             coarsest_s: work_s - levels_s,
             draw_s: drawn_s - levels_s,
-            spent: self.policy != Policy::Feedback || self.feedback.is_coarsest() || !steers(&self.views),
+            spent: self.is_spent(levels_s / work_s),
             set_s: self.set_point_s().min(self.target_s()),
             period_s: 1.0 / self.target_hz,
         };
         self.scale.observe(frame, priced_s);
+    }
+
+    /// Whether nothing but pixels is left to take; `levels` is the part of the frame that levels take above their least.
+    fn is_spent(&self, levels: f64) -> bool {
+        match self.policy {
+            Policy::Feedback => self.feedback.is_coarsest() || !steers(&self.views),
+            _ => !self.plan.promise.feasible || levels < LEVELS_LEAST,
+        }
     }
 
     /// The objects that the frame was drawn with, their numbers and levels.

@@ -97,7 +97,8 @@ fn steady_load_under_noise_of_a_fifth_reverses_nothing() {
     let rises = run.changes.windows(2).filter(|pair| pair[1].1 > pair[0].1).count();
     assert_eq!(rises, 0, "{:?}", run.changes);
     let took = SLOW.frame_s(run.law.scale()) / PERIOD_S;
-    assert!((0.75..1.0).contains(&took), "{took} of the time at {}", run.law.scale());
+    // it is not taken for late by less than two errors of the mean of a second, 0.08
+    assert!((0.75..1.08).contains(&took), "{took} of the time at {}", run.law.scale());
 }
 
 #[test]
