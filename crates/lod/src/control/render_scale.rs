@@ -14,8 +14,11 @@ pub const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75,
 const WINDOW_S: f64 = 1.0;
 /// … and at least.
 const WINDOW_FRAMES: f64 = 16.0;
-/// Fewest frames that pixels are taken after.
+/// Fewest frames that anything is decided by.
 const FRAMES_MIN: f64 = 3.0;
+/// A frame past the mean by this many standard deviations, and by this logarithm at least, is a stall, and so many of them in a row are
+/// another load.
+const STALL: (f64, f64) = (4.0, 0.1);
 /// Standard errors by which a mean must be past a threshold, and what few frames add to that, over their number less one: near Student's
 /// 0.975 quantile.
 const CERTAIN: (f64, f64) = (2.0, 4.6);
@@ -23,9 +26,11 @@ const CERTAIN: (f64, f64) = (2.0, 4.6);
 const TAKE: f64 = 0.97;
 /// … and given back if the larger one is predicted to need this, or less: less than a step of scale lies between.
 const GIVE: f64 = 0.9;
-/// Seconds after any change before pixels are given back; doubled, up to the second, each time that they have to be taken again within
-/// four times as long.
+/// Seconds before pixels that were taken are given back; doubled, up to the second, each time that they have to be taken again within four
+/// times as long.
 const PATIENCE_S: (f64, f64) = (0.5, 16.0);
+/// Seconds from one step back to the next: seven steps, from half of the pixels to all, in a second and a half.
+const STEP_S: f64 = 0.2;
 /// Variance of what is not known of the pixels' part at first, as a square of a factor; and what each change adds to it, because scenes move.
 const DOUBT: (f64, f64) = (0.25, 0.02);
 /// The range of the learnt factor.
@@ -68,6 +73,12 @@ impl Window {
         libm::exp(self.mean)
     }
 
+    /// Whether a time is unlike the others.
+    fn excludes(&self, seconds: f64) -> bool {
+        let far = (STALL.0 * libm::sqrt(self.variance)).max(STALL.1);
+        self.frames >= FRAMES_MIN && (libm::log(seconds) - self.mean).abs() > far
+    }
+
     /// Standard error of the mean.
     fn error(&self) -> f64 {
         libm::sqrt(self.variance / (self.frames - 1.0).max(1.0))
@@ -77,6 +88,21 @@ impl Window {
     fn surely_s(&self) -> (f64, f64) {
         let doubt = (CERTAIN.0 + CERTAIN.1 / (self.frames - 1.0).max(1.0)) * self.error();
         (libm::exp(self.mean - doubt), libm::exp(self.mean + doubt))
+    }
+}
+
+/// Times of frames and of their drawing.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Times {
+    work: Window,
+    draw: Window,
+}
+
+impl Times {
+    fn add(&mut self, frame: &ScaledFrame) {
+        let most = (WINDOW_S / frame.period_s).max(WINDOW_FRAMES);
+        self.work.add(frame.coarsest_s, most);
+        self.draw.add(frame.draw_s, most);
     }
 }
 
@@ -94,11 +120,12 @@ pub(super) struct RenderScale {
     /// Numbers of the least and the most of [`SCALES`] allowed.
     range: (usize, usize),
     at: usize,
-    /// Times of the frames at this scale.
-    window: Window,
-    draw: Window,
-    /// Seconds at this scale, and since pixels were given back.
+    /// Times of the frames at this scale, and of the newest that are unlike them.
+    times: Times,
+    unlike: Times,
+    /// Seconds at this scale, since pixels were taken, and since they were given back.
     held_s: f64,
+    taken_s: f64,
     given_s: f64,
     patience_s: f64,
     change: Option<Change>,
@@ -130,9 +157,10 @@ impl RenderScale {
         Self {
             range,
             at: range.1,
-            window: Window::default(),
-            draw: Window::default(),
+            times: Times::default(),
+            unlike: Times::default(),
             held_s: 0.0,
+            taken_s: f64::INFINITY,
             given_s: f64::INFINITY,
             patience_s: PATIENCE_S.0,
             change: None,
@@ -164,7 +192,7 @@ impl RenderScale {
 
     /// Forgets the frames at this scale: they were unlike those to come.
     pub fn disturb(&mut self) {
-        (self.window, self.draw, self.change) = (Window::default(), Window::default(), None);
+        (self.times, self.unlike, self.change) = (Times::default(), Times::default(), None);
     }
 
     /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture at a scale by the prices, with all else at its coarsest.
@@ -174,23 +202,39 @@ impl RenderScale {
         if self.range.0 == self.range.1 || !sound {
             return;
         }
-        (self.held_s, self.given_s) = (self.held_s + period_s, self.given_s + period_s);
+        [&mut self.held_s, &mut self.taken_s, &mut self.given_s].into_iter().for_each(|s| *s += period_s);
         if !spent && !self.is_reduced() {
             return self.disturb();
         }
-        let most = (WINDOW_S / period_s).max(WINDOW_FRAMES);
-        self.window.add(coarsest_s, most);
-        self.draw.add(draw_s, most);
+        self.add(&frame);
         self.learn();
-        self.late = self.window.mean_s() > set_s;
-        if self.window.frames < FRAMES_MIN {
+        let work = self.times.work;
+        self.late = work.mean_s() > set_s;
+        if work.frames < FRAMES_MIN {
             return;
         }
-        let (least_s, most_s) = self.window.surely_s();
+        let (least_s, most_s) = work.surely_s();
         if spent && least_s > set_s {
             self.take(least_s, set_s, &priced_s);
-        } else if self.held_s >= self.patience_s && most_s <= GIVE * set_s {
+        } else if self.held_s >= STEP_S && self.taken_s >= self.patience_s && most_s <= GIVE * set_s {
             self.give(most_s, set_s, &priced_s);
+        }
+    }
+
+    /// Counts a frame: among those at this scale, or, if it is unlike them, among such, which replace them once they are enough.
+    fn add(&mut self, frame: &ScaledFrame) {
+        let Times { work, .. } = self.times;
+        if !work.excludes(frame.coarsest_s) {
+            self.unlike = Times::default();
+            return self.times.add(frame);
+        }
+        let side = |mean: f64| mean > work.mean;
+        if side(self.unlike.work.mean) != side(libm::log(frame.coarsest_s)) {
+            self.unlike = Times::default();
+        }
+        self.unlike.add(frame);
+        if self.unlike.work.frames >= FRAMES_MIN {
+            self.times = std::mem::take(&mut self.unlike);
         }
     }
 
@@ -216,6 +260,7 @@ impl RenderScale {
         } else {
             self.patience_s = PATIENCE_S.0;
         }
+        self.taken_s = 0.0;
         self.go(to, priced_s);
     }
 
@@ -226,26 +271,26 @@ impl RenderScale {
 
     fn priced_change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
         let here_s = priced_s(self.scale());
-        if here_s > 0.0 { self.draw.mean_s() * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
+        if here_s > 0.0 { self.times.draw.mean_s() * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
     }
 
     fn go(&mut self, to: usize, priced_s: &impl Fn(f64) -> f64) {
-        let change = Change { before: self.window, priced_s: self.priced_change_s(to, priced_s) };
+        let change = Change { before: self.times.work, priced_s: self.priced_change_s(to, priced_s) };
         (self.at, self.held_s) = (to, 0.0);
         self.disturb();
         self.change = Some(change);
     }
 
-    /// Learns the factor from the last change, once as many frames are known after it as patience needs.
+    /// Learns the factor from the last change, once the times after it are known.
     fn learn(&mut self) {
-        let Some(Change { before, priced_s }) = self.change.filter(|_| self.held_s >= PATIENCE_S.0) else { return };
+        let Some(Change { before, priced_s }) = self.change.filter(|_| self.held_s >= STEP_S) else { return };
         self.change = None;
         // no mean is better known than to a hundredth
         let square = |w: Window| (w.error() * w.error() + 1e-4) * w.mean_s() * w.mean_s();
-        let noise_s2 = square(before) + square(self.window);
+        let noise_s2 = square(before) + square(self.times.work);
         self.doubt += DOUBT.1;
         let gain = self.doubt / (self.doubt + noise_s2 / (priced_s * priced_s));
-        let measured = (self.window.mean_s() - before.mean_s()) / priced_s;
+        let measured = (self.times.work.mean_s() - before.mean_s()) / priced_s;
         if measured.is_finite() && gain.is_finite() {
             self.factor = crate::within(self.factor + gain * (measured - self.factor), FACTOR.0, FACTOR.1);
             self.doubt *= 1.0 - gain;
