@@ -86,7 +86,7 @@ fn where_pixels_dominate_fewer_are_drawn_and_all_again_when_the_load_has_gone() 
             assert_eq!((scale("/end"), scale("/mean"), scale("/least")), (1.0, 1.0, 1.0));
             continue;
         }
-        // (1.2 + 1.84 + 27.6 s²) 2 is 0.97 of the frame at s = 0.69, and 0.87 at 0.65 for feedback, which leaves a tenth free
+        // (1.2 + 1.84 + 27.6 s²) 2 is 0.97 · 0.98 of the frame at s = 0.68, and of 0.9, which feedback goes for, at 0.65
         assert!((0.6..=0.65).contains(&scale("/least")) && scale("/end") == 1.0, "{policy}: {}", report["budget"]);
         let text = std::fs::read_to_string(&csv).unwrap();
         let rows = text.lines().skip(1).map(|row| row.split(',').nth(2).unwrap().parse::<f64>().unwrap());

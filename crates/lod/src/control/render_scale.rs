@@ -22,14 +22,13 @@ const STALL: (f64, f64) = (4.0, 0.1);
 /// Standard errors by which a mean must be past a threshold, and what few frames add to that, over their number less one: near Student's
 /// 0.975 quantile.
 const CERTAIN: (f64, f64) = (2.0, 4.6);
-/// A scale is taken if it is predicted to need this fraction of the time, or less …
-const TAKE: f64 = 0.97;
-/// … and given back if the larger one is predicted to need this, or less: less than a step of scale lies between.
-const GIVE: f64 = 0.9;
+/// A scale is gone to if it is predicted to need this fraction of the time, or less: what is left, and what is not certain, keeps pixels from
+/// being taken and given in turn.
+const FIT: f64 = 0.97;
 /// Seconds before pixels that were taken are given back; doubled, up to the second, each time that they have to be taken again within four
 /// times as long.
 const PATIENCE_S: (f64, f64) = (0.5, 16.0);
-/// Seconds from one step back to the next: seven steps, from half of the pixels to all, in a second and a half.
+/// Seconds from one change upward to the next.
 const STEP_S: f64 = 0.2;
 /// Variance of what is not known of the pixels' part at first, as a square of a factor; and what each change adds to it, because scenes move.
 const DOUBT: (f64, f64) = (0.25, 0.02);
@@ -216,7 +215,7 @@ impl RenderScale {
         let (least_s, most_s) = work.surely_s();
         if spent && least_s > set_s {
             self.take(least_s, set_s, &priced_s);
-        } else if self.held_s >= STEP_S && self.taken_s >= self.patience_s && most_s <= GIVE * set_s {
+        } else if self.held_s >= STEP_S && self.taken_s >= self.patience_s && most_s <= FIT * set_s {
             self.give(most_s, set_s, &priced_s);
         }
     }
@@ -238,11 +237,11 @@ impl RenderScale {
         }
     }
 
-    /// Goes to the next larger scale that frames of `most_s` are predicted to be early with: one step, unless enlarging itself costs more than
-    /// a step.
+    /// Goes to the largest scale that frames of `most_s` are predicted to be early with, were pixels a standard deviation dearer than is known.
     fn give(&mut self, most_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
-        let mut larger = self.at + 1..=self.range.1;
-        if let Some(to) = larger.find(|at| most_s + self.change_s(*at, priced_s) <= GIVE * set_s) {
+        let factor = self.factor + libm::sqrt(self.doubt);
+        let early = |at: &usize| most_s + factor * self.priced_change_s(*at, priced_s) <= FIT * set_s;
+        if let Some(to) = (self.at + 1..=self.range.1).rev().find(early) {
             self.given_s = 0.0;
             self.go(to, priced_s);
         }
@@ -250,9 +249,9 @@ impl RenderScale {
 
     /// Goes to the largest scale that frames of `least_s` are predicted to be in time with; to the fastest if there is none.
     fn take(&mut self, least_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
-        let change_s = |at: usize| self.change_s(at, priced_s);
+        let change_s = |at: usize| self.factor * self.priced_change_s(at, priced_s);
         let smaller = (self.range.0..self.at).rev();
-        let fits = smaller.clone().find(|at| least_s + change_s(*at) <= TAKE * set_s);
+        let fits = smaller.clone().find(|at| least_s + change_s(*at) <= FIT * set_s);
         let fastest = smaller.min_by(|a, b| change_s(*a).total_cmp(&change_s(*b)));
         let Some(to) = fits.or(fastest).filter(|to| change_s(*to) < 0.0) else { return };
         if self.given_s < 4.0 * self.patience_s {
@@ -264,11 +263,7 @@ impl RenderScale {
         self.go(to, priced_s);
     }
 
-    /// By how much a frame takes longer at another scale: as by the prices, times what was learnt.
-    fn change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
-        self.factor * self.priced_change_s(at, priced_s)
-    }
-
+    /// By how much a frame takes longer at another scale by the prices, seconds.
     fn priced_change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
         let here_s = priced_s(self.scale());
         if here_s > 0.0 { self.times.draw.mean_s() * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
