@@ -277,6 +277,18 @@ fn all_keys_of_a_table_that_have_the_wrong_type_are_told_at_once() {
 }
 
 #[test]
+fn the_range_of_the_pictures_scale_is_read_checked_and_has_a_default() {
+    let scales = |key: &str| read(&format!("format = 1\n[target]\n{key}\n")).map(|scene| scene.target.render_scale);
+    assert_eq!(scales("").unwrap(), (0.35, 1.0));
+    assert_eq!(scales("render_scale = [0.5, 0.9]").unwrap(), (0.5, 0.9));
+    assert_eq!(scales("render_scale = 1.0").unwrap(), (1.0, 1.0));
+    for (bad, expected) in [("[0.2, 1.0]", "0.35"), ("1.5", "0.35"), ("[0.9, 0.5]", "[0.5, 0.9]"), ("nan", "0.35")] {
+        let (line, _, _, said) = problem(&format!("format = 1\n[target]\nrender_scale = {bad}\n"));
+        assert!(line == 3 && said.contains("render_scale") && said.contains(expected), "{said}");
+    }
+}
+
+#[test]
 fn deep_nesting_and_many_problems_stay_readable() {
     for open in ["[", "{a="] {
         let said = problem(&format!("format = 1\nx = {}\n", open.repeat(100_000))).3;

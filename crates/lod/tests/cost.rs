@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-const MACHINE: Stages = Stages { setup: 20.0, polygon: 0.9, vertex: 0.5, pixel: 0.02 };
+const MACHINE: Stages = Stages { setup: 20.0, polygon: 0.9, vertex: 0.5, pixel: 0.02, serial: 0.0 };
 
 /// Draws of all sizes on a machine that trembles by 3 % and takes three times as long once in twenty draws.
 fn benchmark(seed: u64, count: usize, wild: f64, ratio: Option<f64>) -> Vec<Sample> {
@@ -50,7 +50,7 @@ fn benchmark(seed: u64, count: usize, wild: f64, ratio: Option<f64>) -> Vec<Samp
 #[test]
 fn fit_finds_the_machine_among_outliers() {
     for seed in 1..9 {
-        let got = fit(&benchmark(seed, 300, 0.05, None)).unwrap().stages;
+        let got = fit(&benchmark(seed, 300, 0.05, None), 0.0).unwrap().stages;
         for (name, got, want, part) in [
             ("polygon", got.polygon, MACHINE.polygon, 0.05),
             ("vertex", got.vertex, MACHINE.vertex, 0.05),
@@ -64,9 +64,25 @@ fn fit_finds_the_machine_among_outliers() {
 }
 
 #[test]
+fn stages_one_after_the_other_are_told_from_stages_beside_each_other() {
+    let errors = |seed, serial: f64| {
+        let machine = Stages { serial, ..MACHINE };
+        let draws = benchmark(seed, 200, 0.05, None).into_iter();
+        let slower = draws.map(|s| Sample { time: s.time * machine.time(s.work) / MACHINE.time(s.work), ..s });
+        let slower: Vec<_> = slower.collect();
+        [0.0, 1.0].map(|serial| fit(&slower, serial).unwrap().error50)
+    };
+    for seed in 1..5 {
+        let ([beside, wrong], [wrong_too, after]) = (errors(seed, 0.0), errors(seed, 1.0));
+        // the tremble of 3 % is in each
+        assert!(beside < 0.7 * wrong && after < 0.7 * wrong_too, "{beside} {wrong}, {wrong_too} {after}");
+    }
+}
+
+#[test]
 fn held_out_draws_are_predicted_within_a_tenth() {
     for seed in 1..9 {
-        let model = fit(&benchmark(seed, 200, 0.05, None)).unwrap().stages;
+        let model = fit(&benchmark(seed, 200, 0.05, None), 0.0).unwrap().stages;
         let mut errors: Vec<_> =
             benchmark(seed + 100, 500, 0.0, None).iter().map(|s| (model.time(s.work) / s.time - 1.0).abs()).collect();
         errors.sort_by(f64::total_cmp);
@@ -76,7 +92,7 @@ fn held_out_draws_are_predicted_within_a_tenth() {
 
 #[test]
 fn vertices_proportional_to_polygons_are_counted_as_polygons() {
-    let got = fit(&benchmark(3, 300, 0.0, Some(2.0))).unwrap();
+    let got = fit(&benchmark(3, 300, 0.0, Some(2.0)), 0.0).unwrap();
     let both = got.stages.polygon + 2.0 * got.stages.vertex;
     assert!((both / (0.9 + 2.0 * 0.5) - 1.0).abs() < 0.02 && got.error95 < 0.1, "{got:?}");
 }
@@ -84,14 +100,14 @@ fn vertices_proportional_to_polygons_are_counted_as_polygons() {
 #[test]
 fn fit_of_too_few_or_invalid_numbers_is_none() {
     let good = benchmark(1, 7, 0.0, None);
-    assert_eq!(fit(&good), None);
+    assert_eq!(fit(&good, 0.0), None);
     let mut all = benchmark(1, 100, 0.0, None);
     for (i, bad) in [f64::NAN, f64::INFINITY, -1.0, 0.0].into_iter().enumerate() {
         all.push(Sample { time: bad, ..all[i] });
         let work = Work { pixels: if bad == 0.0 { f64::NAN } else { bad }, ..all[i].work };
         all.push(Sample { work, ..all[i] });
     }
-    assert_eq!(fit(&all).unwrap().samples, 100);
+    assert_eq!(fit(&all, 0.0).unwrap().samples, 100);
 }
 
 #[test]

@@ -19,8 +19,10 @@ use std::time::{Duration, Instant};
 /// One measured picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
-    /// Pixels of the picture.
+    /// Pixels of the picture as drawn.
     pub picture_px: f64,
+    /// Pixels that it was enlarged to; 0 for one that was not.
+    pub enlarged_px: f64,
     /// Objects in it.
     pub objects: u32,
     /// Triangles per object.
@@ -36,6 +38,8 @@ pub struct Drawn {
 /// Pictures without an object, to measure the cost of the picture and its pixels alone.
 const EMPTY: [Size; 3] =
     [Size { width: 320, height: 180 }, Size { width: 640, height: 360 }, Size { width: 960, height: 540 }];
+/// A picture without an object, to measure the cost of enlarging: its size when shown, and its scale.
+const ENLARGED: (Size, f64) = (Size { width: 960, height: 540 }, 0.5);
 /// Pictures of balls.
 const SIZE: Size = Size { width: 640, height: 360 };
 /// Balls along the side of a square (few where they are large), and the most pixels that each may cover without overlapping the next.
@@ -65,10 +69,10 @@ struct Balls {
     pixels: f64,
 }
 
-/// A picture to draw: of this size without an object, or balls.
+/// A picture to draw: of this size without an object, at a scale, or balls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TestPicture {
-    Empty(Size),
+    Empty(Size, f64),
     Balls(Balls),
 }
 
@@ -79,7 +83,8 @@ fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
             SHADINGS.map(|shading| TestPicture::Balls(Balls { shading, triangles, pixels }))
         })
     };
-    EMPTY.into_iter().map(TestPicture::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
+    let empty = EMPTY.map(|size| (size, 1.0)).into_iter().chain([ENLARGED]);
+    empty.map(|(size, scale)| TestPicture::Empty(size, scale)).chain(ends_first(areas_px).flat_map(of)).collect()
 }
 
 /// The fraction of all pictures still to be measured when `known` are done, 0 … 1.
@@ -110,9 +115,9 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
         }
         drawn.push(match wanted {
             TestPicture::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
-            TestPicture::Empty(size) => {
+            TestPicture::Empty(size, scale) => {
                 screen = screen.resized(size)?;
-                let found = empty(&mut screen)?;
+                let found = empty(&mut screen, scale)?;
                 screen = screen.resized(SIZE)?;
                 found
             }
@@ -122,10 +127,13 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
 }
 
 /// A picture without an object.
-fn empty(screen: &mut Offscreen) -> Result<Drawn, GpuError> {
-    let seconds = median(screen, &mut SceneView::new(Vec::new(), Vec::new()), 1.0, &[])?;
-    let (picture_px, shading) = (screen.size().pixels(), Shading::PerPixel);
-    Ok(Drawn { picture_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
+fn empty(screen: &mut Offscreen, scale: f64) -> Result<Drawn, GpuError> {
+    let mut nothing = SceneView::new(Vec::new(), Vec::new());
+    nothing.set_scale(scale);
+    let seconds = median(screen, &mut nothing, 1.0, &[])?;
+    let (shown, shading) = (screen.size(), Shading::PerPixel);
+    let (picture_px, enlarged_px) = (shown.scaled(scale).pixels(), if scale < 1.0 { shown.pixels() } else { 0.0 });
+    Ok(Drawn { picture_px, enlarged_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
 }
 
 /// The first, the last, the second, the last but one and so on: the pictures measured until time runs out span the whole range.
@@ -151,7 +159,8 @@ fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -
     let seconds = median(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
     let pixels = seen_pixels(&mut scene_view, distance_m);
     let polygons = f64::from(cut);
-    Ok(Drawn { picture_px: SIZE.pixels(), objects: side * side, polygons, pixels, shading, seconds })
+    let picture_px = SIZE.pixels();
+    Ok(Drawn { picture_px, enlarged_px: 0.0, objects: side * side, polygons, pixels, shading, seconds })
 }
 
 /// Pixels that the first ball covers.
@@ -217,8 +226,9 @@ mod tests {
     fn known_measurements_are_not_drawn_again() {
         let areas = [1.0, 16.0, 256.0];
         let all = test_pictures(&areas);
-        assert_eq!(all[..3], EMPTY.map(TestPicture::Empty));
-        assert!(all.len() > 20 && all[3..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
+        assert_eq!(all[..3], EMPTY.map(|size| TestPicture::Empty(size, 1.0)));
+        assert_eq!(all[3], TestPicture::Empty(ENLARGED.0, ENLARGED.1));
+        assert!(all.len() > 20 && all[4..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
         assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
     }
 

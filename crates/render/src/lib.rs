@@ -41,6 +41,8 @@ mod scene_view;
 mod skin;
 mod tessellation;
 mod texturing;
+#[cfg(feature = "gpu")]
+mod upscale;
 mod view;
 mod visibility;
 
@@ -60,5 +62,7 @@ pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample
 pub use scene_view::{Actor, Appearance, Form, Material, SceneView, SkinForm, States, StaticObject};
 pub use skin::{SkinRun, Skins};
 pub use tessellation::skin_divisions;
+#[cfg(feature = "gpu")]
+pub use upscale::{Upscaled, Upscaler};
 pub use view::{Camera, Frustum, Ray, Size};
 pub use visibility::Visibility;

@@ -5,6 +5,7 @@
 
 use super::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 use super::picture::Picture;
+use super::upscale::{Upscaled, Upscaler};
 use super::view::{Camera, Size};
 use image::RgbaImage;
 use std::path::{Path, PathBuf};
@@ -178,6 +179,17 @@ pub struct Offscreen {
     renderer: Renderer,
     size: Size,
     texture: Option<(wgpu::Texture, wgpu::TextureView)>,
+    upscaler: Upscaler,
+    /// The texture of pictures of fewer pixels.
+    reduced: Option<Reduced>,
+}
+
+/// A texture of fewer pixels than the target's.
+#[derive(Debug)]
+struct Reduced {
+    size: Size,
+    view: wgpu::TextureView,
+    shown: Upscaled,
 }
 
 /// Format of the textures that are read back: the shaders apply the sRGB curve themselves, which costs a software rasteriser less than an
@@ -191,7 +203,8 @@ impl Offscreen {
     /// [`GpuError::Draw`] where the device lacks a feature or the size is beyond its limit.
     pub fn new(gpu: Gpu, size: Size, options: RendererOptions) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, options)?;
-        Self::with(gpu, renderer, size)
+        let upscaler = Upscaler::new(&gpu.device, FORMAT, options.lean);
+        Self::with(gpu, renderer, upscaler, size)
     }
 
     /// The same with another size; the renderer and its caches are kept.
@@ -199,29 +212,20 @@ impl Offscreen {
     /// # Errors
     /// [`GpuError::Draw`] where the size is beyond the device's limit.
     pub fn resized(self, size: Size) -> Result<Self, GpuError> {
-        Self::with(self.gpu, self.renderer, size)
+        Self::with(self.gpu, self.renderer, self.upscaler, size)
     }
 
-    fn with(gpu: Gpu, renderer: Renderer, size: Size) -> Result<Self, GpuError> {
+    fn with(gpu: Gpu, renderer: Renderer, upscaler: Upscaler, size: Size) -> Result<Self, GpuError> {
         let max = gpu.device.limits().max_texture_dimension_2d;
         if size.width > max || size.height > max {
             return Err(DrawError::TooLarge { width: size.width, height: size.height, max }.into());
         }
         let texture = (!size.is_empty()).then(|| {
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("offscreen"),
-                size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: FORMAT,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            });
+            let texture = texture(&gpu, size, wgpu::TextureUsages::COPY_SRC);
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             (texture, view)
         });
-        Ok(Self { gpu, renderer, size, texture })
+        Ok(Self { gpu, renderer, size, texture, upscaler, reduced: None })
     }
 
     /// The device that draws.
@@ -257,7 +261,18 @@ impl Offscreen {
     /// As [`Renderer::render`].
     pub fn submit(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
         let Some((_, view)) = &self.texture else { return Ok(DrawTimes::default()) };
-        Ok(self.renderer.render(picture, camera, Target { view, size: self.size })?)
+        let (size, shown) = (self.size.scaled(picture.scale), self.size);
+        if size == shown {
+            return Ok(self.renderer.render(picture, camera, Target { view, size, shown })?);
+        }
+        let reduced = match self.reduced.take().filter(|there| there.size == size) {
+            Some(there) => there,
+            None => Reduced::new(&self.gpu, &self.upscaler, size, shown),
+        };
+        let times = self.renderer.render(picture, camera, Target { view: &reduced.view, size, shown })?;
+        enlarge(&self.gpu, &reduced.shown, view);
+        self.reduced = Some(reduced);
+        Ok(times)
     }
 
     /// Waits until all submitted work is drawn; returns the GPU time, where the adapter reports one.
@@ -287,6 +302,41 @@ impl Offscreen {
     pub fn save(&self, path: &Path) -> Result<(), GpuError> {
         write_png(&self.read_back()?, path)
     }
+}
+
+impl Reduced {
+    fn new(gpu: &Gpu, upscaler: &Upscaler, size: Size, shown: Size) -> Self {
+        let texture = texture(gpu, size, wgpu::TextureUsages::TEXTURE_BINDING);
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Self { size, shown: upscaler.show(&gpu.device, &view, size, shown), view }
+    }
+}
+
+/// A texture to draw into, with one more use.
+fn texture(gpu: &Gpu, size: Size, used_as: wgpu::TextureUsages) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("offscreen"),
+        size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | used_as,
+        view_formats: &[],
+    })
+}
+
+/// Fills `target` with a picture of fewer pixels.
+fn enlarge(gpu: &Gpu, picture: &Upscaled, target: &wgpu::TextureView) {
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("enlarge") });
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store };
+    let attachment = wgpu::RenderPassColorAttachment { view: target, depth_slice: None, resolve_target: None, ops };
+    picture.draw(&mut encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("enlarge"),
+        color_attachments: &[Some(attachment)],
+        ..Default::default()
+    }));
+    gpu.queue.submit([encoder.finish()]);
 }
 
 /// Waits until all submitted work is done.
@@ -329,6 +379,27 @@ pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Resul
     let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
     let image = RgbaImage::from_raw(width, height, rows.copied().collect());
     image.ok_or_else(|| GpuError::ReadBack { detail: "the buffer is shorter than the picture".into() })
+}
+
+/// The pixels of a texture that can be bound, enlarged to `shown` if it is smaller.
+///
+/// # Errors
+/// As [`read_back`].
+pub fn read_back_shown(
+    gpu: &Gpu,
+    drawn: &wgpu::Texture,
+    shown: Size,
+    lost: &DeviceLoss,
+) -> Result<PictureFile, GpuError> {
+    let size = Size { width: drawn.width(), height: drawn.height() };
+    if size == shown {
+        return read_back(gpu, drawn, lost);
+    }
+    let enlarged = texture(gpu, shown, wgpu::TextureUsages::COPY_SRC);
+    let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let upscaler = Upscaler::new(&gpu.device, FORMAT, false);
+    enlarge(gpu, &upscaler.show(&gpu.device, &view(drawn), size, shown), &view(&enlarged));
+    read_back(gpu, &enlarged, lost)
 }
 
 /// Writes a picture as PNG.

@@ -192,6 +192,8 @@ pub struct Picture {
     pub environment: Environment,
     /// Drawing options.
     pub style: Style,
+    /// Width and height to draw it with as a fraction of the target's, > 0, at most 1; below 1 it is enlarged to the target.
+    pub scale: f64,
     /// All tubes' samples.
     pub samples: Vec<SkinSample>,
     /// The tubes, sorted by level.
@@ -221,6 +223,7 @@ impl Default for Picture {
             shadowed_m: (DVec3::NEG_ONE, DVec3::ONE),
             environment: Environment::default(),
             style: Style::default(),
+            scale: 1.0,
             samples: Vec::new(),
             tubes: Vec::new(),
             instances: Vec::new(),

@@ -247,6 +247,11 @@ impl SceneView {
         self.picture.environment = environment;
     }
 
+    /// Chooses the scale of pictures from the next one on: [`Picture::scale`].
+    pub fn set_scale(&mut self, scale: f64) {
+        self.picture.scale = if scale > 0.0 { scale.min(1.0) } else { 1.0 };
+    }
+
     /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
     /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
     pub fn set_snapshot(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {

@@ -28,6 +28,14 @@ impl Size {
         f64::from(self.width) * f64::from(self.height)
     }
 
+    /// The size at `scale` times the width and height, rounded; a side that there is keeps a pixel.
+    #[must_use]
+    pub fn scaled(self, scale: f64) -> Self {
+        // a cast of floats saturates
+        let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(pixels.min(1));
+        Self { width: side(self.width), height: side(self.height) }
+    }
+
     fn aspect(self) -> f64 {
         f64::from(self.width.max(1)) / f64::from(self.height.max(1))
     }

@@ -43,13 +43,15 @@ pub struct StepPrice {
     pub unit_us: f64,
 }
 
-/// Price of a frame: setup + pixel · pixels of the picture + the price of its objects.
+/// Price of a frame: setup + pixel · pixels drawn + enlarge · pixels enlarged to + the price of its objects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawPrice {
     /// Milliseconds per frame, ≥ 0.
     pub setup_ms: f64,
-    /// Nanoseconds per pixel of the picture, whatever covers it, ≥ 0.
+    /// Nanoseconds per pixel of the picture as drawn, whatever covers it, ≥ 0.
     pub pixel_ns: f64,
+    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to, ≥ 0.
+    pub enlarge_ns: f64,
     /// Price of objects by their shading: flat, Gouraud, light at every pixel, textured.
     pub objects: [ObjectPrice; 4],
 }
@@ -98,7 +100,12 @@ impl Machine {
                 price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
-            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 4] },
+            draw: DrawPrice {
+                setup_ms: 1.4,
+                pixel_ns: 6.0,
+                enlarge_ns: 2.0,
+                objects: [price_of_objects(5.0, 0.22); 4],
+            },
             choice_ns: (0.0, 0.0),
             noise_sd: 0.0,
             wander_sd: 0.0,
@@ -113,12 +120,13 @@ impl Machine {
     #[must_use]
     pub fn workstation() -> Self {
         let base = Self::two_cores_software();
-        let DrawPrice { setup_ms, pixel_ns, .. } = base.draw;
+        let DrawPrice { setup_ms, pixel_ns, enlarge_ns, .. } = base.draw;
         Self {
             cores: 8,
             draw: DrawPrice {
                 setup_ms: setup_ms / 20.0,
                 pixel_ns: pixel_ns / 20.0,
+                enlarge_ns: enlarge_ns / 20.0,
                 objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 4],
             },
             ..base

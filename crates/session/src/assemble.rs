@@ -154,6 +154,7 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
     control.set_value(value(target.value));
     control.set_raise(target.raise);
+    control.set_render_scale(target.render_scale);
     if let Some((lag_s, share)) = target.lag {
         control.set_lag(lag_s, share);
     }
@@ -186,10 +187,12 @@ pub fn prices(draw: &DrawPrice) -> Prices {
         polygon: price.triangle_us * 1e-6,
         vertex: price.vertex_us * 1e-6,
         pixel: price.pixel_ns * 1e-9,
+        serial: 0.0,
     };
     Prices {
         frame_s: draw.setup_ms * 1e-3,
         pixel_s: draw.pixel_ns * 1e-9,
+        enlarge_s: draw.enlarge_ns * 1e-9,
         shading: draw.objects.each_ref().map(object),
         areas: None,
     }

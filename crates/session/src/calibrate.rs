@@ -10,7 +10,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Version of the cache files; changes whenever the benchmark or the renderer that it measures changes.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Kinds of cache files: finished prices, and measured pictures that are still too few for prices.
 const DRAWING: &str = "drawing";
@@ -23,8 +23,9 @@ struct CachedPrices {
     adapter: String,
     frame_s: f64,
     pixel_s: f64,
-    /// Per shading: setup, polygon, vertex, pixel.
-    shading: [[f64; 4]; 4],
+    enlarge_s: f64,
+    /// Per shading: setup, polygon, vertex, pixel, and the part of the faster stage that shows.
+    shading: [[f64; 5]; 4],
     /// Per shading, by area: setup, and a triangle at each of [`AREAS_PX`].
     areas: Option<[(f64, [f64; AREAS_PX.len()]); 4]>,
 }
@@ -34,8 +35,8 @@ struct CachedPrices {
 struct PartialBenchmark {
     version: u32,
     adapter: String,
-    /// Pixels of the picture, objects, polygons, pixels, number of the shading, seconds.
-    pictures: Vec<[f64; 6]>,
+    /// Pixels of the picture, pixels that it was enlarged to, objects, polygons, pixels, number of the shading, seconds.
+    pictures: Vec<[f64; 7]>,
 }
 
 /// Prices of the adapter of this name: from the cache, else measured on the device that `open` returns, and stored; `None` if there is no
@@ -60,6 +61,10 @@ pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: 
             // the partial measurement is no longer needed
             let _ = std::fs::remove_file(file(&folder, adapter, PARTIAL));
         }
+        // all pictures are there and no prices fit them: measured anew next time
+        (Some(folder), None) if metachron_render::benchmark_left(&AREAS_PX, pictures.len()) == 0.0 => {
+            let _ = std::fs::remove_file(file(&folder, adapter, PARTIAL));
+        }
         (Some(folder), None) => store_partial(&folder, adapter, &pictures),
         (None, _) => {}
     }
@@ -77,8 +82,8 @@ fn measured(drawn: &Drawn) -> Measured {
         // the benchmark draws no soft shadows
         metachron_render::Shading::Textured | metachron_render::Shading::Shadowed => Shading::Textured,
     };
-    let Drawn { picture_px, polygons, pixels, seconds, .. } = *drawn;
-    Measured { picture_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }
+    let Drawn { picture_px, enlarged_px, polygons, pixels, seconds, .. } = *drawn;
+    Measured { picture_px, enlarged_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }
 }
 
 /// The cache folder of this user.
@@ -96,23 +101,23 @@ fn file(folder: &Path, adapter: &str, what: &str) -> PathBuf {
 
 fn read(folder: &Path, adapter: &str) -> Option<Prices> {
     let cached: CachedPrices = serde_json::from_slice(&std::fs::read(file(folder, adapter, DRAWING)).ok()?).ok()?;
-    let all = [cached.frame_s, cached.pixel_s].into_iter().chain(cached.shading.into_iter().flatten());
+    let CachedPrices { frame_s, pixel_s, enlarge_s, .. } = cached;
+    let all = [frame_s, pixel_s, enlarge_s].into_iter().chain(cached.shading.into_iter().flatten());
     let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
-    let stages = |[setup, polygon, vertex, pixel]: [f64; 4]| Stages { setup, polygon, vertex, pixel };
+    let stages = |[setup, polygon, vertex, pixel, serial]: [f64; 5]| Stages { setup, polygon, vertex, pixel, serial };
     let areas = cached.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
     let sound = sound && areas.iter().flatten().all(Areas::is_sound);
-    let prices =
-        Prices { frame_s: cached.frame_s, pixel_s: cached.pixel_s, shading: cached.shading.map(stages), areas };
+    let prices = Prices { frame_s, pixel_s, enlarge_s, shading: cached.shading.map(stages), areas };
     (sound && cached.version == VERSION && cached.adapter == adapter).then_some(prices)
 }
 
 /// Stores the prices; if that fails they are measured again in the next run.
 fn store(folder: &Path, adapter: &str, prices: &Prices) {
-    let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel];
-    let Prices { frame_s, pixel_s, shading, areas } = *prices;
+    let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel, s.serial];
+    let Prices { frame_s, pixel_s, enlarge_s, shading, areas } = *prices;
     let (adapter_name, shading) = (adapter.to_owned(), shading.map(stages));
     let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
-    let cached = CachedPrices { version: VERSION, adapter: adapter_name, frame_s, pixel_s, shading, areas };
+    let cached = CachedPrices { version: VERSION, adapter: adapter_name, frame_s, pixel_s, enlarge_s, shading, areas };
     write(&file(folder, adapter, DRAWING), &cached);
 }
 
@@ -120,17 +125,21 @@ fn store(folder: &Path, adapter: &str, prices: &Prices) {
 fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
     let text = std::fs::read(file(folder, adapter, PARTIAL)).unwrap_or_default();
     let Ok(partial) = serde_json::from_slice::<PartialBenchmark>(&text) else { return Vec::new() };
-    let picture = |[picture_px, objects, polygons, pixels, shading, seconds]: [f64; 6]| {
-        let sound = [picture_px, objects, polygons, pixels, seconds].iter().all(|x| x.is_finite() && *x >= 0.0);
+    let picture = |[picture_px, enlarged_px, objects, polygons, pixels, shading, seconds]: [f64; 7]| {
+        let sound =
+            [picture_px, enlarged_px, objects, polygons, pixels, seconds].iter().all(|x| x.is_finite() && *x >= 0.0);
         let shading = Shading::ALL.into_iter().find(|known| f64::from(*known as u8) == shading).filter(|_| sound)?;
-        Some(Measured { picture_px, objects, polygons, pixels, shading, seconds })
+        Some(Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds })
     };
     let ours = partial.version == VERSION && partial.adapter == adapter;
     partial.pictures.into_iter().map_while(picture).filter(|_| ours).collect()
 }
 
 fn store_partial(folder: &Path, adapter: &str, pictures: &[Measured]) {
-    let row = |p: &Measured| [p.picture_px, p.objects, p.polygons, p.pixels, f64::from(p.shading as u8), p.seconds];
+    let row = |p: &Measured| {
+        let Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds } = *p;
+        [picture_px, enlarged_px, objects, polygons, pixels, f64::from(shading as u8), seconds]
+    };
     let pictures = pictures.iter().map(row).collect();
     write(
         &file(folder, adapter, PARTIAL),
@@ -155,6 +164,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = |seconds| Measured {
             picture_px: 57_600.0,
+            enlarged_px: 0.0,
             objects: 4.0,
             polygons: 32.0,
             pixels: 900.0,

@@ -52,6 +52,8 @@ pub struct FrameRecord {
     pub eps: f64,
     /// Mean level n of the tubes in view, else of everything in view.
     pub n: f64,
+    /// Fraction of its width and height that the picture was drawn with.
+    pub render_scale: f64,
 }
 
 /// A probe's point at the end of the run.

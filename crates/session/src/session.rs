@@ -265,7 +265,8 @@ impl Session {
     #[must_use]
     pub fn clamp(&self) -> Option<String> {
         let status = self.control.status();
-        matches!(status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed).then(|| status.to_string())
+        matches!(status, Status::Clamped(_) | Status::Reduced | Status::BetweenLevels | Status::Fixed)
+            .then(|| status.to_string())
     }
 
     /// The force between the user spring and an agent, newtons.

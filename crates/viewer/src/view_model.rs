@@ -112,6 +112,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     status.policy = session.policy_name().to_owned();
     status.clamp = session.clamp();
     status.triangles = session.picture().triangles();
+    status.render_scale = session.picture().scale;
     status.shares = shares(session, meter);
     fill_couplings(status, session);
     status.energy_j = 0.0;

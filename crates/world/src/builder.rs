@@ -7,7 +7,7 @@ use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
-use super::scene::{Appearance, Gains, Machine, Member, PaceWish, Scene, Spec, Target};
+use super::scene::{Appearance, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Obstacle, Solid};
@@ -330,6 +330,7 @@ impl SceneBuilder {
                 gains: Gains::default(),
                 lag: None,
                 raise: false,
+                render_scale: RENDER_SCALE,
             },
             camera: None,
             machine: Machine::default(),

@@ -87,7 +87,13 @@ pub struct Target {
     pub lag: Option<(f64, f64)>,
     /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
     pub raise: bool,
+    /// Least and most fraction of its width and height that the picture is drawn with, 0.35 … 1: fewer pixels where all else is at its coarsest
+    /// and frames are late.
+    pub render_scale: (f64, f64),
 }
+
+/// The range of [`Target::render_scale`], and its default.
+pub const RENDER_SCALE: (f64, f64) = (0.35, 1.0);
 
 /// Gains of the feedback laws; `None` is the law's own default.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -153,8 +159,10 @@ pub struct Machine {
     pub draw_object_us: Option<f64>,
     /// Microseconds per triangle.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds per pixel.
+    /// Nanoseconds per pixel drawn.
     pub draw_pixel_ns: Option<f64>,
+    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
+    pub draw_enlarge_ns: Option<f64>,
     /// Nanoseconds per object for culling.
     pub cull_object_ns: Option<f64>,
     /// Nanoseconds per object in view for choosing its level.

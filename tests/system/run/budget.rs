@@ -72,6 +72,32 @@ fn a_frame_costs_what_the_machine_declares_for_each_shading() {
 }
 
 #[test]
+fn where_pixels_dominate_fewer_are_drawn_and_all_again_when_the_load_has_gone() {
+    let scene = Folder::with(BALLS);
+    // 1.2 ms and 30 ns for each of 921,600 pixels, 27.6 ms, in a frame of 33.3; twice that from 1 to 3 s on, then a third
+    let load = ["--set", "machine.load=[{at_s = 1.0, factor = 2.0}, {at_s = 3.0, factor = 0.3}]"];
+    let play = ["--set", "machine.draw_pixel_ns=30", "--target-fps", "30", "--seconds", "10"];
+    let csv = scene.file("frames.csv");
+    for policy in ["adaptive", "greedy", "feedback", "full"] {
+        let run = [&play[..], &load, &["--policy", policy, "--frames-csv", &csv]].concat();
+        let report = lockstep(scene.scene(), &run);
+        let scale = |key: &str| number(&report["budget"]["render_scale"], key);
+        if policy == "full" {
+            assert_eq!((scale("/end"), scale("/mean"), scale("/least")), (1.0, 1.0, 1.0));
+            continue;
+        }
+        // (1.2 + 1.84 + 27.6 s²) 2 is 0.97 · 0.98 of the frame at s = 0.68, and of 0.9, which feedback goes for, at 0.65
+        assert!((0.6..=0.65).contains(&scale("/least")) && scale("/end") == 1.0, "{policy}: {}", report["budget"]);
+        let text = std::fs::read_to_string(&csv).unwrap();
+        let rows = text.lines().skip(1).map(|row| row.split(',').nth(2).unwrap().parse::<f64>().unwrap());
+        let late = rows.filter(|ms| *ms > 1.05 * 1e3 / 30.0).count();
+        // the frames by which it is seen that there is a load
+        assert!((1..=8).contains(&late), "{policy}: {late} late");
+        assert_eq!(report["budget"], lockstep(scene.scene(), &run)["budget"], "{policy}: the same each time");
+    }
+}
+
+#[test]
 fn spikes_come_as_often_as_declared() {
     let scene = Folder::with(BALLS);
     let report = lockstep(scene.scene(), &["--frames", "600", "--set", "machine.spikes=0.05"]);

@@ -39,7 +39,8 @@ impl Subject for Render {
             return Ok(Vec::new());
         }
         let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX, 0)?;
-        Ok(drawn.iter().map(|drawn| row(&gpu.describe(), drawn)).collect())
+        let plain = drawn.iter().filter(|drawn| drawn.enlarged_px == 0.0);
+        Ok(plain.map(|drawn| row(&gpu.describe(), drawn)).collect())
     }
 
     fn table(rows: &[Row]) -> Table {

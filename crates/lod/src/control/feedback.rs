@@ -11,6 +11,7 @@ use super::plan::{LevelDemand, SizedView, steers};
 use super::policy::Law;
 use super::status::Status;
 use super::view::{Kind, ObjectView};
+use crate::Bound;
 use crate::grisoni::{GrisoniLaw, Limits};
 use crate::log_law::LogLaw;
 use crate::share::{Share, water_level};
@@ -223,6 +224,15 @@ impl Feedback {
 
     pub fn status(&self) -> Status {
         self.status
+    }
+
+    /// Whether everything in view is as coarse as it may be.
+    pub fn is_coarsest(&self) -> bool {
+        self.started
+            && match self.law {
+                Law::Corrected { .. } => self.corrected.value() >= self.corrected.range().1,
+                Law::Printed { .. } => self.printed.rest() == Some(Bound::Coarsest),
+            }
     }
 
     /// The loop variable ε̂: of the printed law, or of the corrected law (480 over the scene's polygons).

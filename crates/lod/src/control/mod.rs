@@ -22,6 +22,7 @@ mod price;
 mod quality_boost;
 mod query;
 mod rate;
+mod render_scale;
 mod select;
 mod status;
 mod tolerance;

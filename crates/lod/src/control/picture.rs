@@ -4,6 +4,7 @@
 //! `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
 
 mod ahead;
+mod scaled;
 mod settings;
 
 use super::adaptive::AdaptiveChoice;
@@ -19,6 +20,7 @@ use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
 use super::quality_boost::QualityBoost;
 use super::query::{FrameQuery, Promise};
+use super::render_scale::RenderScale;
 use super::select::Select;
 use super::status::Status;
 use super::view::ObjectView;
@@ -71,6 +73,7 @@ pub struct PictureControl {
     select: Select,
     hierarchy: Hierarchy,
     adaptive: AdaptiveChoice,
+    scale: RenderScale,
     ladders: Ladders,
     groups: Groups,
     changes: Changes,
@@ -108,6 +111,7 @@ impl PictureControl {
             select: Select::default(),
             hierarchy: Hierarchy::default(),
             adaptive: AdaptiveChoice::default(),
+            scale: RenderScale::default(),
             ladders: Ladders::default(),
             groups: Groups::default(),
             changes: Changes::default(),
@@ -124,6 +128,7 @@ impl PictureControl {
         let (work_s, drawn_s) = (frame.work.as_secs_f64(), frame.draw.min(frame.work).as_secs_f64());
         if frame.skip {
             self.adaptive.disturb();
+            self.scale.disturb();
         }
         if frame.skip || work_s <= 0.0 {
             return;
@@ -131,10 +136,13 @@ impl PictureControl {
         let overhead_s = work_s - drawn_s;
         self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
         let target_s = self.target_s();
+        self.observe_scale(work_s, drawn_s);
         if !steers(&self.views) {
             return;
         }
         match self.policy {
+            // pixels come back before levels
+            Policy::Feedback if self.scale.is_reduced() && work_s <= self.set_point_s() => {}
             Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
@@ -295,6 +303,7 @@ impl PictureControl {
         match self.policy {
             Policy::Full => Status::Full,
             _ if !steers(&self.views) && in_view(&self.views).next().is_some() => Status::Fixed,
+            Policy::Feedback if self.feedback.is_coarsest() && self.scale.helps() => Status::Reduced,
             Policy::Feedback => self.feedback.status(),
             Policy::Adaptive => self.adaptive.status(),
             _ => Status::of_promise(&self.plan.promise),

@@ -93,6 +93,12 @@ impl Policy {
         !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
     }
 
+    /// Whether the policy takes pixels from the picture where all else is at its coarsest: one that ignores the time of frames does not.
+    #[must_use]
+    pub const fn scales_pictures(self) -> bool {
+        self.predicts() || matches!(self, Self::Feedback)
+    }
+
     /// The prices that the policy uses: by area for Robin Hood (RH05), else two stages (FS93). The default uses the stages too: areas that
     /// objects occlude from each other are priced in full, and its κ is fitted to the remainder (control.md, section 7).
     pub(super) fn prices(self, known: &Prices) -> Prices {

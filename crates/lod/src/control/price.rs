@@ -7,7 +7,7 @@
 use super::area::Areas;
 use super::plan::LevelDemand;
 use super::view::{ObjectView, Shading};
-use crate::cost::fit::{Sample, fit};
+use crate::cost::fit::{BETTER, SERIAL, Sample, fit};
 use crate::cost::stages::{Stages, Work};
 
 /// Vertices of a closed mesh per triangle (Euler: half as many and two more).
@@ -23,6 +23,8 @@ pub struct Prices {
     pub frame_s: f64,
     /// Each pixel of the picture, independent of its content, ≥ 0.
     pub pixel_s: f64,
+    /// Each pixel that a smaller picture is enlarged to, ≥ 0.
+    pub enlarge_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
     pub shading: [Stages; 4],
     /// The same by the area of its triangles, if that was measured: then it replaces the stages.
@@ -32,8 +34,10 @@ pub struct Prices {
 /// A measured picture of equal objects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
-    /// Pixels of the picture.
+    /// Pixels of the picture as drawn.
     pub picture_px: f64,
+    /// Pixels that it was enlarged to; 0 for one that was not.
+    pub enlarged_px: f64,
     /// Objects in the picture; 0 to measure the cost of an empty picture.
     pub objects: f64,
     /// Triangles of each.
@@ -49,8 +53,10 @@ pub struct Measured {
 /// The part of a picture that is independent of the choice.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Backdrop {
-    /// Pixels of the picture, ≥ 0.
+    /// Pixels of the picture as drawn, ≥ 0.
     pub pixels: f64,
+    /// Pixels that it is enlarged to, ≥ 0; 0 for one that is not.
+    pub enlarged: f64,
     /// Triangles that are not subject to a choice: fixed solids, the floor; ≥ 0.
     pub triangles: f64,
 }
@@ -58,8 +64,8 @@ pub struct Backdrop {
 impl Default for Prices {
     /// Two cores with Mesa, from one measurement: the assumption until better prices are known.
     fn default() -> Self {
-        let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
-        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4], areas: None }
+        let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
+        Self { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
     }
 }
 
@@ -74,10 +80,12 @@ impl Prices {
             polygon: of(s.polygon, p.polygon),
             vertex: of(s.vertex, p.vertex),
             pixel: of(s.pixel, p.pixel),
+            serial: crate::within(s.serial, 0.0, 1.0),
         };
         Self {
             frame_s: of(self.frame_s, usual.frame_s),
             pixel_s: of(self.pixel_s, usual.pixel_s),
+            enlarge_s: of(self.enlarge_s, usual.enlarge_s),
             shading: std::array::from_fn(|i| stages(self.shading[i], usual.shading[i])),
             areas: self.areas.filter(|areas| areas.iter().all(Areas::is_sound)),
         }
@@ -89,31 +97,39 @@ impl Prices {
         Self { areas: None, ..self }
     }
 
-    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, and for each shading
+    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, one enlarged, and for each shading
     /// eight pictures of objects.
     #[must_use]
     pub fn fitted(pictures: &[Measured]) -> Option<Self> {
-        let (pixel_s, frame_s) = line(pictures.iter().filter(|p| p.objects == 0.0).map(|p| (p.picture_px, p.seconds)))?;
+        let (enlarged, plain): (Vec<Measured>, Vec<Measured>) =
+            pictures.iter().copied().partition(|p| p.enlarged_px > 0.0);
+        let (pixel_s, frame_s) = line(plain.iter().filter(|p| p.objects == 0.0).map(|p| (p.picture_px, p.seconds)))?;
+        let enlarging = |p: &Measured| (p.seconds - frame_s - pixel_s * p.picture_px) / p.enlarged_px;
+        let enlarge_s = enlarged.first().map(enlarging).filter(|s| s.is_finite())?.max(0.0);
         let draws = |shading: Shading| {
-            let of = pictures.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
+            let of = plain.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
             of.map(move |p| (p.polygons, p.pixels, (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects))
         };
-        let object = |shading: Shading| {
-            let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
-            fit(&draws(shading).map(sample).collect::<Vec<_>>()).map(|found| found.stages)
+        let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
+        let samples = Shading::ALL.map(|shading| draws(shading).map(sample).collect::<Vec<_>>());
+        // whether stages work beside each other is the machine's, whatever the shading
+        let fits = |serial: f64| {
+            let [flat, gouraud, per_pixel, textured] = samples.each_ref().map(|of| fit(of, serial));
+            let all = [flat?, gouraud?, per_pixel?, textured?];
+            Some((all.iter().map(|fit| fit.error50).sum::<f64>(), all.map(|fit| fit.stages)))
         };
-        let [flat, gouraud, per_pixel, textured] = Shading::ALL.map(object);
-        let shading = [flat?, gouraud?, per_pixel?, textured?];
+        let best = SERIAL.into_iter().filter_map(fits);
+        let (_, shading) = best.reduce(|best, next| if next.0 < BETTER * best.0 { next } else { best })?;
         let [flat, gouraud, per_pixel, textured] =
             Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
         let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
-        Some(Self { frame_s, pixel_s, shading, areas: areas() })
+        Some(Self { frame_s, pixel_s, enlarge_s, shading, areas: areas() })
     }
 
     /// Predicted time of a measured picture, seconds.
     #[must_use]
     pub fn predict_s(&self, picture: &Measured) -> f64 {
-        let backdrop = Backdrop { pixels: picture.picture_px, triangles: 0.0 };
+        let backdrop = Backdrop { pixels: picture.picture_px, enlarged: picture.enlarged_px, triangles: 0.0 };
         self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
     }
 
@@ -151,7 +167,8 @@ impl Prices {
     pub fn backdrop_s(&self, backdrop: Backdrop) -> f64 {
         let part = |x: f64| if x > 0.0 { x } else { 0.0 };
         let polygon_s = self.of(Shading::PerPixel).polygon;
-        self.frame_s + self.pixel_s * part(backdrop.pixels) + polygon_s * part(backdrop.triangles)
+        let Backdrop { pixels, enlarged, triangles } = backdrop;
+        self.frame_s + self.pixel_s * part(pixels) + self.enlarge_s * part(enlarged) + polygon_s * part(triangles)
     }
 }
 
@@ -185,8 +202,9 @@ mod tests {
             for k in 0..40 {
                 let objects = if k % 10 == 0 { 0.0 } else { 36.0 };
                 let (polygons, pixels) = (10.0 * 400.0_f64.powf(random()), 10.0 * 500.0_f64.powf(random()));
+                let (picture_px, enlarged_px) = (1e5 + 9e5 * random(), if k == 0 { 2e6 } else { 0.0 });
                 let mut picture =
-                    Measured { picture_px: 1e5 + 9e5 * random(), objects, polygons, pixels, shading, seconds: 0.0 };
+                    Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds: 0.0 };
                 let stall = if random() < 0.05 && objects > 0.0 { 1.6 } else { 1.0 };
                 picture.seconds = machine.predict_s(&picture) * stall * (1.0 + 0.06 * (random() - 0.5));
                 all.push(picture);
@@ -197,10 +215,11 @@ mod tests {
 
     #[test]
     fn held_out_pictures_are_predicted_within_a_tenth_in_nineteen_of_twenty() {
-        let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel };
+        let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel, serial: 0.0 };
         let machine = Prices {
             frame_s: 1.4e-3,
             pixel_s: 6e-9,
+            enlarge_s: 2e-9,
             shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9), stages(0.3e-6, 55e-9)],
             areas: None,
         };
@@ -224,8 +243,8 @@ mod tests {
 
     #[test]
     fn the_slower_stage_counts() {
-        let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5 };
-        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4], areas: None };
+        let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5, serial: 0.0 };
+        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, enlarge_s: 0.0, shading: [stages; 4], areas: None };
         // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 200.0), 101.0);
@@ -238,6 +257,6 @@ mod tests {
         let sound = prices.sound();
         assert_eq!((sound.frame_s, sound.pixel_s, sound.shading[1].polygon), (2.8e-3, 12e-9, 0.44e-6));
         assert_eq!(sound.shading[0], Prices::default().shading[0]);
-        assert!(sound.backdrop_s(Backdrop { pixels: f64::NAN, triangles: -1.0 }) == 2.8e-3);
+        assert!(sound.backdrop_s(Backdrop { pixels: f64::NAN, enlarged: -1.0, triangles: -1.0 }) == 2.8e-3);
     }
 }

@@ -19,6 +19,8 @@ pub enum Status {
     Settled,
     /// The controller is stopped at this end of the range of the objects in view.
     Clamped(Bound),
+    /// Everything is at its coarsest, and the work is on target because the picture is drawn with fewer pixels.
+    Reduced,
     /// There is time left, but the next finer level would be late.
     BetweenLevels,
     /// Nothing in view can be drawn in more than one way.
@@ -59,6 +61,7 @@ impl fmt::Display for Status {
             Self::Settled => "on target",
             Self::Clamped(Bound::Finest) => "at its finest: ε may not be finer, and there is time left",
             Self::Clamped(Bound::Coarsest) => "at its coarsest: ε may not be coarser, and frames still take too long",
+            Self::Reduced => "at its coarsest, and on target with fewer pixels",
             Self::BetweenLevels => "between levels: there is time left, but the next finer level would be late",
             Self::Fixed => "fixed: nothing in view has a range to choose from",
             Self::Full => "full detail: the frame time is ignored",

@@ -21,6 +21,8 @@ pub struct Sample {
 pub struct Fit {
     /// The coefficients.
     pub stages: Stages,
+    /// Half of the samples are predicted to within this fraction of their time.
+    pub error50: f64,
     /// 95 % of the samples are predicted to within this fraction of their time.
     pub error95: f64,
     /// Number of samples used: the valid ones.
@@ -35,12 +37,18 @@ const WILD: f64 = 1.345 * 1.4826;
 /// Least number of samples for a fit.
 const LEAST: usize = 8;
 
-/// Fits setup + max(c₁ polygons + c₂ vertices, c₃ pixels) to samples of both stages; `None` with fewer than eight valid ones.
+/// Parts of the faster stage that may show, to choose among …
+pub const SERIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// … where a larger one counts if its error is below this part of the best before.
+pub const BETTER: f64 = 0.9;
+
+/// Fits setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels to samples of both stages, for a given `serial`; `None` with fewer
+/// than eight valid ones.
 ///
 /// The samples should span polygons where pixels are few, and pixels where polygons are few. If the ratio of vertices to polygons is
 /// constant throughout, the two cannot be separated: then c₂ is 0 and c₁ covers both.
 #[must_use]
-pub fn fit(samples: &[Sample]) -> Option<Fit> {
+pub fn fit(samples: &[Sample], serial: f64) -> Option<Fit> {
     let number = |x: f64| x.is_finite() && x >= 0.0;
     let sound = |s: &Sample| {
         number(s.work.polygons) && number(s.work.vertices) && number(s.work.pixels) && number(s.time) && s.time > 0.0
@@ -49,18 +57,30 @@ pub fn fit(samples: &[Sample]) -> Option<Fit> {
     if samples.len() < LEAST {
         return None;
     }
-    let mut stages = start(&samples);
-    let mut best = (f64::INFINITY, stages);
+    let Found { typical, stages } = descend(&samples, Stages { serial, ..start(&samples) });
+    let error95 = quantile(samples.iter().map(|s| (stages.time(s.work) / s.time - 1.0).abs()), 0.95);
+    Some(Fit { stages, error50: typical, error95, samples: samples.len() })
+}
+
+/// Coefficients, and the median of their relative errors.
+#[derive(Clone, Copy)]
+struct Found {
+    typical: f64,
+    stages: Stages,
+}
+
+/// The best of all rounds from `stages` on.
+fn descend(samples: &[Sample], mut stages: Stages) -> Found {
+    let mut best = Found { typical: f64::INFINITY, stages };
     for _ in 0..ROUNDS {
         let errors: Vec<_> = samples.iter().map(|s| stages.time(s.work) / s.time - 1.0).collect();
         let typical = quantile(errors.iter().map(|e| e.abs()), 0.5);
-        if typical < best.0 {
-            best = (typical, stages);
+        if typical < best.typical {
+            best = Found { typical, stages };
         }
-        stages = round(&samples, &errors, typical, stages);
+        stages = round(samples, &errors, typical, stages);
     }
-    let error95 = quantile(samples.iter().map(|s| (best.1.time(s.work) / s.time - 1.0).abs()), 0.95);
-    Some(Fit { stages: best.1, error95, samples: samples.len() })
+    best
 }
 
 /// Initial guess: both stages as if each were alone, from low quantiles of the time per polygon and per pixel, half the least time as
@@ -71,14 +91,15 @@ fn start(samples: &[Sample]) -> Stages {
         let many = samples.iter().filter(|s| count(&s.work) > 0.0 && s.time > 2.0 * least);
         quantile(many.map(|s| s.time / count(&s.work)), 0.1)
     };
-    Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels) }
+    Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels), serial: 0.0 }
 }
 
 /// One least-squares fit of the relative error, each sample in the stage that was slower by the previous fit (eq. 42).
 fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> Stages {
     let row = |s: &Sample| {
-        let w = s.work;
-        if before.is_filling(w) { [1.0, 0.0, 0.0, w.pixels] } else { [1.0, w.polygons, w.vertices, 0.0] }
+        let (w, hidden) = (s.work, before.serial);
+        let (geometry, fill) = if before.is_filling(w) { (hidden, 1.0) } else { (1.0, hidden) };
+        [1.0, geometry * w.polygons, geometry * w.vertices, fill * w.pixels]
     };
     let mut sums = [[0.0; 5]; 4];
     for (s, error) in samples.iter().zip(errors) {
@@ -97,6 +118,7 @@ fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> St
         polygon: if geometry { polygon } else { before.polygon },
         vertex: if geometry { vertex } else { before.vertex },
         pixel: if fill { pixel } else { before.pixel },
+        ..before
     }
 }
 

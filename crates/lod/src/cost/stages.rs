@@ -1,4 +1,4 @@
-//! The cost of drawing as two parallel stages, of which the slower counts (FS93, §4).
+//! The cost of drawing as two stages beside each other, of which the slower counts (FS93, §4), or one after the other, or between.
 //!
 //! In: polygons, vertices, pixels. Out: a time. Never here: where the coefficients come from ([`super::fit`]).
 //! Theory: `docs/theory/budget.md`, eq. 41.
@@ -25,13 +25,17 @@ pub struct Stages {
     pub vertex: f64,
     /// c₃: time of a pixel.
     pub pixel: f64,
+    /// The part of the faster stage that the slower does not hide, 0 … 1: 0 on the paper's machine, 1 where a processor does one after the
+    /// other.
+    pub serial: f64,
 }
 
 impl Stages {
-    /// setup + max(c₁ polygons + c₂ vertices, c₃ pixels) (FS93, §4; the setup is ours).
+    /// setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels (FS93, §4; the setup and what is not hidden are ours).
     #[must_use]
     pub fn time(&self, work: Work) -> f64 {
-        self.setup + self.geometry(work).max(self.pixel * work.pixels)
+        let (geometry, fill) = (self.geometry(work), self.pixel * work.pixels);
+        self.setup + geometry.max(fill) + self.serial * geometry.min(fill)
     }
 
     /// Time of the stage that every polygon passes.
@@ -40,7 +44,7 @@ impl Stages {
         self.polygon * work.polygons + self.vertex * work.vertices
     }
 
-    /// Whether the pixel stage is the slower: then fewer polygons save no time.
+    /// Whether the pixel stage is the slower: then fewer polygons save no more than the part of their time that it does not hide.
     #[must_use]
     pub fn is_filling(&self, work: Work) -> bool {
         self.pixel * work.pixels > self.geometry(work)

@@ -46,10 +46,11 @@ impl Candidate {
             Self::Feedback(law) => PictureControl::new(Policy::Feedback, law, target_hz),
             Self::Adaptive { margin } => {
                 let mut control = PictureControl::new(Policy::Adaptive, Law::CORRECTED, target_hz);
-                let object = Stages { setup: 0.0, polygon: plant.line.slope, vertex: 0.0, pixel: 0.0 };
+                let object = Stages { setup: 0.0, polygon: plant.line.slope, vertex: 0.0, pixel: 0.0, serial: 0.0 };
                 control.set_prices(Prices {
                     frame_s: plant.line.intercept.max(0.0),
                     pixel_s: 0.0,
+                    enlarge_s: 0.0,
                     shading: [object; 4],
                     areas: None,
                 });

@@ -6,6 +6,7 @@ use super::super::environment::{Environment, EnvironmentLight};
 use super::super::light_volume::LightColumn;
 use super::super::picture::{Colouring, FloorDraw, Picture};
 use super::super::view::{Camera, Size};
+use super::Target;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
@@ -67,7 +68,8 @@ pub fn light_source(environment: Environment) -> String {
 
 impl Globals {
     /// The block of one frame.
-    pub fn new(picture: &Picture, camera: &Camera, size: Size, shadow_px: u32) -> Self {
+    pub fn new(picture: &Picture, camera: &Camera, target: Target<'_>, shadow_px: u32) -> Self {
+        let Target { size, shown, .. } = target;
         let frame = LightFrame::new(picture, shadow_px);
         let focus = picture.focus_m - picture.origin;
         let radius = picture.focus_radius_m;
@@ -79,9 +81,10 @@ impl Globals {
         let patch = floor.map_or_else(Patch::default, |floor| frame.patch(floor, picture.origin));
         let reach = patch.reach(floor.map_or(focus, |f| f.below(focus)), radius);
         // half the picture's width and height one metre away
-        let half = DVec2::new(f64::from(size.width), f64::from(size.height)) * (0.5 * pixel);
+        let half =
+            DVec2::new(f64::from(shown.width), f64::from(shown.height)) * (0.5 / camera.pixels_per_metre(1.0, shown));
         Self {
-            view_projection: camera.view_projection(size, picture.origin).to_cols_array(),
+            view_projection: camera.view_projection(shown, picture.origin).to_cols_array(),
             light_projection: frame.projection(picture.origin).as_mat4().to_cols_array(),
             eye: four(camera.eye() - picture.origin, frame.texel_m),
             texel: [1.0 / shadow_px as f32, camera.distance_m as f32, 0.0, 0.0],

@@ -63,8 +63,10 @@ impl RendererOptions {
 pub struct Target<'a> {
     /// A view of a texture in the renderer's format.
     pub view: &'a wgpu::TextureView,
-    /// The texture's size.
+    /// The texture's size: pixels that are drawn.
     pub size: Size,
+    /// The size that it is shown with: its proportions are the picture's, those of a smaller texture are rounded.
+    pub shown: Size,
 }
 
 /// Cost of drawing a picture.
@@ -198,10 +200,10 @@ impl Renderer {
         }
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         self.prepare_light(picture.environment);
-        self.upload(picture, camera, target.size);
+        self.upload(picture, camera, target);
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         let shadows = self.draw_shadows(&mut encoder, picture);
-        let room = !globals::floor_fills(picture, camera, target.size);
+        let room = !globals::floor_fills(picture, camera, target.shown);
         let draws = shadows + self.draw_picture(&mut encoder, picture, target, room);
         if let Some(timing) = &mut self.timing {
             timing.resolve(&mut encoder);
@@ -247,8 +249,9 @@ impl Renderer {
         }
     }
 
-    fn upload(&mut self, picture: &Picture, camera: &Camera, size: Size) {
-        let globals = Globals::new(picture, camera, size, self.setup.options.shadow_px);
+    fn upload(&mut self, picture: &Picture, camera: &Camera, target: Target<'_>) {
+        let size = target.size;
+        let globals = Globals::new(picture, camera, target, self.setup.options.shadow_px);
         self.queue.write_buffer(&self.bindings.globals, 0, bytemuck::bytes_of(&globals));
         self.samples.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.samples));
         self.instances.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.instances));

@@ -2,6 +2,7 @@
 mod adapter;
 mod light;
 mod painting;
+mod reduced;
 mod scenery;
 mod stage;
 mod still_life;

@@ -8,7 +8,7 @@ use crate::format::{
 };
 use glam::DVec3;
 use metachron_core::SimSpan;
-use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
+use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, RENDER_SCALE, Target, View};
 
 /// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
 const OPTIMISER_SHARE: f64 = 0.05;
@@ -41,6 +41,9 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         lead: gain("lead", f.lead, allowed(0.0..=1.99, "")),
         margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
     });
+    let scales = file
+        .and_then(|f| f.render_scale)
+        .map(|scales| c.ends(&place, "render_scale", scales, &allowed(RENDER_SCALE.0..=RENDER_SCALE.1, "")));
     Target {
         lag: lag(c, &place, file),
         frame_hz: c.optional(&place, "frame_hz", frame_hz, &allowed(1.0..=1000.0, "Hz")).unwrap_or(FRAME_DEFAULT_HZ),
@@ -49,6 +52,7 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         law: file.and_then(|f| f.law).unwrap_or_default(),
         gains,
         raise: file.and_then(|f| f.raise).unwrap_or_default(),
+        render_scale: scales.unwrap_or(RENDER_SCALE),
     }
 }
 
@@ -159,6 +163,7 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
     let draw_object_us = number("draw_object_us", file.draw_object_us, allowed(0.0..=1e6, "µs"));
     let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
     let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
+    let draw_enlarge_ns = number("draw_enlarge_ns", file.draw_enlarge_ns, allowed(0.0..=1e6, "ns"));
     let cull_object_ns = number("cull_object_ns", file.cull_object_ns, allowed(0.0..=1e6, "ns"));
     let choose_object_ns = number("choose_object_ns", file.choose_object_ns, allowed(0.0..=1e6, "ns"));
     let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
@@ -177,6 +182,7 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
         draw_object_us,
         draw_triangle_us,
         draw_pixel_ns,
+        draw_enlarge_ns,
         cull_object_ns,
         choose_object_ns,
         shading,

@@ -1,6 +1,6 @@
 //! The tables of a scene other than its objects.
 
-use super::{CouplingFile, FaultsFile, GroupFile, JointFile, Point};
+use super::{CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point};
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -119,6 +119,9 @@ pub struct TargetFile {
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
+    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both, 0.35 … 1; then it is enlarged.
+    /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.
+    pub render_scale: Option<OneOrRange<f64>>,
 }
 
 /// `[camera]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
@@ -173,8 +176,10 @@ pub struct MachineFile {
     pub draw_object_us: Option<f64>,
     /// Microseconds per triangle, 0 … 1e4.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds per pixel of the picture, 0 … 1e6.
+    /// Nanoseconds per pixel of the picture as drawn, 0 … 1e6.
     pub draw_pixel_ns: Option<f64>,
+    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to, 0 … 1e6.
+    pub draw_enlarge_ns: Option<f64>,
     /// Nanoseconds per object for culling, 0 … 1e6. Default 0.
     pub cull_object_ns: Option<f64>,
     /// Nanoseconds per object in view for choosing its level, 0 … 1e6. Default 0.

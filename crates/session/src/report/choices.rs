@@ -29,6 +29,19 @@ pub struct ChoiceSummary {
     pub lag_ms: Option<Spread>,
     /// Objects in view that were left out for lack of time, over all frames.
     pub holes: Option<u64>,
+    /// Fraction of its width and height that the picture was drawn with; `None` without a frame.
+    pub render_scale: Option<ScaleSummary>,
+}
+
+/// The scales of a run's pictures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ScaleSummary {
+    /// Of the last picture.
+    pub end: f64,
+    /// Mean over all pictures.
+    pub mean: f64,
+    /// The least.
+    pub least: f64,
 }
 
 /// Summarises the choices of `frames`.
@@ -52,7 +65,13 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         draw_ms: spread(|row| row.draw_ms),
         lag_ms: spread(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
+        render_scale: scales(frames),
     }
+}
+
+fn scales(frames: &[FrameRecord]) -> Option<ScaleSummary> {
+    let spread = Spread::of(frames.iter().map(|row| row.render_scale))?;
+    frames.last().map(|last| ScaleSummary { end: last.render_scale, mean: spread.mean, least: spread.min })
 }
 
 impl ChoiceSummary {

@@ -7,7 +7,7 @@ mod frames;
 mod goal;
 mod summary;
 
-pub use choices::{ChoiceSummary, summarise_choices};
+pub use choices::{ChoiceSummary, ScaleSummary, summarise_choices};
 pub use frames::{
     BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Spread, summarise, summarise_undrawn,
 };
@@ -448,6 +448,9 @@ mod tests {
             "/budget/lag_ms/p99",
             "/budget/lag_ms/max",
             "/budget/holes",
+            "/budget/render_scale/end",
+            "/budget/render_scale/mean",
+            "/budget/render_scale/least",
         ] {
             assert!(json.pointer(path).is_some(), "{path} is missing");
         }

@@ -1,6 +1,9 @@
 //! The report as a table for people.
 
-use super::{AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, Spread};
+use super::{
+    AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, ScaleSummary,
+    Spread,
+};
 use std::fmt::Write;
 
 impl Report {
@@ -57,6 +60,9 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
     }
     if let Some(error) = choices.model_error {
         let _ = write!(out, "; predictions {}", error_text(error));
+    }
+    if let Some(ScaleSummary { mean, least, .. }) = choices.render_scale.filter(|scale| scale.least < 1.0) {
+        let _ = write!(out, "; drawn at {:.0} % of its size, at least {:.0} %", 100.0 * mean, 100.0 * least);
     }
     if let Some(gap) = choices.certificate {
         let _ = write!(out, "; within {:.2} % of the best", 100.0 * gap);

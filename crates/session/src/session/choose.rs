@@ -16,6 +16,7 @@ impl Session {
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
         let started = self.now();
         self.gather();
+        self.scene_view.set_scale(self.control.render_scale());
         self.survey(camera, size);
         self.visible_resolution.update(started, self.scene_view.seen(), camera, size);
         let culled = self.now();
@@ -34,7 +35,7 @@ impl Session {
     /// start of the drawing to its end.
     pub fn spend_declared(&mut self, size: Size) -> Duration {
         let Chosen { cull, select, select_next, objects_s, other_triangles, .. } = self.chosen;
-        let backdrop = Backdrop { pixels: size.pixels(), triangles: other_triangles };
+        let backdrop = self.backdrop(size, other_triangles);
         let seconds = self.declared.backdrop_s(backdrop) + objects_s;
         let draw = self.machine.frame_time(seconds, self.frames(), self.now());
         let started = self.now();
@@ -42,9 +43,9 @@ impl Session {
         self.now().saturating_sub(started + cull + select)
     }
 
-    /// Finds the objects seen by `camera`.
+    /// Finds the objects seen by `camera`, with the pixels that they are drawn with.
     pub fn survey(&mut self, camera: &Camera, size: Size) {
-        self.scene_view.survey(camera, size);
+        self.scene_view.survey(camera, size.scaled(self.control.render_scale()));
         assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), &self.scene);
     }
 
@@ -78,9 +79,15 @@ impl Session {
     /// Sets the controller's inputs for the next choice.
     pub fn set_choice_inputs(&mut self, size: Size) {
         // the triangles outside the choice hardly change from one frame to the next
-        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
+        self.control.set_backdrop(self.backdrop(size, self.chosen.other_triangles));
         self.share_processor();
         self.control.set_cull(self.chosen.cull);
+    }
+
+    /// The part of a picture shown with `size` that is independent of the choice.
+    fn backdrop(&self, size: Size, triangles: f64) -> Backdrop {
+        let drawn = size.scaled(self.control.render_scale());
+        Backdrop { pixels: drawn.pixels(), enlarged: if drawn == size { 0.0 } else { size.pixels() }, triangles }
     }
 
     /// Declared time of finding visible objects; zero in real time, where it is measured.

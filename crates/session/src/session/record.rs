@@ -37,6 +37,7 @@ impl Session {
             holes: promise.holes,
             eps: self.control.eps_hat(),
             n,
+            render_scale: self.scene_view.picture().scale,
         }
     }
 

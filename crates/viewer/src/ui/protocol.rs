@@ -225,6 +225,8 @@ pub struct Status {
     pub clamp: Option<String>,
     /// Triangles in the last picture.
     pub triangles: u64,
+    /// Fraction of its width and height that it was drawn with, 0 … 1.
+    pub render_scale: f64,
     /// Total mechanical energy, joules.
     pub energy_j: f64,
     /// Hash of every agent's state, where the run computes one.

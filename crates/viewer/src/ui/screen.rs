@@ -4,15 +4,14 @@
 //! The thread waits for the picture, so that its measured work is complete; egui draws after it on the same queue.
 
 use super::Screen;
-use super::blit::{Blit, BlitShape};
+use super::blit;
 use super::protocol::{Simulation, ViewRequest};
 use egui::{Rect, Shape};
 use egui_wgpu::{RenderState, wgpu};
 use metachron_render::Gpu;
 use metachron_render::offscreen;
-use metachron_render::{DeviceLoss, DrawError, Renderer, RendererOptions, Size, Target};
+use metachron_render::{DeviceLoss, DrawError, Renderer, RendererOptions, Size, Target, Upscaled, Upscaler};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Times of one picture.
@@ -24,7 +23,7 @@ pub struct DrawnTimes {
     pub draw: Duration,
     /// The part of it that the device measured itself.
     pub gpu: Option<Duration>,
-    /// Whether the picture's size differs from the one before.
+    /// Whether the size that it is shown with differs from the one before.
     pub resized: bool,
 }
 
@@ -32,7 +31,10 @@ pub struct DrawnTimes {
 struct Canvas {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    shown: Arc<BlitShape>,
+    /// Pixels that are drawn, and those that they are shown with.
+    drawn: Size,
+    shown: Size,
+    picture: Upscaled,
 }
 
 /// The window's device as a [`Screen`].
@@ -41,7 +43,7 @@ pub struct GpuScreen {
     target_format: wgpu::TextureFormat,
     adapter: String,
     renderer: Renderer,
-    blit: Blit,
+    upscaler: Upscaler,
     canvas: Option<Canvas>,
     times: Option<DrawnTimes>,
     failure: Option<DrawError>,
@@ -64,7 +66,7 @@ impl GpuScreen {
             target_format: state.target_format,
             adapter: gpu.describe(),
             renderer,
-            blit: Blit::new(&gpu.device, state.target_format),
+            upscaler: Upscaler::new(&gpu.device, state.target_format, options.lean),
             canvas: None,
             times: None,
             failure: None,
@@ -108,7 +110,7 @@ impl GpuScreen {
         let Some(canvas) = &self.canvas else { return Err("No picture has been drawn yet.".to_owned()) };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let path = folder.join(format!("metachron-{}-{}.png", file_name(scene), now.as_millis()));
-        let image = offscreen::read_back(&self.gpu, &canvas.texture, self.lost());
+        let image = offscreen::read_back_shown(&self.gpu, &canvas.texture, canvas.shown, self.lost());
         let written = image.and_then(|image| offscreen::write_png(&image, &path));
         written.map(|()| path).map_err(|error| error.to_string())
     }
@@ -118,10 +120,11 @@ impl GpuScreen {
         let picture = simulation.compose(view);
         let composed = Instant::now();
         let max = self.gpu.device.limits().max_texture_dimension_2d;
-        let size = Size { width: view.size.width.clamp(1, max), height: view.size.height.clamp(1, max) };
-        let resized = self.resize(size);
+        let shown = Size { width: view.size.width.clamp(1, max), height: view.size.height.clamp(1, max) };
+        let size = shown.scaled(picture.scale);
+        let resized = self.resize(size, shown);
         let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
-        let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
+        let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size, shown })?;
         simulation.while_drawn(view);
         // a failure here means a lost device, which is noticed before the next frame
         let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
@@ -129,11 +132,13 @@ impl GpuScreen {
         Ok(DrawnTimes { compose: composed - start, draw: composed.elapsed(), gpu, resized })
     }
 
-    /// Makes the texture of this size if there is none yet. Returns whether it was made.
-    fn resize(&mut self, Size { width, height }: Size) -> bool {
-        if self.canvas.as_ref().is_some_and(|c| (c.texture.width(), c.texture.height()) == (width, height)) {
+    /// Makes the texture of `drawn` pixels if there is none yet. Returns whether it is shown with others than the one before.
+    fn resize(&mut self, drawn: Size, shown: Size) -> bool {
+        let before = self.canvas.as_ref().map(|canvas| (canvas.drawn, canvas.shown));
+        if before == Some((drawn, shown)) {
             return false;
         }
+        let Size { width, height } = drawn;
         let device = &self.gpu.device;
         // most targets of egui store sRGB-encoded bytes unchanged; a target that encodes needs linear input, hence the decoding view
         let encodes = self.target_format.is_srgb();
@@ -150,13 +155,14 @@ impl GpuScreen {
                 | wgpu::TextureUsages::COPY_SRC,
             view_formats: if encodes { &decoded } else { &[] },
         });
-        let shown = texture.create_view(&wgpu::TextureViewDescriptor {
+        let decoding = texture.create_view(&wgpu::TextureViewDescriptor {
             format: Some(if encodes { decoded[0] } else { FORMAT }),
             ..wgpu::TextureViewDescriptor::default()
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.canvas = Some(Canvas { texture, view, shown: self.blit.show(device, &shown) });
-        true
+        let picture = self.upscaler.show(device, &decoding, drawn, shown);
+        self.canvas = Some(Canvas { texture, view, drawn, shown, picture });
+        before.is_none_or(|(_, before)| before != shown)
     }
 }
 
@@ -186,7 +192,7 @@ impl Screen for GpuScreen {
                 let _ = self.gpu.device.poll(wgpu::PollType::Poll);
             }
         }
-        self.canvas.as_ref().map(|canvas| canvas.shown.shape(over))
+        self.canvas.as_ref().map(|canvas| blit::shape(&canvas.picture, over))
     }
 
     fn adapter(&self) -> &str {

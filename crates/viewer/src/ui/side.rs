@@ -205,6 +205,12 @@ fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
         ui.end_row();
     });
     value(ui, "Triangles", &text::count(status.triangles), "In the last picture");
+    value(
+        ui,
+        "Scale",
+        &format!("{:.0} %", 100.0 * status.render_scale),
+        "Fraction of its width and height that the picture is drawn with; less where everything is at its coarsest and frames would be late",
+    );
 }
 
 fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
@@ -327,6 +333,13 @@ mod tests {
             let count = |name| harness.query_all_by_role_and_label(egui::Role::Slider, name).count();
             assert_eq!((count("Motion"), count("Hysteresis")), (1, there));
         }
+    }
+
+    #[test]
+    fn the_scale_of_the_picture_is_shown() {
+        let status = Status { render_scale: 0.65, ..Status::default() };
+        let harness = Harness::new_ui(|ui| picture(ui, &mut DrawingOptions::default(), &status));
+        assert!(harness.query_by_label("65 %").is_some());
     }
 
     #[test]

@@ -19,7 +19,7 @@ const SEAT_POLYGONS: f64 = 186.0;
 const PIECE_POLYGONS: [f64; 2] = [1021.0, 1008.0];
 const PIECES: usize = 16;
 /// A polygon takes 13.5 µs (FS93, view A: 0.98 s for 72,570); the cost of a pixel is such that a polygon takes 18.9 µs at 5300 of them.
-const STAGES: Stages = Stages { setup: 20.0, polygon: 12.0, vertex: 3.0, pixel: 0.012 };
+const STAGES: Stages = Stages { setup: 20.0, polygon: 12.0, vertex: 3.0, pixel: 0.012, serial: 0.0 };
 /// Frames of the path.
 pub(super) const LAP: usize = 250;
 /// T of the paper, microseconds.

@@ -26,7 +26,7 @@ const OVERLAP: f64 = 0.25;
 const WIDTHS: [f64; 12] = [20.0, 16.0, 13.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0];
 
 const fn of(polygon: f64) -> Stages {
-    Stages { setup: 1.0, polygon, vertex: 0.0, pixel: 0.0 }
+    Stages { setup: 1.0, polygon, vertex: 0.0, pixel: 0.0, serial: 0.0 }
 }
 
 /// The forms in which a tree can be drawn.

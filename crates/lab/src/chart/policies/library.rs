@@ -36,7 +36,7 @@ const FURNITURE: [(usize, f64, f64, bool); 5] = [
 const PARTS: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
 
 const fn of(polygon: f64, pixel: f64) -> Stages {
-    Stages { setup: 30.0, polygon, vertex: 0.0, pixel }
+    Stages { setup: 30.0, polygon, vertex: 0.0, pixel, serial: 0.0 }
 }
 
 fn show(target: f64) -> Show {

@@ -22,7 +22,7 @@ const FRAMES: usize = 1000;
 const QUICK_PART: usize = 4;
 /// T, microseconds.
 const TARGET: f64 = 1e5;
-const STAGES: Stages = Stages { setup: 30.0, polygon: 0.6, vertex: 0.1, pixel: 0.002 };
+const STAGES: Stages = Stages { setup: 30.0, polygon: 0.6, vertex: 0.1, pixel: 0.002, serial: 0.0 };
 /// Steps of the ladder, half an octave each: down to a five-hundredth of the triangles.
 const STEPS: i32 = 18;
 const POLICIES: [Policy; 3] = [Policy::Greedy, Policy::Convex, Policy::Adaptive];

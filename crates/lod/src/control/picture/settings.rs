@@ -5,6 +5,7 @@
 use super::super::policy::{Law, Policy};
 use super::super::price::{Backdrop, Prices};
 use super::super::quality_boost::QualityBoost;
+use super::super::render_scale::RenderScale;
 use super::PictureControl;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
@@ -101,6 +102,18 @@ impl PictureControl {
     /// Reserves this many seconds of every frame for others from the next choice on: finite, ≥ 0; anything else is none.
     pub fn set_reserve(&mut self, seconds: f64) {
         self.reserve_s = if seconds.is_finite() { seconds.max(0.0) } else { 0.0 };
+    }
+
+    /// Bounds the fraction of its width and height that a picture is drawn with: least and most, 0.35 … 1. Initially every pixel is drawn.
+    pub fn set_render_scale(&mut self, range: (f64, f64)) {
+        self.scale = RenderScale::new(range);
+    }
+
+    /// The fraction of its width and height to draw the next picture with. Views and pixels given to the controller are those of the smaller
+    /// picture.
+    #[must_use]
+    pub fn render_scale(&self) -> f64 {
+        if self.policy.scales_pictures() { self.scale.scale() } else { self.scale.most() }
     }
 
     /// Freezes all levels, or releases them; objects that come or go are an exception.

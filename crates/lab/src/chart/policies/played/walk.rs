@@ -187,9 +187,14 @@ pub(in super::super) fn predicted(
 
 /// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
 fn opened(name: &str, text: &str, times: Times) -> anyhow::Result<(String, FlyThrough)> {
-    let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
-    let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
-    let scene = load(&Source::memory(name, text.as_bytes())?, overrides)?;
+    let declared = if times == Times::Declared { DECLARED.as_slice() } else { &[] };
+    // the policies of the papers are compared at one number of pixels
+    let overrides: Vec<_> = [("target.render_scale", "1.0")]
+        .iter()
+        .chain(declared)
+        .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+        .collect();
+    let scene = load(&Source::memory(name, text.as_bytes())?, &overrides)?;
     let gpu = match times {
         Times::Measured => Some(Gpu::headless()?),
         Times::Declared => Gpu::headless().ok(),

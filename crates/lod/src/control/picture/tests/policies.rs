@@ -6,8 +6,8 @@ use proptest::prelude::*;
 
 /// Prices of the plant of these tests: its pixels are the backdrop's.
 fn prices() -> Prices {
-    let object = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
-    Prices { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4], areas: None }
+    let object = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
+    Prices { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
 }
 
 const PICTURE_PX: f64 = 921_600.0;
@@ -31,7 +31,7 @@ const HEEDFUL: [Policy; 12] = [
 pub(super) fn control(policy: Policy, target_hz: f64) -> PictureControl {
     let mut control = PictureControl::new(policy, Law::CORRECTED, target_hz);
     control.set_prices(prices());
-    control.set_backdrop(Backdrop { pixels: PICTURE_PX, triangles: 0.0 });
+    control.set_backdrop(Backdrop { pixels: PICTURE_PX, ..Backdrop::default() });
     control
 }
 
@@ -57,7 +57,7 @@ fn truth_s(plan: &Plan, views: &[ObjectView]) -> f64 {
         let drawn = view.visible && level.polygons > 0.0;
         if drawn { prices.object_s(level.shading, level.polygons, 0.0) } else { 0.0 }
     };
-    let backdrop = Backdrop { pixels: PICTURE_PX, triangles: 0.0 };
+    let backdrop = Backdrop { pixels: PICTURE_PX, ..Backdrop::default() };
     prices.backdrop_s(backdrop) + views.iter().zip(&plan.levels).map(of).sum::<f64>()
 }
 
@@ -349,9 +349,9 @@ proptest! {
         let policy = Policy::ALL[which];
         let mut control = control(policy, 30.0);
         let at = |i: usize| numbers[i % numbers.len()];
-        let stages = crate::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3) };
+        let stages = crate::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3), serial: 0.0 };
         let shading = [stages, prices().of(Shading::Flat), stages, stages];
-        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), shading, areas: None });
+        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), enlarge_s: at(5), shading, areas: None });
         let mut views: Vec<_> = (0..8).map(|i| if i % 2 == 0 { tube(i as u32) } else { mesh(i as u32, 1e3, 5000) }).collect();
         let members = Kind::Group { radius_m: 1.0, members: (1, 3), impostors: [0, 0, 0, 0, 0, 0, 0, 0] };
         views[6].kind = members;
@@ -376,7 +376,7 @@ proptest! {
 
 /// Six meshes near by on a machine whose pixels cost, at so many frames a second, with time that is left to be used or not.
 fn near_by(target_hz: f64, raise: bool) -> (PictureControl, Vec<ObjectView>) {
-    let stages = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 60e-9 };
+    let stages = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 60e-9, serial: 0.0 };
     let mut control = control(Policy::Adaptive, target_hz);
     control.set_prices(Prices { shading: [stages; 4], ..prices() });
     control.set_raise(raise);
@@ -390,7 +390,7 @@ fn frame_near_by(control: &mut PictureControl, views: &[ObjectView], times: f64)
     let prices = *control.prices();
     let object_s =
         |(view, level): (&ObjectView, &LevelDemand)| prices.object_s(level.shading, level.polygons, view.pixels);
-    let backdrop_s = prices.backdrop_s(Backdrop { pixels: PICTURE_PX, triangles: 0.0 });
+    let backdrop_s = prices.backdrop_s(Backdrop { pixels: PICTURE_PX, ..Backdrop::default() });
     let work_s = backdrop_s + times * views.iter().zip(&plan.levels).map(object_s).sum::<f64>();
     control.observe(frame_work(Duration::from_secs_f64(work_s), false));
     let soft = plan.levels.iter().filter(|level| level.shading == Shading::Shadowed).count();
