@@ -18,6 +18,7 @@ use super::sync::thread::Thread;
 use super::worker_wakeup::WorkerWakeup;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
+use std::time::Duration;
 
 /// How long after the last touch an agent may not rest, simulated time: longer than the period of any touching agent above 10 Hz, so that
 /// an agent does not go to rest between two touches.
@@ -26,6 +27,10 @@ const TOUCH_HOLD: SimSpan = SimSpan::from_nanos(100_000_000);
 /// How long after an agent was far behind the others check for it, simulated time; and the least interval between two records of it.
 const FAR_BEHIND_HOLD: SimSpan = SimSpan::from_nanos(2_000_000_000);
 const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
+
+/// How long the end of a run waits after the last thread that ended, and how many times that for a cluster, at most.
+const END_PATIENCE: Duration = Duration::from_millis(400);
+const END_PATIENCE_MAX: u32 = 25;
 
 /// The flags of one agent.
 #[derive(Debug)]
@@ -120,6 +125,14 @@ impl SleepRegistry {
             at = next;
         }
         at
+    }
+
+    /// How long a step that does not return is waited for at the end of a run before it counts as hung: a turn of a cluster makes the steps of
+    /// all its members.
+    pub fn end_patience(&self) -> Duration {
+        let mut led = vec![0; self.signals.len()];
+        (0..).map(AgentId).take(led.len()).for_each(|id| led[self.leader(id).0 as usize] += 1);
+        END_PATIENCE * led.into_iter().fold(1, u32::max).min(END_PATIENCE_MAX)
     }
 
     fn direct_leader(&self, id: AgentId) -> Option<AgentId> {
@@ -296,6 +309,17 @@ mod tests {
         assert!(sleep.take_notified());
         assert!(sleep.take_wake(ME));
         assert!(!sleep.take_wake(ME));
+    }
+
+    #[test]
+    fn a_cluster_is_waited_for_as_long_as_its_members() {
+        let sleep = SleepRegistry::new(40);
+        assert_eq!(sleep.end_patience(), END_PATIENCE);
+        [1, 5].into_iter().for_each(|id| sleep.follow(AgentId(id), Some(AgentId(0))));
+        sleep.follow(AgentId(7), Some(AgentId(5)));
+        assert_eq!(sleep.end_patience(), 4 * END_PATIENCE);
+        (8..40).for_each(|id| sleep.follow(AgentId(id), Some(AgentId(7))));
+        assert_eq!(sleep.end_patience(), END_PATIENCE_MAX * END_PATIENCE);
     }
 
     #[test]

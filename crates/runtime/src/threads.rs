@@ -29,9 +29,6 @@ pub const THREADS_MAX: usize = 1000;
 /// pool, 100 cost 10 and 6 (`docs/throughput.md`).
 pub const AUTO_THREADS_MAX: usize = 64;
 
-/// How long the end of a run waits after the last agent that ended. A step that takes longer counts as hung; its thread is left behind.
-const PATIENCE: Duration = Duration::from_millis(400);
-
 /// Agents on threads of their own.
 pub struct Threads {
     clock: Arc<dyn Clock>,
@@ -92,12 +89,13 @@ impl Threads {
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
 
-    /// Ends all threads and waits for them until a timeout.
+    /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind.
     fn end(&mut self) {
+        let patience = self.sleep.end_patience();
         self.sleep.stop();
         let mut missing = self.threads.iter().flatten().count();
         while missing > 0 {
-            let Ok(id) = self.ended.recv_timeout(PATIENCE) else { break };
+            let Ok(id) = self.ended.recv_timeout(patience) else { break };
             missing -= 1;
             if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
@@ -105,7 +103,7 @@ impl Threads {
             }
         }
         for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
-            handle.shared.gauges.park(format!("a step did not end within {} s", PATIENCE.as_secs_f64()));
+            handle.shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
         close_remaining(&self.handles, &self.timeline.read(), self.clock.now());

@@ -15,9 +15,6 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// How long the end of a run waits after the last worker that ended. A step that takes longer counts as hung; its thread is left behind.
-const JOIN_TIMEOUT: Duration = Duration::from_millis(400);
-
 /// A worker is given up when it is found in the same turn this many times in a row: after a suspension of the whole machine it is found so
 /// only once.
 const CHECKS_MAX: u32 = 4;
@@ -167,10 +164,11 @@ impl Supervisor {
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers until a timeout, and ends all agents.
+    /// Waits for the workers until a timeout, and ends all agents: a step that takes longer counts as hung, and its thread is left behind.
     fn join_all(&mut self) {
+        let patience = self.state.sleep.end_patience();
         while self.workers.iter().any(|worker| worker.thread.is_some()) {
-            match self.messages.recv_timeout(JOIN_TIMEOUT) {
+            match self.messages.recv_timeout(patience) {
                 Ok(Message::Ended(number)) => self.join(number),
                 Ok(Message::Stop) => {}
                 Err(_) => break,
@@ -178,7 +176,7 @@ impl Supervisor {
         }
         for worker in self.workers.iter().filter(|worker| worker.thread.is_some()) {
             if let Some(turn) = worker.watchdog.current().filter(|turn| worker.watchdog.give_up(*turn)) {
-                self.park_stuck(turn.agent(), JOIN_TIMEOUT);
+                self.park_stuck(turn.agent(), patience);
             }
         }
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
