@@ -38,7 +38,7 @@ const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
 /// steps into one throws off what rests on it.
 const STRETCHED_NEAR: (u64, u64) = (5, 2);
 
-/// And at most this long (docs/theory/coupling.md, eq. 7g).
+/// And at most this long: the longest macro step of a cluster that is behind (docs/theory/clusters.md, section 9).
 const STRETCHED_NEAR_MAX: SimSpan = SimSpan::from_nanos(16_666_667);
 
 /// An agent that waits for peers for more than 1/`WAIT_SHARE` of its time is behind because of them.
