@@ -16,7 +16,7 @@ pub struct Coupling {
     pub a: AgentId,
     /// The peer.
     pub b: AgentId,
-    /// The kind of coupling: `cluster`, `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `grasp`, `attach`.
+    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `grasp` or `attach`.
     pub kind: &'static str,
     /// Contacts or attachments at the end of the run.
     pub contacts: u32,

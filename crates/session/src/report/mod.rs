@@ -165,7 +165,7 @@ pub struct CouplingReport {
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `grasp` or `attach`.
+    /// The kind of coupling: `cluster`, `ledger`, `tlm`, `grasp` or `attach`.
     pub kind: String,
     /// Contacts, grasps, attachments or joints at the end of the run.
     pub contacts: u64,
