@@ -15,10 +15,15 @@ pub const UNCONFIRMED_ERROR_MAX: f64 = 0.405_465_108_108_164_4;
 /// Nearer to the target time than this, |ln(t/T)|, a time that no level improves counts as settled.
 const NEAR: f64 = 0.05;
 
+/// The range of κ.
+pub const KAPPA: (f64, f64) = (1e-3, 1.99);
+/// The range of λ.
+pub const LEAD: (f64, f64) = (0.0, 1.99);
+
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
-    /// κ, 0.01 … 1.99: the share of an error (of logarithms) that one update removes if all time is work that ε scales. Below 1 the loop is
+    /// κ, 0.001 … 1.99: the share of an error (of logarithms) that one update removes if all time is work that ε scales. Below 1 the loop is
     /// stable in every scene, also if a measurement comes one frame late; from 1 on only where the share s of work that ε scales keeps κ s
     /// below 1 (control.md, eq. 8).
     pub kappa: f64,
@@ -40,9 +45,9 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() { within(self.kappa, 0.01, 1.99) } else { Self::default().kappa };
+        let kappa = if self.kappa.is_finite() { within(self.kappa, KAPPA.0, KAPPA.1) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, lead: within(width(self.lead), 0.0, 1.99), early: width(self.early), late: width(self.late) }
+        Self { kappa, lead: within(width(self.lead), LEAD.0, LEAD.1), early: width(self.early), late: width(self.late) }
     }
 }
 

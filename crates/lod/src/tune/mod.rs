@@ -18,6 +18,7 @@ mod relay;
 mod robust_fit;
 mod search;
 mod trials;
+mod tuning;
 
 #[cfg(test)]
 mod tests;
@@ -34,3 +35,17 @@ pub use relay::relay_gains;
 pub use robust_fit::Line;
 pub use search::{Family, Search, SearchResult, search};
 pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
+pub use tuning::{NORMALISED, Origin, Row, Tuning, tune};
+
+/// What laws accept is what scenes, the window and the search allow.
+const _: () = {
+    use crate::{control::Law, log_law};
+    use metachron_core::gains;
+    assert!(same(Law::ALPHA, gains::ALPHA) && same(Law::BETA, gains::BETA));
+    assert!(same(Law::KAPPA, gains::KAPPA) && same(log_law::KAPPA, gains::KAPPA));
+    assert!(same(Law::LEAD, gains::LEAD) && same(log_law::LEAD, gains::LEAD));
+};
+
+const fn same(one: (f64, f64), other: (f64, f64)) -> bool {
+    one.0 == other.0 && one.1 == other.1
+}
