@@ -158,14 +158,22 @@ mod tests {
 
     #[test]
     fn margins_are_constraints_and_where_nothing_keeps_them_the_least_lack_is_given() {
-        let verdict = |shortfall: f64, objective: f64| {
-            let (_, tuning) = (0, judge(&plant_of(vec![tube_alone()], 5e-3, 1e-6), Law::CORRECTED, 30.0, EXTENT));
-            Verdict { shortfall, objective, ..tuning }
-        };
+        let plant = plant_of(vec![tube_alone()], 5e-3, 1e-6);
+        let judged = judge(&plant, Law::CORRECTED, 30.0, EXTENT);
+        let verdict = |shortfall: f64, objective: f64| Verdict { shortfall, objective, ..judged.clone() };
         let order = [verdict(0.0, 0.2), verdict(0.0, 5.0), verdict(0.01, 0.1), verdict(0.01, 0.3), verdict(1.0, 0.0)];
         for pair in order.windows(2) {
             assert!(pair[0].compare(&pair[1]).is_lt() && pair[0].rank() < pair[1].rank(), "{pair:?}");
         }
         assert!(order[1].is_safe() && !order[2].is_safe());
+        // a filter without noise corrects nearly all of an error at once: no margin of this policy bears two frames of delay
+        let mut go_on = |_: f64, _: &Verdict| true;
+        let mut setting = Search { plant: &plant, target_hz: 30.0, extent: EXTENT, go_on: &mut go_on };
+        let least = search(&mut setting, Family::Adaptive, &[]).unwrap().best;
+        assert!(!least.is_safe(), "{least:?}");
+        for margin in [0.01, 0.05, 0.1, 0.2, 0.4] {
+            let other = judge(&plant, Candidate::Adaptive { margin }, 30.0, EXTENT);
+            assert!(least.shortfall <= other.shortfall, "{least:?} and {other:?}");
+        }
     }
 }
