@@ -204,14 +204,14 @@ impl<'a> Tuned<'a> {
     fn rests_on_the_clamp_and_leaves(&self, hz: f64, speed: f64) {
         let coarsest_s = 1e-3 * number(&self.said, "/plant/reach_ms/0");
         let hopeless = 3.0 / (hz * coarsest_s);
-        let load = [(0.0, 1.0 / speed), (BEFORE_S, hopeless), (3.0, 1.0 / speed)];
-        let rows = self.frames((&self.gains(), hz), &load, 3.0 + AFTER_S, &[]);
+        let load = [(0.0, 1.0 / speed), (BEFORE_S, hopeless), (4.5, 1.0 / speed)];
+        let rows = self.frames((&self.gains(), hz), &load, 4.5 + AFTER_S, &[]);
         let set_s = self.set_s(hz);
-        let at_rest: Vec<_> = rows.iter().filter(|row| (2.2..3.0).contains(&row.0)).collect();
+        let at_rest: Vec<_> = rows.iter().filter(|row| (3.5..4.5).contains(&row.0)).collect();
         assert!(at_rest.iter().all(|row| row.1 > 2.0 * set_s), "it is no overload: {at_rest:?}");
         let (least, most) = at_rest.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), row| (l.min(row.2), m.max(row.2)));
         assert!(most <= 1.03 * least, "{}: {least} to {most} triangles on the clamp", self.scene);
-        let after: Vec<_> = rows.iter().filter(|row| row.0 >= 3.0).map(|row| (row.0, row.1 / set_s)).collect();
+        let after: Vec<_> = rows.iter().filter(|row| row.0 >= 4.5).map(|row| (row.0, row.1 / set_s)).collect();
         // the first frame after it may have begun up to one long frame later
         let settled = settled_after(&after) - after[0].0;
         assert!(settled <= 1.0, "{}: {settled} s of {after:?}", self.scene);
@@ -268,6 +268,8 @@ fn dear_ball() -> Folder {
         r#"
         [world]
         gravity_m_s2 = [0.0, 0.0, 0.0]
+        [target]
+        frame_hz = 45.0
         [machine]
         draw_triangle_us = 10.0
         [camera]
@@ -313,12 +315,16 @@ fn the_gains_for_the_overload_hold_its_frames_and_beat_the_others() {
 
 #[test]
 fn the_gains_for_the_auditorium_hold_its_frames_and_beat_the_others() {
-    // seen from where its walk begins: on the way what is in view changes what is in reach
+    // seen from where its walk begins: on the way what is in view changes what is in reach; its many objects make each frame of a trial dear,
+    // and gains hold at every rate, so they are found at the fewest frames a second
     let view = "eye_m=[-0.5,-9.0,2.2],look_at_m=[6.859,-2.374,0.808]";
-    let stand =
-        [format!("camera.keyframe=[{{at_s=0.0,{view}}},{{at_s=100.0,{view}}}]"), "camera.even=false".to_owned()];
+    let stand = [
+        format!("camera.keyframe=[{{at_s=0.0,{view}}},{{at_s=100.0,{view}}}]"),
+        "camera.even=false".to_owned(),
+        "target.frame_hz=20.0".to_owned(),
+    ];
     let tuned = Tuned::new("auditorium", stand.into_iter().flat_map(|set| ["--set".to_owned(), set]).collect());
-    assert_eq!(number(&tuned.said, "/at_speed"), 0.5);
+    assert_eq!(number(&tuned.said, "/at_speed"), 0.25);
     tuned.gives_the_best_of_its_table_inside_the_ranges_of_scenes();
     assert!(tuned.holds_wherever_it_can() >= 2, "{}", tuned.said["plant"]);
     tuned.beats_the_printed_gains_and_a_relay(30.0, 0.5);

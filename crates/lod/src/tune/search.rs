@@ -55,8 +55,9 @@ pub enum Family {
 const TRIES: f64 = 2.0;
 /// Spread of the first simplex.
 const SPREAD: f64 = 0.35;
-/// Gains that may be 0 are searched from here on: a smaller share of a frame, or of an error, changes no level.
-const GAIN_LEAST: f64 = 1e-3;
+/// A simplex of logarithms cannot start from a margin or a λ of 0, nor leave one near it: it starts no nearer than this.
+const MARGIN_LEAST: f64 = 1e-3;
+const LEAD_LEAST: f64 = 0.05;
 
 impl Family {
     /// Every family.
@@ -80,18 +81,20 @@ impl Family {
         }
     }
 
-    /// The logarithms of the gains of `candidate`; `None` if it is not of this family.
+    /// The logarithms of gains from which the simplex looks around `candidate`; `None` if it is not of this family.
     fn place(self, candidate: Candidate) -> Option<Vec<f64>> {
         let gains = match (self, candidate) {
-            (Self::Corrected, Candidate::Feedback(Law::Corrected { kappa, lead: 0.0, margin })) => vec![kappa, margin],
-            (Self::Pi, Candidate::Feedback(Law::Corrected { kappa, lead, margin })) => vec![kappa, margin, lead],
+            (Self::Corrected, Candidate::Feedback(Law::Corrected { kappa, lead: 0.0, margin })) => {
+                vec![kappa, margin.max(MARGIN_LEAST)]
+            }
+            (Self::Pi, Candidate::Feedback(Law::Corrected { kappa, lead, margin })) => {
+                vec![kappa, margin.max(MARGIN_LEAST), lead.max(LEAD_LEAST)]
+            }
             (Self::Printed, Candidate::Feedback(Law::Printed { alpha, beta })) => vec![alpha, beta],
-            (Self::Adaptive, Candidate::Adaptive { margin }) => vec![margin],
+            (Self::Adaptive, Candidate::Adaptive { margin }) => vec![margin.max(MARGIN_LEAST)],
             _ => return None,
         };
-        // gains that are never 0 may be smaller
-        let least = if self == Self::Printed { 0.0 } else { GAIN_LEAST };
-        Some(gains.into_iter().map(|gain| libm::log(gain.max(least))).collect())
+        Some(gains.into_iter().map(libm::log).collect())
     }
 
     /// Gains on the grid, one list for each gain.
