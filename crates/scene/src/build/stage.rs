@@ -53,8 +53,8 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
 }
 
 /// The allowed values of a gain.
-const fn gain_range((least, most): (f64, f64)) -> Allowed {
-    allowed(least..=most, "")
+const fn gain_range(ends: (f64, f64)) -> Allowed {
+    allowed(ends.0..=ends.1, "")
 }
 
 /// The greatest lag in seconds and the optimiser's share of it.

@@ -278,8 +278,8 @@ fn labelled(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui)) {
     });
 }
 
-const fn range((least, most): (f64, f64)) -> RangeInclusive<f64> {
-    least..=most
+const fn range(ends: (f64, f64)) -> RangeInclusive<f64> {
+    ends.0..=ends.1
 }
 
 fn slider(
