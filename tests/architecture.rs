@@ -17,7 +17,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("crates/render", &["core", "geometry"]),
     ("crates/session", &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render"]),
     ("crates/viewer", &["core", "contact", "runtime", "world", "scene", "lod", "render", "session"]),
-    ("crates/console", &["runtime", "world", "scene", "lod"]),
+    ("crates/console", &["core", "runtime", "world", "scene", "lod"]),
     (
         "crates/lab",
         &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render", "session", "console"],

@@ -23,6 +23,7 @@ mod attachment;
 pub mod body;
 mod cluster_state;
 mod disjoint_sets;
+pub mod gains;
 pub mod id;
 mod inverse_mass;
 pub mod ledger;

@@ -4,13 +4,11 @@
 
 use super::output::BadInput;
 use anyhow::Context;
-use metachron_lod::adaptive::DEFAULT_MARGIN;
+use metachron_core::gains;
+use metachron_lod::adaptive::{DEFAULT_MARGIN, MARGIN_MAX};
 use metachron_lod::control::Law;
-use metachron_lod::tune::Candidate;
+use metachron_lod::tune::{Candidate, NORMALISED};
 use std::path::Path;
-
-/// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
-pub const NORMALISED: f64 = 0.046;
 
 /// The keys of `[target]` that a fragment may have.
 const KEYS: [&str; 6] = ["policy", "law", "alpha", "beta", "kappa", "lead"];
@@ -72,19 +70,21 @@ fn candidate(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> 
         let gain = value(name).unwrap_or(own);
         check_range(shown, gain, low, high).map(|()| gain)
     };
-    let beta = || gain("β", "beta", 5.0, Law::BETA);
+    let beta = || gain("β", "beta", 5.0, gains::BETA);
     let lead = if law == "pi" { 0.2 } else { 0.0 };
     Ok(match law {
-        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, Law::ALPHA)?, beta: beta()? }.into(),
+        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, gains::ALPHA)?, beta: beta()? }.into(),
         "normalised" => {
             let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
             Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
         }
-        "adaptive" => Candidate::Adaptive { margin: gain(MARGIN, MARGIN, DEFAULT_MARGIN, (0.0, 0.5))? },
+        "adaptive" => {
+            Candidate::Adaptive { margin: gain(MARGIN, MARGIN, DEFAULT_MARGIN, (gains::MARGIN.0, MARGIN_MAX))? }
+        }
         _ => Law::Corrected {
-            kappa: gain("κ", "kappa", 0.5, Law::KAPPA)?,
-            lead: gain("λ", "lead", lead, Law::LEAD)?,
-            margin: gain(MARGIN, MARGIN, 0.1, (0.0, 0.9))?,
+            kappa: gain("κ", "kappa", 0.5, gains::KAPPA)?,
+            lead: gain("λ", "lead", lead, gains::LEAD)?,
+            margin: gain(MARGIN, MARGIN, 0.1, gains::MARGIN)?,
         }
         .into(),
     })

@@ -4,6 +4,7 @@
 //! where the time was measured. Theory: `docs/theory/control.md`, eq. 7 … 12.
 
 use crate::{Bound, within};
+use metachron_core::gains;
 
 /// Clamp of the error of one update, |ln(t/T)|: a frame four times too slow. At κ = ½ one update halves the work at most.
 pub const ERROR_MAX: f64 = 2.0 * core::f64::consts::LN_2;
@@ -18,7 +19,7 @@ const NEAR: f64 = 0.05;
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
-    /// κ, 0.01 … 1.99: the share of an error (of logarithms) that one update removes if all time is work that ε scales. Below 1 the loop is
+    /// κ, 0.001 … 1.99: the share of an error (of logarithms) that one update removes if all time is work that ε scales. Below 1 the loop is
     /// stable in every scene, also if a measurement comes one frame late; from 1 on only where the share s of work that ε scales keeps κ s
     /// below 1 (control.md, eq. 8).
     pub kappa: f64,
@@ -40,9 +41,18 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() { within(self.kappa, 0.01, 1.99) } else { Self::default().kappa };
+        let kappa = if self.kappa.is_finite() {
+            within(self.kappa, gains::KAPPA.0, gains::KAPPA.1)
+        } else {
+            Self::default().kappa
+        };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, lead: within(width(self.lead), 0.0, 1.99), early: width(self.early), late: width(self.late) }
+        Self {
+            kappa,
+            lead: within(width(self.lead), gains::LEAD.0, gains::LEAD.1),
+            early: width(self.early),
+            late: width(self.late),
+        }
     }
 }
 

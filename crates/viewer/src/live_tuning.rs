@@ -87,7 +87,7 @@ impl Tuning {
         }
         let observed = std::mem::take(&mut design.observed);
         self.restore(session.control());
-        self.stage = Stage::Searching(Searching::start(observed, self.target_hz)?);
+        self.stage = Stage::Searching(Searching::start(observed, self.before.1, self.target_hz)?);
         Ok(())
     }
 
@@ -136,27 +136,27 @@ impl Tuning {
 }
 
 impl Searching {
-    fn start(observed: Vec<Observed>, target_hz: f64) -> std::io::Result<Self> {
+    fn start(observed: Vec<Observed>, present: Law, target_hz: f64) -> std::io::Result<Self> {
         let shared = Arc::new(SearchState::default());
         let theirs = Arc::clone(&shared);
-        let run = move || find(&observed, target_hz, &theirs);
+        let run =
+            move || find(&Plant::identify(&observed).map_err(|why| why.to_string())?, present, target_hz, &theirs);
         let thread = std::thread::Builder::new().name("tuning".to_owned()).spawn(run)?;
         Ok(Self { thread, shared })
     }
 }
 
-/// The best gains of the corrected law for the observed frames.
-fn find(observed: &[Observed], target_hz: f64, shared: &SearchState) -> Result<Verdict, String> {
-    let plant = Plant::identify(observed).map_err(|why| why.to_string())?;
-    if let Some(why) = refusal(&plant, target_hz) {
+/// The best gains of the corrected law on this plant, or the present ones where none is better.
+fn find(plant: &Plant, present: Law, target_hz: f64, shared: &SearchState) -> Result<Verdict, String> {
+    if let Some(why) = refusal(plant, target_hz) {
         return Err(why);
     }
     let mut go_on = |share: f64, best: &Verdict| {
         *shared.progress.lock().unwrap_or_else(PoisonError::into_inner) = (share, verdict_text(best));
         !shared.stopped.load(Ordering::Relaxed)
     };
-    let mut setting = Search { plant: &plant, target_hz, extent: EXTENT, go_on: &mut go_on };
-    search(&mut setting, Family::Corrected)
+    let mut setting = Search { plant, target_hz, extent: EXTENT, go_on: &mut go_on };
+    search(&mut setting, Family::Corrected, &[present.into()])
         .map(|found| found.best)
         .ok_or_else(|| "no candidate could be evaluated".to_owned())
 }

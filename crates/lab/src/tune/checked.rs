@@ -3,10 +3,10 @@
 //! In: a plant and the gains found on it. Out: settling times, predicted and measured. Never here: a judgement of them.
 
 use super::super::args::TuneArgs;
-use super::{Identified, Tuned, live};
+use super::{Identified, live};
 use metachron_console::progress::Bar;
 use metachron_lod::control::Law;
-use metachron_lod::tune::{Start, Trial, play, settled_after};
+use metachron_lod::tune::{Start, Trial, Tuning, play, settled_after};
 use metachron_session::{After, Drawing, Pushes, Session, median, push};
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -49,18 +49,18 @@ impl Checked {
 pub(super) fn check(
     args: &TuneArgs,
     on: &Identified,
-    tuned: &Tuned,
+    tuned: &Tuning,
     stopped: &AtomicBool,
 ) -> anyhow::Result<Vec<Checked>> {
-    if tuned.verdict().is_none_or(|v| v.at_speed != 1.0) {
+    if tuned.best.at_speed != 1.0 {
         return Ok(Vec::new());
     }
-    let set_s = tuned.best.set_share() / on.target_hz;
+    let set_s = tuned.law.set_share() / on.target_hz;
     let times = if on.live { TIMES_LIVE } else { 1 };
-    let predicted_s = RATES.map(|rate| predicted_s(on, tuned.best, rate, times));
+    let predicted_s = RATES.map(|rate| predicted_s(on, tuned.law, rate, times));
     let slowest_s = predicted_s.iter().flatten().fold(0.0_f64, |most, s| most.max(*s));
     let pushes = Pushes {
-        law: tuned.best,
+        law: tuned.law,
         polygons: RATES.iter().map(|rate| on.plant.line.x_of(set_s / rate).max(1.0)).collect(),
         times,
         watch_s: if on.live { (WATCH * slowest_s).clamp(WATCH_S.0, WATCH_S.1) } else { WATCH_S.1 },

@@ -4,10 +4,10 @@
 
 use super::super::chart::figure;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::{Identified, Tuned};
+use super::{Identified, origin_name};
 use anyhow::Context;
 use metachron_lod::control::Law;
-use metachron_lod::tune::{Candidate, Disturbance, Measures, Plant, Start, Trial, measure, play};
+use metachron_lod::tune::{Candidate, Disturbance, Measures, Origin, Plant, Start, Trial, Tuning, measure, play};
 use std::path::{Path, PathBuf};
 
 /// Starting rates shown, in parts of the target rate.
@@ -25,7 +25,7 @@ const MAP_S: f64 = 3.0;
 const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 
 /// Draws and writes the figure.
-pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuned) -> anyhow::Result<[PathBuf; 2]> {
+pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuning) -> anyhow::Result<[PathBuf; 2]> {
     let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), late_frames(on, tuned)];
     let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
     let figure = Figure { title, panels, columns: 2 };
@@ -66,21 +66,21 @@ fn undisturbed_trial(on: &Identified, candidate: impl Into<Candidate>, rate: f64
 type Drawn = fn(Vec<(f64, f64)>) -> Mark;
 
 /// A colour for every law of the table: laws that were found as lines, laws for comparison dashed.
-fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
+fn styles(tuned: &Tuning) -> impl Iterator<Item = (Colour, Drawn)> {
     let found = tuned.found.len();
     let mark = move |k: usize| if k < found { Mark::Line } else { Mark::Dashed };
     Colour::LINES.into_iter().cycle().enumerate().map(move |(k, colour)| (colour, mark(k) as Drawn))
 }
 
 /// Step responses from 0.4 and from 2.5 times the target rate.
-fn responses(on: &Identified, tuned: &Tuned) -> Panel {
+fn responses(on: &Identified, tuned: &Tuning) -> Panel {
     let plant = evaluated_plant(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
     for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
         for (k, rate) in STARTS.into_iter().enumerate() {
             let beats = play(&plant, &undisturbed_trial(on, row.verdict.candidate, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
-            layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
+            layers.push(layer(if k == 0 { origin_name(row.origin) } else { "" }, colour, mark(line)));
         }
     }
     Panel {
@@ -92,16 +92,18 @@ fn responses(on: &Identified, tuned: &Tuned) -> Panel {
 }
 
 /// The plant on the machine on which the gains were judged.
-fn evaluated_plant(on: &Identified, tuned: &Tuned) -> Plant {
-    on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
+fn evaluated_plant(on: &Identified, tuned: &Tuning) -> Plant {
+    on.plant.on(tuned.best.at_speed)
 }
 
 /// The printed law over (α, β): where it settles, is slow, or swings; the chosen gains as a dot.
-fn map(on: &Identified, tuned: &Tuned) -> Panel {
+fn map(on: &Identified, tuned: &Tuning) -> Panel {
     let ([columns, rows], plant) = (CELLS, evaluated_plant(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
     let found = tuned.rows.iter().filter_map(|row| match row.verdict.candidate {
-        Candidate::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
+        Candidate::Feedback(Law::Printed { alpha, beta }) if matches!(row.origin, Origin::Found(_)) => {
+            Some((alpha, beta))
+        }
         _ => None,
     });
     let found: Vec<_> = found.collect();
@@ -150,7 +152,7 @@ fn kind(measured: &[Measures]) -> usize {
 }
 
 /// Late frames over the speed of the machine, with 40 % more load for a third of the time.
-fn late_frames(on: &Identified, tuned: &Tuned) -> Panel {
+fn late_frames(on: &Identified, tuned: &Tuning) -> Panel {
     let trial = |candidate: Candidate, speed: f64| Trial {
         speed,
         disturbance: Disturbance::Load(1.4),
@@ -164,7 +166,7 @@ fn late_frames(on: &Identified, tuned: &Tuned) -> Panel {
     let lines = tuned.rows.iter().zip(styles(tuned)).zip(measured.chunks(SPEEDS.len()));
     let lines = lines.map(|((row, (colour, mark)), measured)| {
         let points = SPEEDS.iter().zip(measured).map(|(speed, m)| (*speed, 100.0 * m.miss_share)).collect();
-        layer(row.name, colour, mark(points))
+        layer(origin_name(row.origin), colour, mark(points))
     });
     let layers: Vec<_> = lines.collect();
     let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);

@@ -11,12 +11,10 @@ use super::args::TuneArgs;
 use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::gains;
-use metachron_console::gains::NORMALISED;
 use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
-use metachron_lod::control::Law;
 use metachron_lod::tune::{
-    Candidate, Extent, Family, Plant, Search, SearchResult, Verdict, explain, judge, refusal, relay_gains, search,
+    Candidate, Extent, Family, Origin, Plant, Search, Tuning, Verdict, explain, judge, refusal, search, tune,
 };
 use metachron_render::{Gpu, Offscreen, RendererOptions, Size};
 use metachron_scene::{Source, load};
@@ -41,28 +39,6 @@ struct Identified {
     machine: String,
 }
 
-/// A law's name in the table, and its verdict.
-struct Row {
-    name: &'static str,
-    verdict: Verdict,
-}
-
-/// The result of a search over all families.
-struct Tuned {
-    rows: Vec<Row>,
-    found: Vec<(Family, SearchResult)>,
-    /// The best of the feedback laws, which the fragment contains.
-    best: Law,
-    interrupted: bool,
-}
-
-impl Tuned {
-    /// The verdict on the best law.
-    fn verdict(&self) -> Option<&Verdict> {
-        self.rows.iter().map(|row| &row.verdict).find(|v| v.candidate == self.best.into())
-    }
-}
-
 /// Tunes a scene, or explains given gains.
 ///
 /// # Errors
@@ -81,7 +57,7 @@ pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
     let Some(identified) = identify(args, scene, &stopped)? else { return Ok(Exit::Interrupted) };
     match given {
         Some(candidate) => analyse(args, &identified, candidate),
-        None => tune(args, &identified, &fragment, &stopped),
+        None => find(args, &identified, &fragment, &stopped),
     }
 }
 
@@ -149,13 +125,13 @@ fn analyse(args: &TuneArgs, on: &Identified, candidate: Candidate) -> anyhow::Re
 }
 
 /// Finds gains, reports them and writes them to files.
-fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool) -> anyhow::Result<Exit> {
+fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool) -> anyhow::Result<Exit> {
     refuse_out_of_reach(on)?;
     let folder = &args.out;
     std::fs::create_dir_all(folder)
         .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
     let tuned = look_for_gains(args, on, stopped)?;
-    gains::write(fragment, &gains::fragment(tuned.best, &report::comment(on, &tuned)))?;
+    gains::write(fragment, &gains::fragment(tuned.law, &report::comment(on, &tuned)))?;
     let mut files = vec![fragment.to_owned()];
     let mut checked = Vec::new();
     // after an interrupt the user does not wait for figures
@@ -180,62 +156,30 @@ fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
     refusal(&on.plant, on.target_hz).map_or(Ok(()), |why| Err(BadInput(format!("{}: {why}", on.scene.name)).into()))
 }
 
-/// Searches every family, and judges the laws for comparison.
-fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuned> {
-    let extent = extent(args);
-    let mut found = Vec::new();
-    for family in Family::ALL {
-        let bar = Bar::new(family_name(family), args.common.quiet || args.common.json);
+/// Searches every family, from the laws for comparison.
+fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuning> {
+    let one = |family: Family, starts: &[Candidate]| {
+        let bar = Bar::new(origin_name(Origin::Found(family)), args.common.quiet || args.common.json);
         let mut go_on = |share: f64, best: &Verdict| {
             bar.set(share, format!("best so far {}: {:.3}", gains::gains_text(best.candidate), best.objective));
             !stopped.load(Ordering::Relaxed)
         };
-        let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent, go_on: &mut go_on };
-        found.extend(search(&mut setting, family).map(|f| (family, f)));
-        if stopped.load(Ordering::Relaxed) {
-            break;
-        }
-    }
-    let best = best_law(&found).context("no candidate could be evaluated")?;
-    let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
-    let mut rows: Vec<_> =
-        found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
-    let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.candidate == best.into()).cloned();
-    rows.extend(verdict.iter().flat_map(|verdict| reference_laws(on, verdict, extent)));
-    Ok(Tuned { rows, found, best, interrupted })
-}
-
-/// The best of the laws whose gain is the same at every rate. The printed law's gain is not, and the predicting policy has no gains to
-/// write to the fragment: both are only shown in the table.
-fn best_law(found: &[(Family, SearchResult)]) -> Option<Law> {
-    let law = |(_, f): &(Family, SearchResult)| match f.best.candidate {
-        Candidate::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
-        _ => None,
+        let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent: extent(args), go_on: &mut go_on };
+        search(&mut setting, family, starts)
     };
-    found.iter().filter_map(law).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(law, _)| law)
+    tune(&on.plant, on.target_hz, one).context("no candidate could be evaluated")
 }
 
-/// The laws for comparison with the gains found; the relay's law has the same margin.
-fn reference_laws(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
-    let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
-    let margin = 1.0 - best.candidate.set_share();
-    let rivals = [
-        ("corrected, default gains", Some(Law::CORRECTED)),
-        ("printed, α = 1e-4", Some(Law::PRINTED)),
-        ("normalised, α = k/f₀", Some(normalised)),
-        ("relay (Ziegler-Nichols)", relay_gains(&on.plant.on(best.at_speed), on.target_hz, margin)),
-    ];
-    let judged = |(name, law): (&'static str, Option<Law>)| {
-        Some(Row { name, verdict: judge(&on.plant, law?, on.target_hz, extent) })
-    };
-    rivals.into_iter().filter_map(judged).collect()
-}
-
-const fn family_name(family: Family) -> &'static str {
-    match family {
-        Family::Corrected => "corrected, found",
-        Family::Pi => "PI, found",
-        Family::Printed => "printed, found",
-        Family::Adaptive => "adaptive, found",
+/// The name of a row of the table.
+const fn origin_name(origin: Origin) -> &'static str {
+    match origin {
+        Origin::Found(Family::Corrected) => "corrected, found",
+        Origin::Found(Family::Pi) => "PI, found",
+        Origin::Found(Family::Printed) => "printed, found",
+        Origin::Found(Family::Adaptive) => "adaptive, found",
+        Origin::Default => "corrected, default gains",
+        Origin::Printed => "printed, α = 1e-4",
+        Origin::Normalised => "normalised, α = k/f₀",
+        Origin::Relay => "relay (Ziegler-Nichols)",
     }
 }

@@ -4,15 +4,15 @@
 
 use super::super::chart::table::{Cell, Table};
 use super::checked::Checked;
-use super::{Identified, Tuned};
+use super::{Identified, origin_name};
 use metachron_console::gains;
 use metachron_lod::control::Law;
-use metachron_lod::tune::{Candidate, Explanation, Margins, Verdict};
+use metachron_lod::tune::{Candidate, Explanation, Margins, Tuning, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// The table of a tuning, the plant, the files.
-pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> String {
+pub(super) fn text(on: &Identified, tuned: &Tuning, checked: &[Checked], files: &[PathBuf]) -> String {
     let mut table = Table::new(&[
         "law",
         "gains",
@@ -24,13 +24,14 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
         "reversals",
         "quality",
         "robust_to",
+        "lacks",
         "objective",
     ]);
     for row in &tuned.rows {
         let v = &row.verdict;
         let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
         table.rows.push(vec![
-            row.name.into(),
+            origin_name(row.origin).into(),
             gains::gains_text(v.candidate).into(),
             settle,
             Cell::Number(v.overshoot, 3),
@@ -40,30 +41,46 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
             Cell::Number(v.reversals, 4),
             Cell::Number(v.quality, 3),
             robust(v).into(),
+            Cell::Number(v.shortfall, 2),
             Cell::Number(v.objective, 4),
         ]);
     }
     let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
     format!(
-        "{}{}\n{}\nbest: {}\n{}files: {}\n",
+        "{}{}{}\n{}\nbest: {}\n{}files: {}\n",
         plant(on),
         speed_note(tuned),
+        constraint_notes(tuned),
         table.text(),
-        gains::gains_text(tuned.best.into()),
+        gains::gains_text(tuned.best.candidate),
         checked.iter().map(Checked::text).collect::<String>(),
         files.join(", ")
     )
 }
 
 /// A note where the gains were judged on another machine, because the view leaves nothing to control on this one.
-fn speed_note(tuned: &Tuned) -> String {
-    let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
+fn speed_note(tuned: &Tuning) -> String {
+    let speed = tuned.best.at_speed;
     if speed == 1.0 {
         return String::new();
     }
     format!(
         "note  on this machine the finest level fits in the frame budget: gains were evaluated on a machine {speed} times as fast\n"
     )
+}
+
+/// Notes where no gains keep the margins, and where the policy that predicts, which has no gains, is better than those given.
+fn constraint_notes(tuned: &Tuning) -> String {
+    let lacking = (!tuned.best.is_safe()).then(|| {
+        let kept = tuned.best.margins.map_or_else(|| "its set point is out of reach".to_owned(), margins);
+        format!(
+            "note  no law tried keeps a gain margin of 2 and a delay margin of 2 frames; the best lacks least: {kept}\n"
+        )
+    });
+    let policy = tuned.better_policy().map(|v| {
+        format!("note  the policy adaptive, which has no gains, does better here: {}\n", gains::gains_text(v.candidate))
+    });
+    lacking.into_iter().chain(policy).collect()
 }
 
 /// The plant, in a few lines.
@@ -102,21 +119,23 @@ fn margins(Margins { gain, delay }: Margins) -> String {
 }
 
 /// The comment above the fragment.
-pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
-    let worth = tuned.verdict().map_or_else(String::new, |v| {
-        let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
-        format!(
-            "\n{settle}, {:.2} % of frames late{}",
-            100.0 * v.miss_share,
-            v.margins.map_or_else(String::new, |m| format!(", {}", margins(m)))
-        )
-    });
-    format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
+pub(super) fn comment(on: &Identified, tuned: &Tuning) -> String {
+    let best = &tuned.best;
+    let settle = best.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
+    format!(
+        "found by metachron tune for {} at {} Hz on {}\n{settle}, {:.2} % of frames late{}{}",
+        on.scene.name,
+        on.target_hz,
+        on.machine,
+        100.0 * best.miss_share,
+        best.margins.map_or_else(String::new, |m| format!(", {}", margins(m))),
+        if best.is_safe() { "" } else { ": less than is wanted, and no law tried lacks less" },
+    )
 }
 
 /// The same as JSON: the best law at the top level, together with everything else.
-pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
-    let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(row.name, &row.verdict)).collect();
+pub(super) fn json(on: &Identified, tuned: &Tuning, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
+    let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(origin_name(row.origin), &row.verdict)).collect();
     let tried: Vec<_> = tuned
         .found
         .iter()
@@ -126,7 +145,7 @@ pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
             })
         })
         .collect();
-    let mut whole = tuned.verdict().map_or_else(|| json!({}), |v| row_json(law_name(v.candidate), v));
+    let mut whole = row_json(law_name(tuned.best.candidate), &tuned.best);
     let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
         "checked": checked.iter().map(Checked::json).collect::<Vec<_>>(),
@@ -153,7 +172,7 @@ fn row_json(name: &str, v: &Verdict) -> Value {
         "law": name, "gains": gains_json(v.candidate), "settle_s": v.settle_s, "overshoot": v.overshoot,
         "miss_share": v.miss_share, "gain_margin": v.margins.map(|m| m.gain), "delay_margin_frames": v.margins.map(|m| m.delay),
         "reversals": v.reversals, "quality": v.quality, "robust_to": v.robust_to, "asked": v.asked, "at_speed": v.at_speed,
-        "objective": v.objective,
+        "shortfall": v.shortfall, "objective": v.objective,
     })
 }
 

@@ -37,6 +37,8 @@ use pick::{Picker, Terms};
 
 /// The fraction of a frame that a policy with a prediction leaves free where a scene sets none.
 pub const DEFAULT_MARGIN: f64 = 0.02;
+/// The greatest margin, as a fraction of T.
+pub const MARGIN_MAX: f64 = 0.5;
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
 /// Frames whose measurement may still arrive: later measurements are ignored.
@@ -73,7 +75,7 @@ impl Default for Settings {
 
 impl Settings {
     fn sound(self) -> Self {
-        let (margin, sigmas) = (crate::within(self.margin, 0.0, 0.5), crate::within(self.sigmas, 0.0, 5.0));
+        let (margin, sigmas) = (crate::within(self.margin, 0.0, MARGIN_MAX), crate::within(self.sigmas, 0.0, 5.0));
         Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
     }
 }
@@ -273,7 +275,7 @@ impl Adaptive {
     pub fn margin(&self) -> f64 {
         let used = self.estimators.iter().zip(&self.table).filter(|(_, table)| **table > 0);
         let sigma = used.map(|(estimator, _)| estimator.sigma()).fold(0.0, f64::max);
-        self.settings.margin.max((self.settings.sigmas + self.misses.extra_sigmas()) * sigma).min(0.5)
+        self.settings.margin.max((self.settings.sigmas + self.misses.extra_sigmas()) * sigma).min(MARGIN_MAX)
     }
 
     fn cost(&self, terms: &Terms) -> f64 {

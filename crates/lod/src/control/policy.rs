@@ -137,15 +137,6 @@ impl Law {
     /// The printed law with the gains of (GDC04).
     pub const PRINTED: Self = Self::Printed { alpha: 1e-4, beta: 5.0 };
 
-    /// The range of α.
-    pub const ALPHA: (f64, f64) = (1e-9, 1.0);
-    /// The range of β.
-    pub const BETA: (f64, f64) = (1e-6, 1e3);
-    /// The range of κ.
-    pub const KAPPA: (f64, f64) = (1e-3, 1.99);
-    /// The range of λ.
-    pub const LEAD: (f64, f64) = (0.0, 1.99);
-
     /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses (exceeds 1.05 T) in fewer than 1 frame in
     /// 100.
     pub const CORRECTED: Self = Self::Corrected { kappa: 0.5, lead: 0.0, margin: 0.1 };

@@ -18,6 +18,7 @@ mod relay;
 mod robust_fit;
 mod search;
 mod trials;
+mod tuning;
 
 #[cfg(test)]
 mod tests;
@@ -34,3 +35,4 @@ pub use relay::relay_gains;
 pub use robust_fit::Line;
 pub use search::{Family, Search, SearchResult, search};
 pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
+pub use tuning::{NORMALISED, Origin, Row, Tuning, tune};

@@ -77,7 +77,7 @@ impl TimeRange {
 }
 
 /// The longest dead time tested, frames.
-const DEAD_TIME_MAX: usize = 4;
+pub(super) const DEAD_TIME_MAX: usize = 4;
 /// A longer dead time is accepted if its scatter is below this fraction of that of the best shorter one.
 const BETTER: f64 = 0.9;
 /// Least number of frames for an identification.

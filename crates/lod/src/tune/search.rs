@@ -1,14 +1,16 @@
-//! Search for the best gains: a coarse grid, then Nelder and Mead's simplex from the best grid point (NM65).
+//! Search for the best gains: given laws and a coarse grid, then Nelder and Mead's simplex from the best of these (NM65).
 //!
-//! In: a plant, a target, the extent of the trials. Out: the best verdict so far, whenever it is stopped. Deterministic. Never here: the
-//! objective ([`crate::tune::judge`] has it).
+//! In: a plant, a target, the extent of the trials, laws to start from. Out: the best verdict so far, whenever it is stopped; it is never
+//! after that of a law it started from ([`Verdict::compare`]). Deterministic. Never here: the objective ([`crate::tune::judge`] has it).
 
 use super::candidate::Candidate;
 use super::plant::Plant;
 use super::trials::{Extent, Verdict, judge};
+use crate::adaptive::MARGIN_MAX;
 use crate::control::Law;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
+use metachron_core::gains;
 use std::cell::RefCell;
 
 /// A search.
@@ -28,6 +30,8 @@ pub struct Search<'a> {
 pub struct SearchResult {
     /// The best verdict.
     pub best: Verdict,
+    /// The verdicts on the laws it started from, in their order.
+    pub starts: Vec<Verdict>,
     /// Every candidate with its objective, in the order they were tried.
     pub tried: Vec<(Candidate, f64)>,
     /// Whether it was stopped before its end.
@@ -51,23 +55,46 @@ pub enum Family {
 const TRIES: f64 = 2.0;
 /// Spread of the first simplex.
 const SPREAD: f64 = 0.35;
+/// A simplex of logarithms cannot start from a margin or a λ of 0, nor leave one near it: it starts no nearer than this.
+const MARGIN_LEAST: f64 = 1e-3;
+const LEAD_LEAST: f64 = 0.05;
 
 impl Family {
     /// Every family.
     pub const ALL: [Self; 4] = [Self::Corrected, Self::Pi, Self::Printed, Self::Adaptive];
 
-    /// The candidate with the gains whose logarithms are `at`.
+    /// The candidate with the gains whose logarithms are `at`, inside the ranges of gains.
     fn candidate(self, at: &[f64]) -> Candidate {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
-        let margin = (0.005, 0.5);
         match self {
-            Self::Corrected => Law::Corrected { kappa: gain(0, Law::KAPPA), lead: 0.0, margin: gain(1, margin) }.into(),
-            Self::Pi => {
-                Law::Corrected { kappa: gain(0, Law::KAPPA), lead: gain(2, Law::LEAD), margin: gain(1, margin) }.into()
+            Self::Corrected => {
+                Law::Corrected { kappa: gain(0, gains::KAPPA), lead: 0.0, margin: gain(1, gains::MARGIN) }.into()
             }
-            Self::Printed => Law::Printed { alpha: gain(0, Law::ALPHA), beta: gain(1, Law::BETA) }.into(),
-            Self::Adaptive => Candidate::Adaptive { margin: gain(0, margin) },
+            Self::Pi => Law::Corrected {
+                kappa: gain(0, gains::KAPPA),
+                lead: gain(2, gains::LEAD),
+                margin: gain(1, gains::MARGIN),
+            }
+            .into(),
+            Self::Printed => Law::Printed { alpha: gain(0, gains::ALPHA), beta: gain(1, gains::BETA) }.into(),
+            Self::Adaptive => Candidate::Adaptive { margin: gain(0, (gains::MARGIN.0, MARGIN_MAX)) },
         }
+    }
+
+    /// The logarithms of gains from which the simplex looks around `candidate`; `None` if it is not of this family.
+    fn place(self, candidate: Candidate) -> Option<Vec<f64>> {
+        let gains = match (self, candidate) {
+            (Self::Corrected, Candidate::Feedback(Law::Corrected { kappa, lead: 0.0, margin })) => {
+                vec![kappa, margin.max(MARGIN_LEAST)]
+            }
+            (Self::Pi, Candidate::Feedback(Law::Corrected { kappa, lead, margin })) => {
+                vec![kappa, margin.max(MARGIN_LEAST), lead.max(LEAD_LEAST)]
+            }
+            (Self::Printed, Candidate::Feedback(Law::Printed { alpha, beta })) => vec![alpha, beta],
+            (Self::Adaptive, Candidate::Adaptive { margin }) => vec![margin.max(MARGIN_LEAST)],
+            _ => return None,
+        };
+        Some(gains.into_iter().map(libm::log).collect())
     }
 
     /// Gains on the grid, one list for each gain.
@@ -106,52 +133,61 @@ struct SearchState<'a, 'b> {
     search: &'b mut Search<'a>,
     family: Family,
     best: Option<Verdict>,
-    tried: Vec<(Candidate, f64)>,
+    tried: Vec<Verdict>,
     expected: f64,
     interrupted: bool,
 }
 
 impl SearchState<'_, '_> {
-    fn cost(&mut self, at: &[f64]) -> Option<f64> {
+    /// Judges a candidate; `None` once the search was stopped.
+    fn judge(&mut self, candidate: Candidate) -> Option<f64> {
         if self.interrupted {
             return None;
         }
-        let candidate = self.family.candidate(at);
         let verdict = judge(self.search.plant, candidate, self.search.target_hz, self.search.extent);
-        let objective = verdict.objective;
-        self.tried.push((candidate, objective));
-        if self.best.as_ref().is_none_or(|best| objective < best.objective) {
-            self.best = Some(verdict);
-        }
+        let rank = verdict.rank();
+        let best = self.best.take().filter(|best| best.compare(&verdict).is_le()).unwrap_or_else(|| verdict.clone());
+        self.tried.push(verdict);
         let done = (self.tried.len() as f64 / self.expected).min(1.0);
-        if let Some(best) = &self.best {
-            self.interrupted = !(self.search.go_on)(done, best);
+        self.interrupted = !(self.search.go_on)(done, &best);
+        self.best = Some(best);
+        Some(rank)
+    }
+
+    /// Judges the given laws and the grid; the place of the best of the family among them.
+    fn best_corner(&mut self, starts: &[Candidate]) -> Option<Vec<f64>> {
+        let family = self.family;
+        let given = starts.iter().map(|&candidate| (family.place(candidate), candidate));
+        let grid = family.candidates().into_iter().map(|at| (Some(at.clone()), family.candidate(&at)));
+        let mut corner = None::<(Vec<f64>, f64)>;
+        for (place, candidate) in given.chain(grid) {
+            let Some(rank) = self.judge(candidate) else { break };
+            let Some(at) = place else { continue };
+            if corner.as_ref().is_none_or(|(_, held)| rank < *held) {
+                corner = Some((at, rank));
+            }
         }
-        Some(objective)
+        corner.map(|(at, _)| at)
     }
 }
 
-/// Searches for the best gains of `family`; `None` if no candidate was judged.
+/// Searches for the best gains of `family`, and judges `starts` first, of which those of the family are points to start from; `None` if no
+/// candidate was judged.
 #[must_use]
-pub fn search(search: &mut Search<'_>, family: Family) -> Option<SearchResult> {
-    let grid = family.candidates();
-    let expected = grid.len() as f64 + TRIES * family.iterations() as f64;
+pub fn search(search: &mut Search<'_>, family: Family, starts: &[Candidate]) -> Option<SearchResult> {
+    let count = starts.len() + family.candidates().len();
+    let expected = count as f64 + TRIES * family.iterations() as f64;
     let mut state = SearchState { search, family, best: None, tried: Vec::new(), expected, interrupted: false };
-    let mut corner = None::<(Vec<f64>, f64)>;
-    for at in grid {
-        let Some(objective) = state.cost(&at) else { break };
-        if corner.as_ref().is_none_or(|(_, held)| objective < *held) {
-            corner = Some((at, objective));
-        }
-    }
-    let (corner, _) = corner?;
+    let corner = state.best_corner(starts);
     let state = RefCell::new(state);
-    if !state.borrow().interrupted {
-        // a search that is stopped ends as an error of its cost function; the best so far is stored in `judging`
+    if let Some(corner) = corner.filter(|_| !state.borrow().interrupted) {
+        // a search that is stopped ends as an error of its cost function; the best so far is stored in the state
         let _ = run_simplex(&state, corner);
     }
     let SearchState { best, tried, interrupted, .. } = state.into_inner();
-    Some(SearchResult { best: best?, tried, interrupted })
+    let starts = tried.iter().take(starts.len()).cloned().collect();
+    let tried = tried.iter().map(|verdict| (verdict.candidate, verdict.objective)).collect();
+    Some(SearchResult { best: best?, starts, tried, interrupted })
 }
 
 /// Nelder and Mead's simplex from the best of the grid.
@@ -176,12 +212,16 @@ impl CostFunction for Cost<'_, '_, '_> {
     type Output = f64;
 
     fn cost(&self, at: &Self::Param) -> Result<f64, Error> {
-        self.0.borrow_mut().cost(at).ok_or_else(|| Error::msg("stopped"))
+        let mut state = self.0.borrow_mut();
+        let candidate = state.family.candidate(at);
+        state.judge(candidate).ok_or_else(|| Error::msg("stopped"))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::margins::Loop;
+    use super::super::plant::DEAD_TIME_MAX;
     use super::super::plant::tests::observed;
     use super::*;
 
@@ -194,13 +234,12 @@ mod tests {
         };
         let extent = Extent { seeds: 1, millis: 1500, threads: None };
         let mut setting = Search { plant: &plant, target_hz: 30.0, extent, go_on: &mut go_on };
-        search(&mut setting, family).unwrap()
+        search(&mut setting, family, &[]).unwrap()
     }
 
     #[test]
     fn the_result_of_a_search_is_safe_and_better_than_all_candidates() {
         let found = found(Family::Corrected, usize::MAX);
-        assert!(found.tried.iter().all(|(_, objective)| *objective >= found.best.objective));
         assert!(found.best.is_safe(), "{:?}", found.best);
         assert!(found.best.settle_s.unwrap() <= 1.0, "{:?}", found.best);
         assert!(!found.interrupted);
@@ -222,6 +261,55 @@ mod tests {
             let all = family.candidates();
             assert_eq!(all.len(), count, "{family:?}");
             assert!(all.iter().enumerate().all(|(k, at)| !all[..k].contains(at)), "{family:?}");
+        }
+    }
+
+    #[test]
+    fn gains_that_are_found_are_inside_the_ranges_of_gains() {
+        // the ends of the box, and far beyond them
+        for family in Family::ALL {
+            for wish in [-1e3, 1e3] {
+                let within =
+                    |value: f64, (low, high): (f64, f64)| assert!((low..=high).contains(&value), "{family:?} {value}");
+                match family.candidate(&[wish; 3]) {
+                    Candidate::Feedback(Law::Corrected { kappa, lead, margin }) => {
+                        within(kappa, gains::KAPPA);
+                        within(lead, gains::LEAD);
+                        within(margin, gains::MARGIN);
+                    }
+                    Candidate::Feedback(Law::Printed { alpha, beta }) => {
+                        within(alpha, gains::ALPHA);
+                        within(beta, gains::BETA);
+                    }
+                    Candidate::Adaptive { margin } => within(margin, gains::MARGIN),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_place_of_a_law_in_its_family_leads_back_to_it() {
+        let law = Law::Corrected { kappa: 0.4, lead: 0.3, margin: 0.05 };
+        assert_eq!(Family::Corrected.place(law.into()), None, "its λ is not 0");
+        let place = Family::Pi.place(law.into()).unwrap();
+        let Candidate::Feedback(Law::Corrected { kappa, lead, margin }) = Family::Pi.candidate(&place) else {
+            panic!("a PI law")
+        };
+        assert!(
+            [kappa - 0.4, lead - 0.3, margin - 0.05].iter().all(|off| off.abs() < 1e-12),
+            "{kappa} {lead} {margin}"
+        );
+    }
+
+    #[test]
+    fn every_grid_of_the_corrected_law_holds_gains_with_margins_at_every_delay() {
+        // all of a frame's time goes with polygons: the loop's gain is κ, at its largest
+        for dead_time in 0..=DEAD_TIME_MAX {
+            let safe = |kappa: &f64| {
+                let near = Loop { gain: *kappa, lead: 0.0, dead_time };
+                near.gain_margin() >= 2.0 && near.delay_margin() >= 2
+            };
+            assert!(Family::Corrected.grid()[0].iter().any(safe), "{dead_time} frames");
         }
     }
 

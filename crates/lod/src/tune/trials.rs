@@ -9,8 +9,10 @@ use super::margins::Loop;
 use super::measures::Measures;
 use super::plant::Plant;
 use super::play::{Start, Trial, play};
+use std::cmp::Ordering;
 use std::num::NonZero;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic;
+use std::sync::atomic::AtomicUsize;
 use std::thread;
 
 /// The extent of the trials.
@@ -27,8 +29,8 @@ pub struct Extent {
 impl Extent {
     /// Ten seeds, four seconds each.
     pub const FULL: Self = Self { seeds: 10, millis: 4000, threads: None };
-    /// Two seeds, two seconds each.
-    pub const QUICK: Self = Self { seeds: 2, millis: 2000, threads: None };
+    /// Two seeds, a second and a half each: a law that settles within a second shows that it stays.
+    pub const QUICK: Self = Self { seeds: 2, millis: 1500, threads: None };
 }
 
 /// The result of judging a law.
@@ -54,7 +56,9 @@ pub struct Verdict {
     pub asked: Vec<f64>,
     /// The speed among them nearest to the machine's own, at which all else was measured; 1 if none was tested.
     pub at_speed: f64,
-    /// The number to minimise: see [`Verdict::objective`].
+    /// How much the margins lack of a gain margin of 2 and a delay margin of 2 frames, as parts of these, 0 … 2; 0: the law keeps them.
+    pub shortfall: f64,
+    /// J, the number to minimise among laws that lack equally little (control.md, eq. 29).
     pub objective: f64,
 }
 
@@ -78,6 +82,9 @@ pub(super) const SETTLE_MAX_S: f64 = 1.0;
 /// Least margins: a factor on the gain, and frames of delay.
 pub(super) const GAIN_MARGIN: f64 = 2.0;
 const DELAY_MARGIN: usize = 2;
+
+/// Weight of the objective between laws that lack margins: it decides where they lack equally much.
+const TIE: f64 = 1e-3;
 
 /// Weights of a late frame, a reversal, a lost part of quality, a second of settling and a missing margin relative to an error of one.
 const WEIGHTS: [f64; 5] = [2.0, 0.1, 1.0, 0.1, 1.0];
@@ -118,8 +125,10 @@ pub fn judge(plant: &Plant, candidate: impl Into<Candidate>, target_hz: f64, ext
         robust_to: asked.iter().copied().filter(|&speed| at_speed(speed).all(good)).collect(),
         asked,
         at_speed: own,
+        shortfall: 0.0,
         objective: 0.0,
     };
+    verdict.shortfall = verdict.margins.map_or(2.0, Margins::shortfall);
     verdict.objective = verdict.weigh(mean(|m| m.error), mean(|m| m.overrun), seconds);
     verdict
 }
@@ -128,10 +137,7 @@ impl Verdict {
     /// Mean error, late frames, reversals, lost quality, settling and missing margins in one number (control.md, eq. 29).
     fn weigh(&self, error: f64, overrun: f64, longest_s: f64) -> f64 {
         let [late, reversal, quality, settling, margin] = WEIGHTS;
-        let margins = self.margins.unwrap_or(Margins { gain: 0.0, delay: 0 });
-        let missing = (1.0 - margins.gain / GAIN_MARGIN).max(0.0)
-            + (1.0 - margins.delay as f64 / DELAY_MARGIN as f64).max(0.0)
-            + (self.asked.len() - self.robust_to.len()) as f64 / SPEEDS.len() as f64;
+        let missing = self.shortfall + (self.asked.len() - self.robust_to.len()) as f64 / SPEEDS.len() as f64;
         error
             + late * overrun
             + reversal * self.reversals
@@ -143,13 +149,31 @@ impl Verdict {
     /// Whether the law keeps the required margins: a factor of two, and two frames.
     #[must_use]
     pub fn is_safe(&self) -> bool {
-        self.margins.is_some_and(|margins| margins.gain >= GAIN_MARGIN && margins.delay >= DELAY_MARGIN)
+        self.shortfall == 0.0
+    }
+
+    /// The order of verdicts, best first: margins are constraints, so the law that lacks less of them comes first whatever its objective,
+    /// and of two that lack equally little the one with the smaller objective (DEB00).
+    #[must_use]
+    pub fn compare(&self, other: &Self) -> Ordering {
+        self.shortfall.total_cmp(&other.shortfall).then(self.objective.total_cmp(&other.objective))
+    }
+
+    /// The same order as one number for the simplex: J/(1 + J) of a law that keeps its margins, past 1 by what another lacks.
+    pub(super) fn rank(&self) -> f64 {
+        let within = self.objective / (1.0 + self.objective);
+        if self.is_safe() { within } else { 1.0 + self.shortfall + TIE * within }
     }
 }
 
 impl Margins {
     fn of(near: &Loop) -> Self {
         Self { gain: near.gain_margin(), delay: near.delay_margin() }
+    }
+
+    /// What is missing of the required margins, each as a part of it.
+    fn shortfall(self) -> f64 {
+        (1.0 - self.gain / GAIN_MARGIN).max(0.0) + (1.0 - self.delay as f64 / DELAY_MARGIN as f64).max(0.0)
     }
 
     fn worse(self, other: Self) -> Self {
@@ -186,7 +210,7 @@ pub fn measure(plant: &Plant, trials: &[Trial], threads: Option<NonZero<usize>>)
     let work = || {
         let mut mine = Vec::new();
         while let Some((at, trial)) = {
-            let at = next.fetch_add(1, Ordering::Relaxed);
+            let at = next.fetch_add(1, atomic::Ordering::Relaxed);
             trials.get(at).map(|t| (at, t))
         } {
             mine.push((at, Measures::of(&play(plant, trial))));

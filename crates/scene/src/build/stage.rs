@@ -7,7 +7,7 @@ use crate::format::{
     CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, TargetFile, model_named,
 };
 use glam::DVec3;
-use metachron_core::SimSpan;
+use metachron_core::{SimSpan, gains};
 use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, RENDER_SCALE, Target, View};
 
 /// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
@@ -34,12 +34,12 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
     let place = Place::new("target", "of `[target]`");
     let frame_hz = file.and_then(|f| f.frame_hz);
     let mut gain = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
-    let gains = file.map_or_else(Gains::default, |f| Gains {
-        alpha: gain("alpha", f.alpha, allowed(1e-9..=1.0, "")),
-        beta: gain("beta", f.beta, allowed(1e-6..=1e3, "")),
-        kappa: gain("kappa", f.kappa, allowed(1e-3..=1.99, "")),
-        lead: gain("lead", f.lead, allowed(0.0..=1.99, "")),
-        margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
+    let given = file.map_or_else(Gains::default, |f| Gains {
+        alpha: gain("alpha", f.alpha, gain_range(gains::ALPHA)),
+        beta: gain("beta", f.beta, gain_range(gains::BETA)),
+        kappa: gain("kappa", f.kappa, gain_range(gains::KAPPA)),
+        lead: gain("lead", f.lead, gain_range(gains::LEAD)),
+        margin: gain("margin", f.margin, gain_range(gains::MARGIN)),
     });
     let scales = file
         .and_then(|f| f.render_scale)
@@ -50,10 +50,15 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         policy: file.and_then(|f| f.policy).unwrap_or_default(),
         value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
-        gains,
+        gains: given,
         raise: file.and_then(|f| f.raise).unwrap_or_default(),
         render_scale: scales.unwrap_or(RENDER_SCALE),
     }
+}
+
+/// The allowed values of a gain.
+const fn gain_range(ends: (f64, f64)) -> Allowed {
+    allowed(ends.0..=ends.1, "")
 }
 
 /// The greatest lag in seconds and the optimiser's share of it.

@@ -1,6 +1,7 @@
 //! The tables of a scene other than its objects.
 
 use super::{CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point};
+use metachron_core::gains;
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -102,14 +103,19 @@ pub struct TargetFile {
     /// Feedback law. Default `corrected`.
     pub law: Option<LawKind>,
     /// Gain α of the printed law, 1e-9 … 1. Default 1e-4.
+    #[schemars(range(min = gains::ALPHA.0, max = gains::ALPHA.1))]
     pub alpha: Option<f64>,
     /// Gain β of the printed law, 1e-6 … 1e3. Default 5.
+    #[schemars(range(min = gains::BETA.0, max = gains::BETA.1))]
     pub beta: Option<f64>,
     /// Gain κ of the corrected law, 0.001 … 1.99; below 1 it is stable for every scene. Default: the law's own.
+    #[schemars(range(min = gains::KAPPA.0, max = gains::KAPPA.1))]
     pub kappa: Option<f64>,
     /// Gain λ of the corrected law on the error's change, 0 … 1.99. Default: the law's own.
+    #[schemars(range(min = gains::LEAD.0, max = gains::LEAD.1))]
     pub lead: Option<f64>,
     /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02.
+    #[schemars(range(min = gains::MARGIN.0, max = gains::MARGIN.1))]
     pub margin: Option<f64>,
     /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the
     /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.

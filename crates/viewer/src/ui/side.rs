@@ -9,6 +9,7 @@ use super::protocol::{Action, AgentRow, AgentState, Filled, Law, Status, Tuning}
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
+use metachron_core::gains;
 use metachron_lod::cost::benefit::Sliders;
 use std::ops::RangeInclusive;
 
@@ -112,7 +113,7 @@ fn benefit_weights(ui: &mut Ui, sliders: Sliders, damped: bool, out: &mut Vec<Ac
 fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
     let mut wanted = law;
     choose_law(ui, &mut wanted, &status.laws);
-    gains(ui, &mut wanted);
+    law_gains(ui, &mut wanted);
     ui.horizontal(|ui| {
         let default = status.laws.iter().copied().find(|law| law.is_same_law(&wanted)).unwrap_or(wanted);
         if ui.add_enabled(wanted != default, egui::Button::new("Reset to default")).clicked() {
@@ -158,19 +159,21 @@ fn choose_law(ui: &mut Ui, law: &mut Law, laws: &[Law]) {
     });
 }
 
-fn gains(ui: &mut Ui, law: &mut Law) {
+fn law_gains(ui: &mut Ui, law: &mut Law) {
     match law {
         Law::Printed { alpha, beta } => {
-            slider(ui, "Gain α", alpha, 1e-6..=1e-1, |s| {
+            slider(ui, "Gain α", alpha, range(gains::ALPHA), |s| {
                 s.logarithmic(true).custom_formatter(|v, _| format!("{v:.1e}"))
             });
-            slider(ui, "Gain β", beta, 0.1..=50.0, |s| s.logarithmic(true).max_decimals(2));
+            slider(ui, "Gain β", beta, range(gains::BETA), |s| s.logarithmic(true).max_decimals(2));
         }
         Law::Corrected { kappa, lead, margin } => {
-            slider(ui, "Gain κ", kappa, 0.01..=0.99, |s| s.max_decimals(2));
-            slider(ui, "Lead λ", lead, 0.0..=0.99, |s| s.max_decimals(2));
+            slider(ui, "Gain κ", kappa, range(gains::KAPPA), |s| s.max_decimals(2));
+            slider(ui, "Lead λ", lead, range(gains::LEAD), |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
-            slider(ui, "Margin", &mut percent, 0.0..=50.0, |s| s.max_decimals(0).suffix(" %"));
+            slider(ui, "Margin", &mut percent, range((100.0 * gains::MARGIN.0, 100.0 * gains::MARGIN.1)), |s| {
+                s.max_decimals(0).suffix(" %")
+            });
             // the conversion to percent and back must not count as a change
             if (percent - *margin * 100.0).abs() > 1e-9 {
                 *margin = percent / 100.0;
@@ -279,6 +282,10 @@ fn labelled(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui)) {
         ui.painter().text(rect.left_center(), egui::Align2::LEFT_CENTER, name, font, palette.weak);
         content(ui);
     });
+}
+
+const fn range(ends: (f64, f64)) -> RangeInclusive<f64> {
+    ends.0..=ends.1
 }
 
 fn slider(

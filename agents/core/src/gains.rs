@@ -1,0 +1,15 @@
+//! Ranges of the gains of the feedback laws that hold a picture at its time.
+//!
+//! In: nothing. Out: the least and the greatest value of each gain, which scene files, their schema, the sliders of the window and the search
+//! for gains all allow. Never here: a law. Theory: `docs/theory/control.md`, eq. 1 and 7.
+
+/// α of the printed law, dimensionless per frame/s: the change of ε̂ for each frame per second that is missing.
+pub const ALPHA: (f64, f64) = (1e-9, 1.0);
+/// β of the printed law, dimensionless: the change of ρ for each unit of ε̂.
+pub const BETA: (f64, f64) = (1e-6, 1e3);
+/// κ of the corrected law, dimensionless: below 1 it is stable for every scene, from 2 on for none.
+pub const KAPPA: (f64, f64) = (1e-3, 1.99);
+/// λ of the corrected law, dimensionless: the share of an error's change that one frame adds.
+pub const LEAD: (f64, f64) = (0.0, 1.99);
+/// The fraction of a frame that the corrected law leaves free.
+pub const MARGIN: (f64, f64) = (0.0, 0.9);
