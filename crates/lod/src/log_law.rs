@@ -4,7 +4,6 @@
 //! where the time was measured. Theory: `docs/theory/control.md`, eq. 7 … 12.
 
 use crate::{Bound, within};
-use metachron_core::gains;
 
 /// Clamp of the error of one update, |ln(t/T)|: a frame four times too slow. At κ = ½ one update halves the work at most.
 pub const ERROR_MAX: f64 = 2.0 * core::f64::consts::LN_2;
@@ -15,6 +14,11 @@ pub const UNCONFIRMED_ERROR_MAX: f64 = 0.405_465_108_108_164_4;
 
 /// Nearer to the target time than this, |ln(t/T)|, a time that no level improves counts as settled.
 const NEAR: f64 = 0.05;
+
+/// The range of κ.
+pub const KAPPA: (f64, f64) = (1e-3, 1.99);
+/// The range of λ.
+pub const LEAD: (f64, f64) = (0.0, 1.99);
 
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,18 +45,9 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() {
-            within(self.kappa, gains::KAPPA.0, gains::KAPPA.1)
-        } else {
-            Self::default().kappa
-        };
+        let kappa = if self.kappa.is_finite() { within(self.kappa, KAPPA.0, KAPPA.1) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self {
-            kappa,
-            lead: within(width(self.lead), gains::LEAD.0, gains::LEAD.1),
-            early: width(self.early),
-            late: width(self.late),
-        }
+        Self { kappa, lead: within(width(self.lead), LEAD.0, LEAD.1), early: width(self.early), late: width(self.late) }
     }
 }
 

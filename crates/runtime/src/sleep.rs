@@ -127,12 +127,13 @@ impl SleepRegistry {
         at
     }
 
-    /// How long a step that does not return is waited for at the end of a run before it counts as hung: a turn of a cluster makes the steps of
-    /// all its members.
-    pub fn end_patience(&self) -> Duration {
+    /// How long the end of a run waits for these agents' turns before they count as hung: a turn of a cluster makes the steps of all its
+    /// members.
+    pub fn end_patience(&self, missing: impl Iterator<Item = AgentId>) -> Duration {
         let mut led = vec![0; self.signals.len()];
         (0..).map(AgentId).take(led.len()).for_each(|id| led[self.leader(id).0 as usize] += 1);
-        END_PATIENCE * led.into_iter().fold(1, u32::max).min(END_PATIENCE_MAX)
+        let most = missing.filter_map(|id| led.get(id.0 as usize).copied()).fold(1, u32::max);
+        END_PATIENCE * most.min(END_PATIENCE_MAX)
     }
 
     fn direct_leader(&self, id: AgentId) -> Option<AgentId> {
@@ -314,12 +315,13 @@ mod tests {
     #[test]
     fn a_cluster_is_waited_for_as_long_as_its_members() {
         let sleep = SleepRegistry::new(40);
-        assert_eq!(sleep.end_patience(), END_PATIENCE);
+        let patience = |of: &[u32]| sleep.end_patience(of.iter().copied().map(AgentId));
+        assert_eq!(patience(&[0, 1]), END_PATIENCE);
         [1, 5].into_iter().for_each(|id| sleep.follow(AgentId(id), Some(AgentId(0))));
         sleep.follow(AgentId(7), Some(AgentId(5)));
-        assert_eq!(sleep.end_patience(), 4 * END_PATIENCE);
+        assert_eq!([patience(&[0]), patience(&[2, 3]), patience(&[])], [4 * END_PATIENCE, END_PATIENCE, END_PATIENCE]);
         (8..40).for_each(|id| sleep.follow(AgentId(id), Some(AgentId(7))));
-        assert_eq!(sleep.end_patience(), END_PATIENCE_MAX * END_PATIENCE);
+        assert_eq!(patience(&[0, 3]), END_PATIENCE_MAX * END_PATIENCE);
     }
 
     #[test]

@@ -91,12 +91,18 @@ impl Threads {
 
     /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind.
     fn end(&mut self) {
-        let patience = self.sleep.end_patience();
         self.sleep.stop();
-        let mut missing = self.threads.iter().flatten().count();
-        while missing > 0 {
+        let missing = |threads: &[Option<JoinHandle<()>>]| {
+            (0..).map(AgentId).zip(threads).filter(|(_, thread)| thread.is_some()).map(|(id, _)| id).collect::<Vec<_>>()
+        };
+        let mut patience = Duration::ZERO;
+        loop {
+            let running = missing(&self.threads);
+            if running.is_empty() {
+                break;
+            }
+            patience = self.sleep.end_patience(running.into_iter());
             let Ok(id) = self.ended.recv_timeout(patience) else { break };
-            missing -= 1;
             if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
                 drop(thread.join());

@@ -89,6 +89,9 @@ impl Design {
     pub fn begin(control: &mut PictureControl, frames: u64) -> Self {
         control.set_policy(Policy::Feedback);
         control.set_law(Law::CORRECTED);
+        // one line is fitted through all frames: they have as many pixels
+        let (_, most) = control.render_scale_range();
+        control.set_render_scale((most, most));
         Self { frames, frame: 0, register: 1, observed: Vec::with_capacity(frames as usize) }
     }
 

@@ -23,6 +23,7 @@ const EXTENT: Extent = Extent { threads: NonZero::new(1), ..Extent::QUICK };
 pub(super) struct Tuning {
     /// Policy and law before the tuning.
     before: (Policy, Law),
+    render_scale: (f64, f64),
     target_hz: f64,
     stage: Stage,
 }
@@ -60,7 +61,8 @@ impl Tuning {
     /// Starts with the experiment.
     pub fn begin(control: &mut PictureControl) -> Self {
         let (before, target_hz) = ((control.policy(), control.law()), control.target_hz());
-        Self { before, target_hz, stage: Stage::Drawing(Design::begin(control, FRAMES)) }
+        let render_scale = control.render_scale_range();
+        Self { before, render_scale, target_hz, stage: Stage::Drawing(Design::begin(control, FRAMES)) }
     }
 
     /// Whether the frames belong to the experiment; the controller must not learn from them.
@@ -91,8 +93,9 @@ impl Tuning {
         Ok(())
     }
 
-    /// Restores the previous policy and law.
+    /// Restores the previous policy, law and bounds of the picture's scale.
     fn restore(&self, control: &mut PictureControl) {
+        control.set_render_scale(self.render_scale);
         control.set_law(self.before.1);
         control.set_policy(self.before.0);
     }

@@ -92,18 +92,17 @@ impl Operator<'_> {
 }
 
 impl Gradients {
-    /// Makes room for the members. Whether a matrix is positive definite is seen of its diagonal only.
+    /// Makes room for the members. Whether a matrix is positive definite is seen of the blocks on its diagonal only.
     ///
     /// # Errors
-    /// A block that has no inverse.
+    /// A block that is not.
     pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
         self.products = 0;
         for list in [&mut self.direction, &mut self.image] {
             list.clear();
             list.resize(members.size(), DVec3::ZERO);
         }
-        let singular = members.mobilities.iter().position(|mobility| !mobility.is_finite());
-        singular.map_or(Ok(()), Err)
+        members.mobilities.iter().position(|mobility| !is_positive(mobility)).map_or(Ok(()), Err)
     }
 
     /// Takes up which blocks the rows move.
@@ -207,6 +206,12 @@ impl Gradients {
             }
         }
     }
+}
+
+/// Whether a symmetric matrix is positive definite, by its leading minors.
+fn is_positive(matrix: &DMat3) -> bool {
+    let [x, y] = [matrix.x_axis, matrix.y_axis];
+    matrix.is_finite() && x.x > 0.0 && x.x * y.y > x.y * y.x && matrix.determinant() > 0.0
 }
 
 fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {

@@ -161,7 +161,8 @@ impl Solver {
             self.run(problem)
         } else {
             self.iterate.respond(problem.members);
-            Report::resting()
+            let products = self.iterate.system.products();
+            Report { products, cut: !self.iterate.answered(), ..Report::resting() }
         };
         self.hand_out(problem);
         Ok(&self.solution)

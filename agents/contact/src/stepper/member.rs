@@ -38,7 +38,8 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// The velocity of each block at the end of the step begun, if nothing touched the body; or near it, and [`Self::unanswered`].
+    /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`] says what it lacks it is
+    /// near that: places are foreseen by it, and into how many parts the step is divided is seen by the solution.
     fn free(&self) -> &[DVec3];
 
     /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.

@@ -2,13 +2,15 @@
 //!
 //! In: a skin and where its vertices are. Out: the patches near a region, and their vertices, edges and triangles. Never here: what touches.
 //!
-//! The tree is made once for each skin, where it is first; of another place only boxes and normals are made anew, once for all searches. A
-//! patch is a few triangles beside each other. Every edge and vertex is in one patch: that of its first triangle, so that the patch's box is
+//! The tree is made once for each skin that a search knows, where it is first; of another place only boxes and normals are made anew, once for
+//! all pairs. A patch is a few triangles beside each other. Every edge and vertex is in one patch: that of its first triangle, so that the patch's box is
 //! around it.
 
+use super::VoronoiRegions;
 use crate::{Aabb, SurfaceShape};
 use glam::DVec3;
-use std::sync::Arc;
+use std::ptr::addr_eq;
+use std::sync::{Arc, Weak};
 
 /// The most triangles of a patch: a box costs about as much to test as a triangle.
 const PATCH: usize = 8;
@@ -47,16 +49,24 @@ struct SkinTree {
 
 /// A skin where it is.
 pub(super) struct PlacedSkin {
-    form: SurfaceShape,
+    form: KnownForm,
     /// The address of the positions that it was asked for last, and when.
     address: usize,
     used: u64,
     positions: Vec<DVec3>,
-    tree: SkinTree,
+    tree: Arc<SkinTree>,
     /// The box of each node, metres.
     boxes: Vec<Aabb>,
     /// For a closed skin the outward normal at each vertex, of any length; none for an open one.
     normals: Vec<DVec3>,
+}
+
+/// The form of a skin, as long as somebody else has it.
+struct KnownForm {
+    vertices: Weak<[u32]>,
+    edges: Weak<[[u32; 2]]>,
+    triangles: Weak<[[u32; 3]]>,
+    fans: Weak<VoronoiRegions>,
 }
 
 /// The skins that were searched, where they were last.
@@ -71,22 +81,22 @@ impl SkinCache {
     pub fn prepare(&mut self, form: &SurfaceShape, positions: &[DVec3]) {
         self.time += 1;
         let address = positions.as_ptr().addr();
-        let is_known = |skin: &PlacedSkin| skin.is_of(form) && skin.address == address;
+        let is_known = |skin: &PlacedSkin| skin.form.is_that_of(form) && skin.address == address;
         let at = self.skins.iter().position(is_known).or_else(|| self.replaceable(form));
         let at = at.unwrap_or_else(|| {
-            // what nobody else holds is gone
-            self.skins.retain(|skin| Arc::strong_count(&skin.form.fans) > 1);
-            self.skins.push(PlacedSkin::new(form, positions));
+            self.skins.retain(|skin| skin.form.fans.strong_count() > 0);
+            let known = self.skins.iter().find(|skin| skin.form.is_that_of(form)).map(|skin| Arc::clone(&skin.tree));
+            self.skins.push(PlacedSkin::new(form, known.unwrap_or_else(|| Arc::new(SkinTree::of(form, positions)))));
             self.skins.len() - 1
         });
         let skin = &mut self.skins[at];
         (skin.address, skin.used) = (address, self.time);
-        skin.move_to(positions);
+        skin.move_to(form, positions);
     }
 
     /// The place of a skin that was asked for longest ago, if there are as many as are kept.
     fn replaceable(&self, form: &SurfaceShape) -> Option<usize> {
-        let places = || self.skins.iter().enumerate().filter(|(_, skin)| skin.is_of(form));
+        let places = || self.skins.iter().enumerate().filter(|(_, skin)| skin.form.is_that_of(form));
         let oldest = places().min_by_key(|(_, skin)| skin.used).map(|(at, _)| at);
         oldest.filter(|_| places().count() == PLACES)
     }
@@ -94,30 +104,39 @@ impl SkinCache {
     /// A skin at the positions that it was prepared for.
     pub fn placed(&self, form: &SurfaceShape, positions: &[DVec3]) -> Option<&PlacedSkin> {
         let address = positions.as_ptr().addr();
-        self.skins.iter().find(|skin| skin.is_of(form) && skin.address == address && !skin.boxes.is_empty())
+        self.skins.iter().find(|skin| skin.form.is_that_of(form) && skin.address == address && !skin.boxes.is_empty())
+    }
+}
+
+impl KnownForm {
+    fn new(form: &SurfaceShape) -> Self {
+        Self {
+            vertices: Arc::downgrade(&form.vertices),
+            edges: Arc::downgrade(&form.edges),
+            triangles: Arc::downgrade(&form.triangles),
+            fans: Arc::downgrade(&form.fans),
+        }
+    }
+
+    fn is_that_of(&self, form: &SurfaceShape) -> bool {
+        addr_eq(self.fans.as_ptr(), Arc::as_ptr(&form.fans))
+            && addr_eq(self.triangles.as_ptr(), Arc::as_ptr(&form.triangles))
+            && addr_eq(self.edges.as_ptr(), Arc::as_ptr(&form.edges))
+            && addr_eq(self.vertices.as_ptr(), Arc::as_ptr(&form.vertices))
     }
 }
 
 impl PlacedSkin {
-    fn new(form: &SurfaceShape, positions: &[DVec3]) -> Self {
-        let tree = SkinTree::of(form, positions);
-        let (boxes, normals) = (vec![], vec![]);
-        Self { form: form.clone(), address: 0, used: 0, positions: vec![], tree, boxes, normals }
+    fn new(form: &SurfaceShape, tree: Arc<SkinTree>) -> Self {
+        let (positions, boxes, normals) = (vec![], vec![], vec![]);
+        Self { form: KnownForm::new(form), address: 0, used: 0, positions, tree, boxes, normals }
     }
 
-    fn is_of(&self, form: &SurfaceShape) -> bool {
-        let own = &self.form;
-        Arc::ptr_eq(&own.fans, &form.fans)
-            && Arc::ptr_eq(&own.triangles, &form.triangles)
-            && Arc::ptr_eq(&own.edges, &form.edges)
-            && Arc::ptr_eq(&own.vertices, &form.vertices)
-    }
-
-    fn move_to(&mut self, positions: &[DVec3]) {
+    fn move_to(&mut self, form: &SurfaceShape, positions: &[DVec3]) {
         if self.positions == positions {
             return;
         }
-        let Self { form, tree, boxes, normals, .. } = self;
+        let Self { tree, boxes, normals, .. } = self;
         self.positions.clear();
         self.positions.extend_from_slice(positions);
         tree.fit(positions, boxes);
@@ -300,7 +319,6 @@ fn divide(parts: &mut [Part], patch: u32, nodes: &mut Vec<Node>, patch_of: &mut 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::narrow_phase::VoronoiRegions;
     use proptest::prelude::*;
 
     /// A grid of triangles, a rope of two edges from its corner, and a vertex alone.
@@ -382,11 +400,11 @@ mod tests {
     #[test]
     fn a_skin_that_nobody_has_any_more_is_dropped() {
         let mut cache = SkinCache::default();
-        let positions = vec![DVec3::ZERO; 39];
+        let places = [vec![DVec3::ZERO; 39], vec![DVec3::ONE; 39]];
         for _ in 0..3 {
             let form = skin();
-            cache.prepare(&form, &positions);
+            places.iter().for_each(|place| cache.prepare(&form, place));
         }
-        assert_eq!(cache.skins.len(), 1);
+        assert_eq!(cache.skins.len(), 2);
     }
 }

@@ -35,6 +35,11 @@ const DOUBT: (f64, f64) = (0.25, 0.02);
 /// The range of the learnt factor.
 const FACTOR: (f64, f64) = (0.25, 4.0);
 
+/// Distance of two fractions that are one.
+const NEAR: f64 = 1e-9;
+/// Frames over which stalls are counted, and the part of them from which on stalls are the load.
+const ODD: (f64, f64) = (16.0, 0.25);
+
 /// One frame, as the controller of the scale sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScaledFrame {
@@ -122,6 +127,8 @@ pub(super) struct RenderScale {
     /// Times of the frames at this scale, and of the newest that are unlike them.
     times: Times,
     unlike: Times,
+    /// The part of the newest frames that were unlike them.
+    odd: f64,
     /// Seconds at this scale, since pixels were taken, and since they were given back.
     held_s: f64,
     taken_s: f64,
@@ -143,21 +150,17 @@ impl Default for RenderScale {
 }
 
 impl RenderScale {
-    /// A controller that stays inside `range`, to the scales nearest to its ends.
+    /// A controller that stays inside `range`; at the scale below it where none lies inside.
     pub fn new(range: (f64, f64)) -> Self {
-        let nearest = |wanted: f64| {
-            let from = |scale: f64| (scale - wanted).abs();
-            let better =
-                |best: usize, (at, scale): (usize, &f64)| if from(*scale) < from(SCALES[best]) { at } else { best };
-            SCALES.iter().enumerate().fold(SCALES.len() - 1, better)
-        };
-        let (least, most) = (nearest(range.0), nearest(range.1));
+        let most = SCALES.iter().rposition(|scale| *scale <= range.1 + NEAR).unwrap_or(0);
+        let least = SCALES.iter().position(|scale| *scale >= range.0 - NEAR).unwrap_or(most);
         let range = (least.min(most), most);
         Self {
             range,
             at: range.1,
             times: Times::default(),
             unlike: Times::default(),
+            odd: 0.0,
             held_s: 0.0,
             taken_s: f64::INFINITY,
             given_s: f64::INFINITY,
@@ -189,16 +192,31 @@ impl RenderScale {
         self.is_reduced() && !self.late
     }
 
+    /// The least and the most that it may be.
+    pub fn bounds(&self) -> (f64, f64) {
+        (SCALES[self.range.0], SCALES[self.range.1])
+    }
+
+    /// Gives all pixels back, and starts anew: others choose now.
+    pub fn release(&mut self) {
+        *self = Self { range: self.range, ..Self::new(self.bounds()) };
+    }
+
+    /// Whether there is nothing to choose.
+    pub fn is_fixed(&self) -> bool {
+        self.range.0 == self.range.1
+    }
+
     /// Forgets the frames at this scale: they were unlike those to come.
     pub fn disturb(&mut self) {
-        (self.times, self.unlike, self.change) = (Times::default(), Times::default(), None);
+        (self.times, self.unlike, self.odd, self.change) = (Times::default(), Times::default(), 0.0, None);
     }
 
     /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture at a scale by the prices, with all else at its coarsest.
     pub fn observe(&mut self, frame: ScaledFrame, priced_s: impl Fn(f64) -> f64) {
         let ScaledFrame { coarsest_s, draw_s, spent, set_s, period_s } = frame;
         let sound = [coarsest_s, draw_s, set_s, period_s].iter().all(|s| s.is_finite() && *s > 0.0);
-        if self.range.0 == self.range.1 || !sound {
+        if self.is_fixed() || !sound {
             return;
         }
         [&mut self.held_s, &mut self.taken_s, &mut self.given_s].into_iter().for_each(|s| *s += period_s);
@@ -220,10 +238,16 @@ impl RenderScale {
         }
     }
 
-    /// Counts a frame: among those at this scale, or, if it is unlike them, among such, which replace them once they are enough.
+    /// Counts a frame: among those at this scale, or, if it is unlike them, among such, which replace them once they are enough in a row. Where
+    /// too many are unlike the others all count.
     fn add(&mut self, frame: &ScaledFrame) {
         let Times { work, .. } = self.times;
-        if !work.excludes(frame.coarsest_s) {
+        let is_odd = work.excludes(frame.coarsest_s);
+        self.odd += (f64::from(u8::from(is_odd)) - self.odd) / ODD.0;
+        if self.odd > ODD.1 {
+            self.disturb();
+        }
+        if !is_odd || self.times.work.frames == 0.0 {
             self.unlike = Times::default();
             return self.times.add(frame);
         }

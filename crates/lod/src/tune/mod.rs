@@ -36,3 +36,11 @@ pub use robust_fit::Line;
 pub use search::{Family, Search, SearchResult, search};
 pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
 pub use tuning::{NORMALISED, Origin, Row, Tuning, tune};
+
+/// The law accepts what scenes, the window and the search allow.
+const _: () = {
+    use crate::log_law;
+    use metachron_core::gains;
+    assert!(log_law::KAPPA.0 == gains::KAPPA.0 && log_law::KAPPA.1 == gains::KAPPA.1);
+    assert!(log_law::LEAD.0 == gains::LEAD.0 && log_law::LEAD.1 == gains::LEAD.1);
+};

@@ -166,8 +166,10 @@ impl Supervisor {
 
     /// Waits for the workers until a timeout, and ends all agents: a step that takes longer counts as hung, and its thread is left behind.
     fn join_all(&mut self) {
-        let patience = self.state.sleep.end_patience();
+        let mut patience = Duration::ZERO;
         while self.workers.iter().any(|worker| worker.thread.is_some()) {
+            let turns = self.workers.iter().filter_map(|worker| worker.watchdog.current());
+            patience = self.state.sleep.end_patience(turns.map(WatchedTurn::agent));
             match self.messages.recv_timeout(patience) {
                 Ok(Message::Ended(number)) => self.join(number),
                 Ok(Message::Stop) => {}

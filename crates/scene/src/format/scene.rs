@@ -125,7 +125,8 @@ pub struct TargetFile {
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
-    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both, 0.35 … 1; then it is enlarged.
+    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both, 0.35 … 1 in steps of 0.05; then it is
+    /// enlarged.
     /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.
     pub render_scale: Option<OneOrRange<f64>>,
 }

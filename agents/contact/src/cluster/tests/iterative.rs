@@ -2,7 +2,7 @@
 
 use super::random::{COUNT, Comparison, FINE, compare_with_slow, distance, miss, random_case, solved, velocities};
 use super::scenes::{Stack, momentum_gained, plate_on_soft_block};
-use super::{Case, Seeded};
+use super::{Body, Case, Seeded};
 use crate::cluster::{Block, Settings, Side, Solution, Solver, StepForm};
 use glam::{DMat3, DVec3};
 
@@ -247,6 +247,23 @@ fn a_matrix_that_is_none_of_a_body_is_told_and_makes_no_energy() {
         let solution = solved(&case, Settings { convex_only, ..iterative() });
         assert!(solution.report.cut && solution.report.work_j < 1e-11, "{:?}", solution.report);
     }
+}
+
+#[test]
+fn a_block_that_is_negative_is_refused_and_a_motion_that_cannot_be_found_is_told() {
+    let lone = |value: f64, coupling: f64| {
+        let block = |row, column, value| Block { row, column, value: DMat3::IDENTITY * value };
+        let body = Body {
+            blocks: vec![block(0, 0, 1.0), block(1, 0, coupling), block(1, 1, value)],
+            free: vec![DVec3::ZERO; 2],
+            unanswered: vec![DVec3::X, DVec3::NEG_X],
+        };
+        let case = Case { h_s: 0.01, bodies: vec![body], contacts: vec![], rows: vec![] };
+        case.with(|problem| Solver::new(iterative()).solve(problem).map(|solution| solution.report.cut))
+    };
+    assert_eq!(lone(1.0, 0.5), Ok(false));
+    assert!(lone(-1.0, 0.5).is_err(), "its diagonal is negative");
+    assert_eq!(lone(1.0, 3.0), Ok(true), "positive on its diagonal alone");
 }
 
 #[test]

@@ -26,8 +26,12 @@ struct Coarsest {
 impl PictureControl {
     /// Chooses the scale of the next picture by a frame of `work_s`, of which `drawn_s` were drawing.
     pub(super) fn observe_scale(&mut self, work_s: f64, drawn_s: f64) {
-        if self.frozen || !self.policy.scales_pictures() {
+        if self.scale.is_fixed() || !self.policy.scales_pictures() {
             return;
+        }
+        if self.frozen {
+            // what is drawn now says nothing of what will be
+            return self.scale.disturb();
         }
         let prices = self.policy.prices(&self.prices);
         let here = self.scale.scale();

@@ -23,6 +23,7 @@ impl PictureControl {
                 self.forget_ladders();
             }
             self.raise = self.raise.map(|_| QualityBoost::default());
+            self.scale.release();
             self.take_over();
         }
     }
@@ -107,6 +108,12 @@ impl PictureControl {
     /// Bounds the fraction of its width and height that a picture is drawn with: least and most, 0.35 … 1. Initially every pixel is drawn.
     pub fn set_render_scale(&mut self, range: (f64, f64)) {
         self.scale = RenderScale::new(range);
+    }
+
+    /// The bounds of that fraction.
+    #[must_use]
+    pub fn render_scale_range(&self) -> (f64, f64) {
+        self.scale.bounds()
     }
 
     /// The fraction of its width and height to draw the next picture with. Views and pixels given to the controller are those of the smaller

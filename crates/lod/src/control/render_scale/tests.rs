@@ -128,8 +128,27 @@ fn nothing_is_taken_that_saves_nothing_and_nothing_while_levels_can_be() {
 }
 
 #[test]
+fn a_load_that_comes_and_goes_is_one() {
+    let mut law = RenderScale::new((0.35, 1.0));
+    let frame = |ms: f64| ScaledFrame {
+        coarsest_s: 1e-3 * ms,
+        draw_s: 1e-3 * ms,
+        spent: true,
+        set_s: PERIOD_S,
+        period_s: PERIOD_S,
+    };
+    (0..90).for_each(|_| law.observe(frame(20.0), |s| s * s));
+    (0..40).for_each(|_| [60.0, 60.0, 20.0].into_iter().for_each(|ms| law.observe(frame(ms), |s| s * s)));
+    assert!(law.is_reduced(), "two frames of three are late");
+}
+
+#[test]
 fn a_range_bounds_it_and_no_number_moves_it() {
-    assert_eq!(RenderScale::new((0.62, 0.9)).range, (5, 11));
+    assert_eq!(RenderScale::new((0.62, 0.9)).range, (6, 11));
+    assert_eq!(
+        [(0.37, 0.37), (0.97, 1.0), (0.1, 0.2)].map(|range| RenderScale::new(range).range),
+        [(0, 0), (13, 13), (0, 0)]
+    );
     let mut law = RenderScale::new((0.6, 0.9));
     let late = ScaledFrame { coarsest_s: 0.5, draw_s: 0.4, spent: true, set_s: PERIOD_S, period_s: PERIOD_S };
     (0..50).for_each(|_| law.observe(ScaledFrame { coarsest_s: f64::NAN, ..late }, |s| s));
