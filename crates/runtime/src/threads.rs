@@ -92,16 +92,10 @@ impl Threads {
     /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind.
     fn end(&mut self) {
         self.sleep.stop();
-        let missing = |threads: &[Option<JoinHandle<()>>]| {
-            (0..).map(AgentId).zip(threads).filter(|(_, thread)| thread.is_some()).map(|(id, _)| id).collect::<Vec<_>>()
-        };
         let mut patience = Duration::ZERO;
-        loop {
-            let running = missing(&self.threads);
-            if running.is_empty() {
-                break;
-            }
-            patience = self.sleep.end_patience(running.into_iter());
+        while self.threads.iter().any(Option::is_some) {
+            let running = (0..).map(AgentId).zip(&self.threads).filter(|(_, thread)| thread.is_some());
+            patience = self.sleep.end_patience(running.map(|(id, _)| id));
             let Ok(id) = self.ended.recv_timeout(patience) else { break };
             if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined

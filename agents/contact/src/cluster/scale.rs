@@ -20,6 +20,11 @@ const DIRECTIONS: [DVec3; SAMPLES] =
 /// Up to so many blocks there is a solve for each sample; of more, one for all: they are far apart then, and each solve is dear.
 const APART_MAX: usize = 500;
 
+/// The most that an iterative solve may leave of a sample's impulses, in shares of them, and that by the velocity that responses may leave,
+/// s/m: a scale is off by about the square.
+const SAMPLE_SHARE: f64 = 0.1;
+const SAMPLE_FINER: f64 = 2e6;
+
 /// Storage for the samples.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scales {
@@ -105,7 +110,8 @@ impl Scales {
                 at.estimate += given.dot(system.members.mobilities[term.block] * given);
             }
         }
-        let goal = system.sample_share * system.members.measure(right).root();
+        let share = (SAMPLE_FINER * system.still_m_s).min(SAMPLE_SHARE);
+        let goal = share * system.members.measure(right).root();
         system.respond(members, &mut Task { right, x, left, goal });
         for (member, at) in samples.iter_mut().enumerate() {
             for (direction, term) in at.terms(&which, member, &system.members, rows) {

@@ -17,11 +17,6 @@ use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
 use std::ops::Range;
 
-/// The most that an iterative solve may leave of a sample's impulses, in shares of them, and that by the velocity that responses may leave,
-/// s/m: a scale is off by about the square.
-const SAMPLE_SHARE: f64 = 0.1;
-const SAMPLE_FINER: f64 = 2e6;
-
 /// What a solve aims at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -192,7 +187,6 @@ impl Solver {
         }
         let Iterate { rows, system, .. } = &mut self.iterate;
         (system.form, system.still_m_s) = (self.settings.form, self.settings.still_m_s);
-        system.sample_share = (SAMPLE_FINER * self.settings.still_m_s).min(SAMPLE_SHARE);
         system.take_members(problem, offsets)?;
         rows.gather(problem, offsets, velocities);
         system.scale_rows(problem.members, rows);

@@ -29,9 +29,8 @@ pub enum StepForm {
 pub(super) struct System {
     /// The form in which the next members are taken up.
     pub form: StepForm,
-    /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17), and the share of a sample that may be left.
+    /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17).
     pub still_m_s: f64,
-    pub sample_share: f64,
     pub members: Members,
     direct: Direct,
     gradients: Gradients,

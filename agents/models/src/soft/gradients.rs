@@ -20,6 +20,8 @@ pub(super) struct Gradients {
     left: Vec<DVec3>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
+    /// The inverse of the matrix of all vertices moving alike, of the blocks approached last.
+    alike: DMat3,
     /// Products of the last solution.
     pub products: u32,
 }
@@ -27,13 +29,19 @@ pub(super) struct Gradients {
 impl Gradients {
     /// Moves `x` as a whole, which is all that a free fall needs; returns what that leaves of the right side of A x = `right`.
     pub fn approach(&mut self, blocks: &[Block], right: &[DVec3], x: &mut [DVec3]) -> &[DVec3] {
-        let Self { left, image, products, .. } = self;
+        let Self { left, image, alike, products, .. } = self;
         image.resize(x.len(), DVec3::ZERO);
+        *alike = together(blocks).inverse();
         measure(blocks, right, x, image, left);
-        shift(x, together(blocks).inverse(), left);
+        shift(x, *alike, left);
         measure(blocks, right, x, image, left);
         *products = 2;
         left
+    }
+
+    /// The velocity of all vertices alike that answers impulses on them in sum, m/s, by the blocks approached last.
+    pub fn answer_alike(&self, impulses: &[DVec3]) -> DVec3 {
+        self.alike * impulses.iter().sum::<DVec3>()
     }
 
     /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places.
@@ -48,10 +56,9 @@ impl Gradients {
         x: &mut [DVec3],
     ) -> Result<(), &'static str> {
         self.approach(blocks, right, x);
-        let Self { mobilities, left, direction, image, products } = self;
+        let Self { mobilities, left, direction, image, alike, products } = self;
         mobilities.clear();
         mobilities.extend(diagonal.iter().map(|at| blocks[*at as usize].value.inverse()));
-        let together = together(blocks).inverse();
         direction.clear();
         direction.resize(x.len(), DVec3::ZERO);
         let mut power = f64::INFINITY;
@@ -63,7 +70,7 @@ impl Gradients {
                 worst = worst.max(answer.abs().max_element());
             }
             if worst <= LEFT_M_S {
-                shift(x, together, left);
+                shift(x, *alike, left);
                 return if x.iter().all(|x| x.is_finite()) { Ok(()) } else { Err(NOT_POSITIVE) };
             }
             let kept = size / std::mem::replace(&mut power, size);
@@ -96,13 +103,13 @@ fn measure(blocks: &[Block], right: &[DVec3], x: &[DVec3], image: &mut [DVec3], 
 }
 
 /// Moves all vertices alike, so that what is `left` sums to nothing: momentum is kept to rounding.
-fn shift(x: &mut [DVec3], together: DMat3, left: &[DVec3]) {
-    let by = together * left.iter().sum::<DVec3>();
+fn shift(x: &mut [DVec3], alike: DMat3, left: &[DVec3]) {
+    let by = alike * left.iter().sum::<DVec3>();
     x.iter_mut().for_each(|x| *x += by);
 }
 
 /// The matrix of all vertices moving alike.
-pub(super) fn together(blocks: &[Block]) -> DMat3 {
+fn together(blocks: &[Block]) -> DMat3 {
     let of = |Block { row, column, value }: &Block| if row == column { *value } else { *value + value.transpose() };
     blocks.iter().map(of).fold(DMat3::ZERO, |sum, value| sum + value)
 }

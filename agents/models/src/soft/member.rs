@@ -42,12 +42,13 @@ struct Kept {
 }
 
 impl SoftBody {
-    /// Adds to each moving vertex of `to` the matching one of `v` times `factor`.
-    fn add_moving(&mut self, v: &[DVec3], factor: f64) {
-        let Self { system, positions, .. } = self;
+    /// Places all vertices where they are `t_s` seconds after the start of the step begun, by the velocities of those that move.
+    fn place_after(&mut self, v: &[DVec3], t_s: f64) {
+        let Self { system, positions, unknowns, .. } = self;
+        positions.clone_from(&unknowns.start);
         for (position, row) in positions.iter_mut().zip(system.rows()) {
             if let Some(row) = *row {
-                *position += v[row as usize] * factor;
+                *position += v[row as usize] * t_s;
             }
         }
     }
@@ -199,14 +200,12 @@ impl ClusterMember for SoftBody {
     }
 
     fn move_to(&mut self, v: &[DVec3], t_s: f64) {
-        self.positions.clone_from(&self.unknowns.start);
-        self.add_moving(v, t_s);
+        self.place_after(v, t_s);
         self.follow();
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
-        self.positions.clone_from(&self.unknowns.start);
-        self.add_moving(v, h_s);
+        self.place_after(v, h_s);
         let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
         if !finite {
             self.positions.clone_from(&self.unknowns.start);

@@ -3,7 +3,7 @@
 //! In: the contributions of each element, always in the same order. Out: velocities. Never here: the elements themselves.
 //! Theory: docs/theory/soft.md, eq. 1, 2, 4.
 
-use super::gradients::{Gradients, together};
+use super::gradients::Gradients;
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
@@ -211,11 +211,7 @@ impl System {
 
     /// The velocity of all moving vertices alike that answers impulses on them in sum, m/s; zero for none.
     pub fn together(&self, impulses: &[DVec3]) -> DVec3 {
-        if impulses.is_empty() {
-            DVec3::ZERO
-        } else {
-            together(&self.blocks).inverse() * impulses.iter().sum::<DVec3>()
-        }
+        if impulses.is_empty() { DVec3::ZERO } else { self.gradients.answer_alike(impulses) }
     }
 
     /// The factor of the last solution, where it was made by one.

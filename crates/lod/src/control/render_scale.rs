@@ -199,7 +199,7 @@ impl RenderScale {
 
     /// Gives all pixels back, and starts anew: others choose now.
     pub fn release(&mut self) {
-        *self = Self { range: self.range, ..Self::new(self.bounds()) };
+        *self = Self::new(self.bounds());
     }
 
     /// Whether there is nothing to choose.
