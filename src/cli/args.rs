@@ -41,6 +41,13 @@ Examples:
   metachron check my.toml other.toml
   metachron check --json my.toml | jq '.[].problems'";
 
+#[cfg(feature = "render")]
+const CALIBRATE_EXAMPLES: &str = "\
+Examples:
+  metachron calibrate                                  the table, measured once and kept
+  metachron calibrate --renew                          measured anew, on a quiet machine
+  metachron calibrate --export prices.json             for another user of this machine";
+
 const GENERATE_EXAMPLES: &str = "\
 Examples:
   metachron generate auditorium                        the built-in scene, on standard output
@@ -84,6 +91,10 @@ pub enum Command {
     #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
+    /// Show what drawing costs on this machine's adapter, as policies reckon with it; measure it anew, write it to a file, or read it
+    #[cfg(feature = "render")]
+    #[command(after_help = CALIBRATE_EXAMPLES)]
+    Calibrate(CalibrateArgs),
     /// Write a scene of the papers' experiments as a scene file, with a seed and options
     #[command(after_help = GENERATE_EXAMPLES)]
     Generate(GenerateArgs),
@@ -101,6 +112,27 @@ pub enum Command {
         /// A command, such as `run`
         command: Option<String>,
     },
+}
+
+/// `calibrate`.
+#[cfg(feature = "render")]
+#[derive(Debug, Args)]
+pub struct CalibrateArgs {
+    /// Forget what is known and measure anew
+    #[arg(long, conflicts_with = "import")]
+    pub renew: bool,
+    /// Write the table to this file
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub export: Option<PathBuf>,
+    /// Take the table from this file, which was measured on the same adapter by the same version
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub import: Option<PathBuf>,
+    /// Print the table as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Overwrite an existing file
+    #[arg(long, requires = "export")]
+    pub force: bool,
 }
 
 /// `generate`.

@@ -3,6 +3,8 @@
 //! In: arguments and environment. Out: data on standard output, messages on standard error, requested files.
 //! Never here: physics, drawing, the format of scenes.
 mod args;
+#[cfg(feature = "render")]
+mod calibrate;
 mod check;
 mod describe;
 mod generate;
@@ -43,6 +45,8 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         Command::Tune(args) => metachron_lab::tune(&args),
         #[cfg(feature = "lab")]
         Command::Fit(args) => metachron_lab::fit(&args),
+        #[cfg(feature = "render")]
+        Command::Calibrate(args) => calibrate::command(&args),
         Command::Generate(args) => generate::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),

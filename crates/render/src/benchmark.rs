@@ -1,8 +1,11 @@
 //! Benchmark of a GPU adapter: drawing times of pictures of many equal balls, by triangles, covered pixels and shading (FS93, §4; RH05,
 //! §4.1).
 //!
-//! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one or two seconds on a software rasteriser
+//! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one to three seconds on a software rasteriser
 //! (CPU); no picture is begun after three seconds, the rest is left for the next run.
+//!
+//! All pictures are drawn once, then all once more in another order, and so on: what slows the machine down for a while slows no kind of
+//! picture more than another, and the median of a picture's times does not see it.
 
 use super::draw::RendererOptions;
 use super::level::{Level, Shading};
@@ -31,7 +34,7 @@ pub struct Drawn {
     pub pixels: f64,
     /// Shading of the objects.
     pub shading: Shading,
-    /// Median of a few drawing times, seconds.
+    /// Median of its drawing times, seconds.
     pub seconds: f64,
 }
 
@@ -55,10 +58,10 @@ const LEAST_PX: f64 = 100.0;
 const NUMBERS: usize = 2;
 /// No picture is begun later than this after the first; the pictures measured until then are returned.
 const LONGEST: Duration = Duration::from_secs(3);
-/// Drawings of each picture after the first one, which makes meshes and buffers …
-const DRAWINGS: usize = 5;
-/// … or as many as fit into this time: a fiftieth of the whole, as there are about fifty pictures.
-const PICTURE: Duration = Duration::from_millis(60);
+/// Drawings of a picture in a round, after a first one, which makes meshes and buffers …
+const DRAWINGS: usize = 2;
+/// … and most rounds.
+const ROUNDS: usize = 4;
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
 /// Equal balls: shading, requested triangles and covered pixels of each.
@@ -76,7 +79,7 @@ enum TestPicture {
     Balls(Balls),
 }
 
-/// All pictures in drawing order: balls whose triangles cover the least and the greatest area come first.
+/// All pictures: balls whose triangles cover the least and the greatest area come first.
 fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
     let of = |area_px| {
         numbers(area_px).flat_map(|(triangles, pixels)| {
@@ -85,6 +88,17 @@ fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
     };
     let empty = EMPTY.map(|size| (size, 1.0)).into_iter().chain([ENLARGED]);
     empty.map(|(size, scale)| TestPicture::Empty(size, scale)).chain(ends_first(areas_px).flat_map(of)).collect()
+}
+
+/// The numbers below `count` in an order that depends on the round alone (Fisher and Yates; a multiplicative generator).
+fn order(count: usize, round: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..count).collect();
+    let mut state = 2 * round as u64 + 1;
+    for left in (2..=count).rev() {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        all.swap(left - 1, (state >> 33) as usize % left);
+    }
+    all
 }
 
 /// The fraction of all pictures still to be measured when `known` are done, 0 … 1.
@@ -108,32 +122,59 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
     for shading in SHADINGS {
         measure(&mut screen, &ball, Balls { shading, triangles: TRIANGLES[0], pixels: SQUARES[0].1 })?;
     }
-    let (begun, mut drawn) = (Instant::now(), Vec::new());
-    for wanted in test_pictures(areas_px).into_iter().skip(known) {
-        if begun.elapsed() > LONGEST {
-            break;
-        }
-        drawn.push(match wanted {
-            TestPicture::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
-            TestPicture::Empty(size, scale) => {
-                screen = screen.resized(size)?;
-                let found = empty(&mut screen, scale)?;
-                screen = screen.resized(SIZE)?;
-                found
+    let begun = Instant::now();
+    let wanted: Vec<_> = test_pictures(areas_px).into_iter().skip(known).collect();
+    let mut measured: Vec<Option<Timed>> = vec![None; wanted.len()];
+    'rounds: for round in 0..ROUNDS {
+        // the first round goes from the most telling pictures on: it may be all that there is time for
+        let first = || (0..wanted.len()).collect();
+        for at in if round == 0 { first() } else { order(wanted.len(), round) } {
+            if begun.elapsed() > LONGEST {
+                break 'rounds;
             }
-        });
+            let timed = match wanted[at] {
+                TestPicture::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
+                TestPicture::Empty(size, scale) => {
+                    screen = screen.resized(size)?;
+                    let timed = empty(&mut screen, scale)?;
+                    screen = screen.resized(SIZE)?;
+                    timed
+                }
+            };
+            match &mut measured[at] {
+                Some(before) => before.times_s.extend(timed.times_s),
+                unmeasured => *unmeasured = Some(timed),
+            }
+        }
     }
-    Ok(drawn)
+    Ok(measured.into_iter().map_while(|timed| timed.map(Timed::median)).collect())
+}
+
+/// A picture, and the times that it took.
+#[derive(Debug, Clone)]
+struct Timed {
+    /// What was drawn; its time is not known yet.
+    drawn: Drawn,
+    times_s: Vec<f64>,
+}
+
+impl Timed {
+    /// The picture with the middle of its times.
+    fn median(mut self) -> Drawn {
+        self.times_s.sort_by(f64::total_cmp);
+        Drawn { seconds: self.times_s[self.times_s.len() / 2], ..self.drawn }
+    }
 }
 
 /// A picture without an object.
-fn empty(screen: &mut Offscreen, scale: f64) -> Result<Drawn, GpuError> {
+fn empty(screen: &mut Offscreen, scale: f64) -> Result<Timed, GpuError> {
     let mut nothing = SceneView::new(Vec::new(), Vec::new());
     nothing.set_scale(scale);
-    let seconds = median(screen, &mut nothing, 1.0, &[])?;
+    let times_s = times(screen, &mut nothing, 1.0, &[])?;
     let (shown, shading) = (screen.size(), Shading::PerPixel);
     let (picture_px, enlarged_px) = (shown.scaled(scale).pixels(), if scale < 1.0 { shown.pixels() } else { 0.0 });
-    Ok(Drawn { picture_px, enlarged_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
+    let drawn = Drawn { picture_px, enlarged_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds: 0.0 };
+    Ok(Timed { drawn, times_s })
 }
 
 /// The first, the last, the second, the last but one and so on: the pictures measured until time runs out span the whole range.
@@ -148,7 +189,7 @@ fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
     covers.filter(|(_, pixels)| (LEAST_PX..=SQUARES[SQUARES.len() - 1].1).contains(pixels)).take(NUMBERS)
 }
 
-fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -> Result<Drawn, GpuError> {
+fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -> Result<Timed, GpuError> {
     let Balls { shading, triangles, pixels } = wanted;
     let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
     let mut scene_view = balls(ball, side, shading == Shading::Textured);
@@ -156,11 +197,12 @@ fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -
     let level = Level { shading, triangles: cut, ..Resolution { eps_m: 1.0, n: 0 }.into() };
     // covered pixels are measured at 1 m; from there they fall with the square of the distance
     let distance_m = (seen_pixels(&mut scene_view, 1.0) / (pixels / f64::from(triangles) * f64::from(cut))).sqrt();
-    let seconds = median(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
+    let times_s = times(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
     let pixels = seen_pixels(&mut scene_view, distance_m);
     let polygons = f64::from(cut);
     let picture_px = SIZE.pixels();
-    Ok(Drawn { picture_px, enlarged_px: 0.0, objects: side * side, polygons, pixels, shading, seconds })
+    let drawn = Drawn { picture_px, enlarged_px: 0.0, objects: side * side, polygons, pixels, shading, seconds: 0.0 };
+    Ok(Timed { drawn, times_s })
 }
 
 /// Pixels that the first ball covers.
@@ -169,13 +211,14 @@ fn seen_pixels(scene_view: &mut SceneView, distance_m: f64) -> f64 {
     scene_view.seen().first().map_or(0.0, |seen| seen.pixels)
 }
 
-fn median(
+/// Times of [`DRAWINGS`] pictures, seconds, after one that makes what they are made of.
+fn times(
     screen: &mut Offscreen,
     scene_view: &mut SceneView,
     distance_m: f64,
     levels: &[Level],
-) -> Result<f64, GpuError> {
-    let (camera, mut times) = (camera(distance_m), Vec::with_capacity(DRAWINGS));
+) -> Result<Vec<f64>, GpuError> {
+    let camera = camera(distance_m);
     let mut draw = || -> Result<f64, GpuError> {
         let started = Instant::now();
         scene_view.survey(&camera, screen.size());
@@ -183,12 +226,7 @@ fn median(
         Ok(started.elapsed().as_secs_f64())
     };
     draw()?;
-    let begun = Instant::now();
-    while times.is_empty() || times.len() < DRAWINGS && begun.elapsed() < PICTURE {
-        times.push(draw()?);
-    }
-    times.sort_by(f64::total_cmp);
-    Ok(times[times.len() / 2])
+    (0..DRAWINGS).map(|_| draw()).collect()
 }
 
 fn camera(distance_m: f64) -> Camera {
@@ -230,6 +268,21 @@ mod tests {
         assert_eq!(all[3], TestPicture::Empty(ENLARGED.0, ENLARGED.1));
         assert!(all.len() > 20 && all[4..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
         assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn every_round_has_all_pictures_in_an_order_of_its_own() {
+        let rounds: Vec<_> = (1..4).map(|round| order(55, round)).collect();
+        for (k, round) in rounds.iter().enumerate() {
+            let mut sorted = round.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..55).collect::<Vec<_>>());
+            // what follows each other in one round does not in another
+            let pairs = |of: &[usize]| of.windows(2).map(|pair| (pair[0], pair[1])).collect::<Vec<_>>();
+            let same =
+                rounds[..k].iter().flat_map(|other| pairs(other)).filter(|pair| pairs(round).contains(pair)).count();
+            assert!(same < 6, "{same} pairs of round {k}");
+        }
     }
 
     #[test]

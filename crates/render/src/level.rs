@@ -14,7 +14,7 @@ pub enum Shading {
     /// Lit per pixel.
     #[default]
     PerPixel,
-    /// Lit per pixel with the texture; an object without a texture is drawn as [`Shading::PerPixel`].
+    /// Lit per pixel with the texture, or that of tissue; an object without one is drawn as [`Shading::PerPixel`].
     Textured,
     /// Reference quality above what policies request: texture, soft-edged shadows, ambient occlusion at corners.
     Shadowed,

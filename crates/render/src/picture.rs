@@ -194,6 +194,8 @@ pub struct Picture {
     pub style: Style,
     /// Width and height to draw it with as a fraction of the target's, > 0, at most 1; below 1 it is enlarged to the target.
     pub scale: f64,
+    /// Whether objects throw shadows, where the light does.
+    pub shadows: bool,
     /// All tubes' samples.
     pub samples: Vec<SkinSample>,
     /// The tubes, sorted by level.
@@ -224,6 +226,7 @@ impl Default for Picture {
             environment: Environment::default(),
             style: Style::default(),
             scale: 1.0,
+            shadows: true,
             samples: Vec::new(),
             tubes: Vec::new(),
             instances: Vec::new(),

@@ -252,6 +252,11 @@ impl SceneView {
         self.picture.scale = if scale > 0.0 { scale.min(1.0) } else { 1.0 };
     }
 
+    /// Chooses whether objects throw shadows from the next picture on: [`Picture::shadows`].
+    pub fn set_shadows(&mut self, shadows: bool) {
+        self.picture.shadows = shadows;
+    }
+
     /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
     /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
     pub fn set_snapshot(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {

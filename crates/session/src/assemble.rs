@@ -254,14 +254,15 @@ fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {
     }
 }
 
-/// The cheapest and the best allowed shading of an object without a texture.
-const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
+/// The cheapest and the best allowed shading of an object without a picture on it; tissue has a texture of its own.
+fn shading(appearance: &metachron_world::Appearance) -> (control::Shading, control::Shading) {
     use control::Shading::{Flat, Gouraud, PerPixel, Textured};
-    match kind {
+    match appearance.shading {
         ShadingKind::Flat => (Flat, Flat),
         ShadingKind::Gouraud => (Gouraud, Gouraud),
         ShadingKind::PerPixel => (PerPixel, PerPixel),
         ShadingKind::Textured => (Textured, Textured),
+        ShadingKind::Any if appearance.material == kinds::Material::Tissue => (Flat, Textured),
         ShadingKind::Any => (Flat, PerPixel),
     }
 }
@@ -284,7 +285,7 @@ fn view_of(
         id: seen.id,
         kind,
         range,
-        shading: shading(appearance.shading),
+        shading: shading(appearance),
         pixels: seen.pixels,
         distance_m: seen.distance_m,
         speed_px_s: seen.speed_px_s,

@@ -3,24 +3,32 @@
 //! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the renderer has it).
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
-use metachron_lod::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};
-use metachron_render::{Drawn, Gpu, RendererOptions};
+use metachron_lod::control::{AREAS_PX, Areas, Measured, Misses, Prices, Shading, Stages};
+use metachron_render::{Drawn, Gpu, GpuError, RendererOptions};
 use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Version of the cache files; changes whenever the benchmark or the renderer that it measures changes.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// Kinds of cache files: finished prices, and measured pictures that are still too few for prices.
 const DRAWING: &str = "drawing";
 const PARTIAL: &str = "begun";
 
-/// A file of the cache.
+/// The version of any file of the cache.
+#[derive(Deserialize)]
+struct Version {
+    version: u32,
+}
+
+/// A file of the cache, seconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct CachedPrices {
     version: u32,
     adapter: String,
+    /// Relative errors: of half of the pictures, of 19 of 20.
+    misses: [f64; 2],
     frame_s: f64,
     pixel_s: f64,
     enlarge_s: f64,
@@ -39,36 +47,145 @@ struct PartialBenchmark {
     pictures: Vec<[f64; 7]>,
 }
 
-/// Prices of the adapter of this name: from the cache, else measured on the device that `open` returns, and stored; `None` if there is no
-/// such device or it cannot be measured. If a slow adapter leaves too few measurements for prices, the next run continues from them. `report`
-/// receives a line if anything is measured.
+/// What drawing costs on an adapter, and how well that is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PriceTable {
+    /// The adapter, as [`Gpu::describe`] names it.
+    pub adapter: String,
+    /// The prices.
+    pub prices: Prices,
+    /// Relative errors by which they miss the pictures that they were fitted to.
+    pub misses: Misses,
+}
+
+/// Why a file is no table of prices for this adapter.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// It is not what [`PriceTable::export`] writes.
+    #[error("expected a table of prices as `metachron calibrate --export` writes it: {0}")]
+    NoTable(String),
+    /// It was measured by another version of the program.
+    #[error(
+        "the table is of version {found}, this program measures version {expected}: measure anew by `metachron calibrate --renew`"
+    )]
+    Version {
+        /// The version in the file.
+        found: u32,
+        /// The version of this program.
+        expected: u32,
+    },
+    /// It was measured on another adapter.
+    #[error("the table is of the adapter `{found}`, pictures are drawn by `{expected}` here")]
+    Adapter {
+        /// The adapter in the file.
+        found: String,
+        /// The adapter here.
+        expected: String,
+    },
+    /// A price cannot be.
+    #[error("a price is negative or no number")]
+    BadPrice,
+}
+
+/// Why prices could not be measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrateError {
+    /// The adapter failed.
+    #[error(transparent)]
+    Draw(#[from] GpuError),
+    /// There was no time for all pictures: what was measured is kept, and the next measurement goes on from it.
+    #[error("{0:.0} % of the pictures could not be drawn within three seconds; the next run goes on with them")]
+    Unfinished(f64),
+    /// No prices fit the pictures; they are forgotten.
+    #[error("no prices fit what was measured, which other programs may have disturbed; the next run measures anew")]
+    NoFit,
+}
+
+/// Prices of the adapter of this name: those that are known, else measured on the device that `open` returns; `None` if there is no such
+/// device or it cannot be measured. `report` receives a line if anything is measured.
 pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: fn(&str)) -> Option<Prices> {
-    let folder = folder();
-    if let Some(known) = folder.as_deref().and_then(|folder| read(folder, adapter)) {
-        return Some(known);
+    if let Some(known) = PriceTable::known(adapter) {
+        return Some(known.prices);
     }
     let gpu = &open().filter(|gpu| gpu.describe() == adapter)?;
-    let mut pictures = folder.as_deref().map_or_else(Vec::new, |folder| read_partial(folder, adapter));
-    let left_s = LONGEST_S * metachron_render::benchmark_left(&AREAS_PX, pictures.len());
-    report(&format!("measuring the drawing costs of this adapter, once (about {:.0} s)", left_s.max(1.0)));
-    let options = RendererOptions::for_adapter(&gpu.info);
-    let drawn = metachron_render::benchmark(gpu, options, &AREAS_PX, pictures.len()).ok()?;
-    pictures.extend(drawn.iter().map(measured));
-    let prices = Prices::fitted(&pictures);
-    match (folder, &prices) {
-        (Some(folder), Some(prices)) => {
-            store(&folder, adapter, prices);
-            // the partial measurement is no longer needed
-            let _ = std::fs::remove_file(file(&folder, adapter, PARTIAL));
-        }
-        // all pictures are there and no prices fit them: measured anew next time
-        (Some(folder), None) if metachron_render::benchmark_left(&AREAS_PX, pictures.len()) == 0.0 => {
-            let _ = std::fs::remove_file(file(&folder, adapter, PARTIAL));
-        }
-        (Some(folder), None) => store_partial(&folder, adapter, &pictures),
-        (None, _) => {}
+    PriceTable::measure(gpu, report).ok().map(|table| table.prices)
+}
+
+impl PriceTable {
+    /// The table of the adapter of this name in this user's cache.
+    #[must_use]
+    pub fn known(adapter: &str) -> Option<Self> {
+        read(&folder()?, adapter)
     }
-    prices
+
+    /// Measures an adapter and stores the table. If a slow adapter leaves too few measurements for prices, the next call goes on from
+    /// them; measurements that no prices fit are forgotten. `report` receives a line before.
+    ///
+    /// # Errors
+    /// [`CalibrateError`]; no table is stored then.
+    pub fn measure(gpu: &Gpu, report: fn(&str)) -> Result<Self, CalibrateError> {
+        let (folder, adapter) = (folder(), gpu.describe());
+        let mut pictures = folder.as_deref().map_or_else(Vec::new, |folder| read_partial(folder, &adapter));
+        let left_s = LONGEST_S * metachron_render::benchmark_left(&AREAS_PX, pictures.len());
+        report(&format!("measuring the drawing costs of this adapter, once (about {:.0} s)", left_s.max(1.0)));
+        let options = RendererOptions::for_adapter(&gpu.info);
+        let drawn = metachron_render::benchmark(gpu, options, &AREAS_PX, pictures.len())?;
+        pictures.extend(drawn.iter().map(measured));
+        let left = metachron_render::benchmark_left(&AREAS_PX, pictures.len());
+        let forget = || folder.as_deref().map(|folder| std::fs::remove_file(file(folder, &adapter, PARTIAL)));
+        let Some(prices) = Prices::fitted(&pictures) else {
+            if left == 0.0 {
+                // all pictures are there and no prices fit them
+                forget();
+                return Err(CalibrateError::NoFit);
+            }
+            folder.iter().for_each(|folder| store_partial(folder, &adapter, &pictures));
+            return Err(CalibrateError::Unfinished(100.0 * left));
+        };
+        forget();
+        let table = Self { misses: prices.misses(&pictures), prices, adapter };
+        table.store();
+        Ok(table)
+    }
+
+    /// Stores the table in this user's cache; if that fails the adapter is measured again in the next run.
+    pub fn store(&self) {
+        folder().iter().for_each(|folder| store(folder, self));
+    }
+
+    /// Forgets what is known of the adapter of this name, and what was measured of it.
+    pub fn forget(adapter: &str) {
+        for what in [DRAWING, PARTIAL] {
+            // what is not there is forgotten already
+            let _ = folder().map(|folder| std::fs::remove_file(file(&folder, adapter, what)));
+        }
+    }
+
+    /// The table as a file.
+    #[must_use]
+    pub fn export(&self) -> String {
+        // numbers and strings alone: nothing that could not be written
+        serde_json::to_string_pretty(&CachedPrices::of(self)).unwrap_or_default() + "\n"
+    }
+
+    /// The table that a file holds, for the adapter of this name.
+    ///
+    /// # Errors
+    /// [`ImportError`].
+    pub fn import(text: &[u8], adapter: &str) -> Result<Self, ImportError> {
+        let no_table = |why: serde_json::Error| ImportError::NoTable(why.to_string());
+        let Version { version: found } = serde_json::from_slice(text).map_err(no_table)?;
+        if found != VERSION {
+            return Err(ImportError::Version { found, expected: VERSION });
+        }
+        let cached: CachedPrices = serde_json::from_slice(text).map_err(no_table)?;
+        if cached.adapter != adapter {
+            return Err(ImportError::Adapter { found: cached.adapter, expected: adapter.to_owned() });
+        }
+        cached.table().ok_or(ImportError::BadPrice)
+    }
 }
 
 /// Longest duration of the measurement, seconds.
@@ -99,26 +216,36 @@ fn file(folder: &Path, adapter: &str, what: &str) -> PathBuf {
     folder.join(format!("{what}-{:016x}.json", hasher.finish()))
 }
 
-fn read(folder: &Path, adapter: &str) -> Option<Prices> {
-    let cached: CachedPrices = serde_json::from_slice(&std::fs::read(file(folder, adapter, DRAWING)).ok()?).ok()?;
-    let CachedPrices { frame_s, pixel_s, enlarge_s, .. } = cached;
-    let all = [frame_s, pixel_s, enlarge_s].into_iter().chain(cached.shading.into_iter().flatten());
-    let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
-    let stages = |[setup, polygon, vertex, pixel, serial]: [f64; 5]| Stages { setup, polygon, vertex, pixel, serial };
-    let areas = cached.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
-    let sound = sound && areas.iter().flatten().all(Areas::is_sound);
-    let prices = Prices { frame_s, pixel_s, enlarge_s, shading: cached.shading.map(stages), areas };
-    (sound && cached.version == VERSION && cached.adapter == adapter).then_some(prices)
+fn read(folder: &Path, adapter: &str) -> Option<PriceTable> {
+    PriceTable::import(&std::fs::read(file(folder, adapter, DRAWING)).ok()?, adapter).ok()
 }
 
-/// Stores the prices; if that fails they are measured again in the next run.
-fn store(folder: &Path, adapter: &str, prices: &Prices) {
-    let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel, s.serial];
-    let Prices { frame_s, pixel_s, enlarge_s, shading, areas } = *prices;
-    let (adapter_name, shading) = (adapter.to_owned(), shading.map(stages));
-    let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
-    let cached = CachedPrices { version: VERSION, adapter: adapter_name, frame_s, pixel_s, enlarge_s, shading, areas };
-    write(&file(folder, adapter, DRAWING), &cached);
+fn store(folder: &Path, table: &PriceTable) {
+    write(&file(folder, &table.adapter, DRAWING), &CachedPrices::of(table));
+}
+
+impl CachedPrices {
+    fn of(table: &PriceTable) -> Self {
+        let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel, s.serial];
+        let PriceTable { adapter, misses: Misses { half, most }, prices } = table;
+        let Prices { frame_s, pixel_s, enlarge_s, shading, areas } = *prices;
+        let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
+        let (adapter, misses, shading) = (adapter.clone(), [*half, *most], shading.map(stages));
+        Self { version: VERSION, adapter, misses, frame_s, pixel_s, enlarge_s, shading, areas }
+    }
+
+    /// The table; `None` with a price that cannot be.
+    fn table(self) -> Option<PriceTable> {
+        let Self { frame_s, pixel_s, enlarge_s, misses: [half, most], .. } = self;
+        let all = [frame_s, pixel_s, enlarge_s, half, most].into_iter().chain(self.shading.into_iter().flatten());
+        let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
+        let stages =
+            |[setup, polygon, vertex, pixel, serial]: [f64; 5]| Stages { setup, polygon, vertex, pixel, serial };
+        let areas = self.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
+        let sound = sound && areas.iter().flatten().all(Areas::is_sound);
+        let prices = Prices { frame_s, pixel_s, enlarge_s, shading: self.shading.map(stages), areas };
+        sound.then_some(PriceTable { adapter: self.adapter, prices, misses: Misses { half, most } })
+    }
 }
 
 /// The pictures measured so far, up to the first invalid one.
@@ -189,9 +316,13 @@ mod tests {
         let mut prices = Prices::default();
         prices.shading[1].vertex = 1.25e-7;
         prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
+        let table = PriceTable { adapter: "one".to_owned(), prices, misses: Misses { half: 0.03, most: 0.2 } };
+        let stored = |table: &PriceTable| {
+            store(folder.path(), table);
+            read(folder.path(), "one")
+        };
         assert_eq!(read(folder.path(), "one"), None);
-        store(folder.path(), "one", &prices);
-        assert_eq!(read(folder.path(), "one"), Some(prices));
+        assert_eq!(stored(&table), Some(table.clone()));
         assert_eq!(read(folder.path(), "two"), None);
         // another adapter's file under this one's name
         std::fs::copy(file(folder.path(), "one", DRAWING), file(folder.path(), "two", DRAWING)).unwrap();
@@ -200,10 +331,25 @@ mod tests {
             std::fs::write(file(folder.path(), "one", DRAWING), text).unwrap();
             assert_eq!(read(folder.path(), "one"), None, "{text}");
         }
-        store(folder.path(), "one", &Prices { frame_s: -1.0, ..prices });
-        assert_eq!(read(folder.path(), "one"), None, "a price below nothing");
+        let with = |prices: Prices| PriceTable { prices, ..table.clone() };
+        assert_eq!(stored(&with(Prices { frame_s: -1.0, ..prices })), None, "a price below nothing");
         let areas = prices.areas.map(|areas| areas.map(|a| Areas { setup: -1.0, ..a }));
-        store(folder.path(), "one", &Prices { areas, ..prices });
-        assert_eq!(read(folder.path(), "one"), None, "one by area below nothing");
+        assert_eq!(stored(&with(Prices { areas, ..prices })), None, "one by area below nothing");
+    }
+
+    #[test]
+    fn a_table_is_taken_on_its_own_adapter_and_by_its_own_version_alone() {
+        let prices = Prices::default();
+        let table = PriceTable { adapter: "one".to_owned(), prices, misses: Misses::default() };
+        let text = table.export();
+        assert_eq!(PriceTable::import(text.as_bytes(), "one"), Ok(table));
+        let refused = |text: &str, adapter: &str| PriceTable::import(text.as_bytes(), adapter).unwrap_err().to_string();
+        assert!(refused(&text, "two").contains("of the adapter `one`, pictures are drawn by `two`"));
+        let older = text.replace(&format!("\"version\": {VERSION}"), "\"version\": 3");
+        assert!(refused(&older, "one").contains("version 3"), "{}", refused(&older, "one"));
+        assert!(refused(&text.replace("0.0014", "-0.0014"), "one").contains("negative"));
+        for text in ["", "[]", "{}", &text[..text.len() / 2]] {
+            assert!(refused(text, "one").contains("expected a table of prices"), "{text}");
+        }
     }
 }

@@ -54,6 +54,8 @@ pub struct FrameRecord {
     pub n: f64,
     /// Fraction of its width and height that the picture was drawn with.
     pub render_scale: f64,
+    /// Whether objects threw shadows in it, where the light does.
+    pub shadows: bool,
 }
 
 /// A probe's point at the end of the run.

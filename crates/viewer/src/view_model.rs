@@ -113,6 +113,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     status.clamp = session.clamp();
     status.triangles = session.picture().triangles();
     status.render_scale = session.picture().scale;
+    status.shadows = session.picture().shadows;
     status.shares = shares(session, meter);
     fill_couplings(status, session);
     status.energy_j = 0.0;

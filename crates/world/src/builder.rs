@@ -352,12 +352,8 @@ impl SceneBuilder {
 }
 
 /// Appearance of parts that declare none.
-const DEFAULT_APPEARANCE: Appearance = Appearance {
-    colour: [200, 160, 150],
-    material: Material::Plastic,
-    importance: 1.0,
-    shading: ShadingKind::PerPixel,
-};
+const DEFAULT_APPEARANCE: Appearance =
+    Appearance { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::Any };
 
 fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {

@@ -213,11 +213,11 @@ pub enum ShadingKind {
     /// Colours at vertices, interpolated between them.
     Gouraud,
     /// Lighting at every pixel.
-    #[default]
     PerPixel,
-    /// Lighting at every pixel of a textured surface; the default of a mesh with a `texture`.
+    /// Lighting at every pixel of a textured surface: tissue, or a mesh with a `texture`.
     Textured,
-    /// Any of them, as the policy chooses.
+    /// Any of them, as the policy chooses; the best of them where it does not.
+    #[default]
     Any,
 }
 

@@ -21,7 +21,7 @@ fn the_rows_of_frames_are_one_a_frame_with_the_documented_columns() {
     let text = std::fs::read_to_string(path).unwrap();
     let mut rows = text.lines();
     let columns = "frame,sim_s,frame_ms,gpu_ms,interval_ms,full_ms,triangles,objects,cull_ms,select_ms,draw_ms,lag_ms,\
-                   predicted_ms,value_over_bound,changes,reversals,holes,eps,n,render_scale";
+                   predicted_ms,value_over_bound,changes,reversals,holes,eps,n,render_scale,shadows";
     assert_eq!(rows.next(), Some(columns));
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert_eq!(rows.len(), 7);

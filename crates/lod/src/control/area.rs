@@ -34,6 +34,13 @@ impl Areas {
         self.setup + polygons * price
     }
 
+    /// The same prices where every triangle is drawn once and not, for a shadow map that covers next to nothing, once more.
+    #[must_use]
+    pub fn drawn_once(self) -> Self {
+        let once = 0.5 * self.polygon[0];
+        Self { polygon: self.polygon.map(|price| price - once), ..self }
+    }
+
     /// Prices from measured objects (triangles, pixels, seconds); `None` if the least or the greatest area is missing, or if no area was
     /// measured with two numbers of triangles, which determine the setup.
     #[must_use]

@@ -36,7 +36,7 @@ pub use level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
 pub use picture::PictureControl;
 pub use plan::{FrameWork, LevelDemand, Plan, detail};
 pub use policy::{Law, Policy};
-pub use price::{Backdrop, Measured, Prices};
+pub use price::{Backdrop, Measured, Misses, Prices};
 pub use query::Promise;
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure};
 pub use status::Status;

@@ -146,7 +146,7 @@ impl PictureControl {
             Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
-                let drawn_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
+                let drawn_s = (drawn_s - self.picture_prices().backdrop_s(self.backdrop)).max(0.0);
                 self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
             }
             _ => {}
@@ -195,14 +195,14 @@ impl PictureControl {
     }
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
-        let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.policy.prices(&self.prices));
+        let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
         self.ladders.update(&self.views, raised, &prices, &self.sliders);
         self.groups.update(&self.views);
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
         let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
         self.others_s = self.reserve_s + kept_s;
-        let fixed_s = self.prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
+        let fixed_s = prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
         if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }

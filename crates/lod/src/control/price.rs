@@ -7,7 +7,7 @@
 use super::area::Areas;
 use super::plan::LevelDemand;
 use super::view::{ObjectView, Shading};
-use crate::cost::fit::{BETTER, SERIAL, Sample, fit};
+use crate::cost::fit::{BETTER, SERIAL, Sample, fit, quantile};
 use crate::cost::stages::{Stages, Work};
 
 /// Vertices of a closed mesh per triangle (Euler: half as many and two more).
@@ -48,6 +48,15 @@ pub struct Measured {
     pub shading: Shading,
     /// Measured time of the picture.
     pub seconds: f64,
+}
+
+/// Relative errors of predicted times.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Misses {
+    /// Half of the pictures are nearer than this fraction of their time.
+    pub half: f64,
+    /// 19 of 20 are.
+    pub most: f64,
 }
 
 /// The part of a picture that is independent of the choice.
@@ -97,6 +106,16 @@ impl Prices {
         Self { areas: None, ..self }
     }
 
+    /// The same prices for pictures with shadows, as which they are measured, or without: the shadow map draws every triangle once more.
+    #[must_use]
+    pub fn with_shadows(self, shadows: bool) -> Self {
+        if shadows {
+            return self;
+        }
+        let once = |s: Stages| Stages { polygon: 0.5 * s.polygon, vertex: 0.5 * s.vertex, ..s };
+        Self { shading: self.shading.map(once), areas: self.areas.map(|areas| areas.map(Areas::drawn_once)), ..self }
+    }
+
     /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, one enlarged, and for each shading
     /// eight pictures of objects.
     #[must_use]
@@ -124,6 +143,14 @@ impl Prices {
             Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
         let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
         Some(Self { frame_s, pixel_s, enlarge_s, shading, areas: areas() })
+    }
+
+    /// How far these prices are from measured pictures.
+    #[must_use]
+    pub fn misses(&self, pictures: &[Measured]) -> Misses {
+        let miss = |picture: &Measured| (self.predict_s(picture) / picture.seconds - 1.0).abs();
+        let all = || pictures.iter().filter(|picture| picture.seconds > 0.0).map(miss);
+        Misses { half: quantile(all(), 0.5), most: quantile(all(), 0.95) }
     }
 
     /// Predicted time of a measured picture, seconds.

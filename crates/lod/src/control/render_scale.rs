@@ -1,14 +1,39 @@
-//! The scale of the picture: how many of its pixels are drawn, where everything else is as coarse as it may be and frames are still late.
+//! The scale of the picture and its shadows: what of it is drawn, where everything else is as coarse as it may be and frames are still late.
 //!
-//! In: the time that a frame would have taken with all else at its coarsest, and what drawing it at another scale would take by the prices.
-//! Out: one of [`SCALES`]. Never here: levels of objects, drawing, enlarging. Theory: `docs/theory/control.md`, section 11.
+//! In: the time that a frame would have taken with all else at its coarsest, and what drawing it otherwise would take by the prices.
+//! Out: a [`PictureRung`]. Never here: levels of objects, drawing, enlarging. Theory: `docs/theory/control.md`, section 11.
 //!
 //! Pixels are the last to be taken and the first to be given back. What a scale saves is known from the prices, and its error is learnt from
 //! the time before and after each change; whether a frame is late is decided by the mean of the frames since the last change and its
 //! uncertainty, so that a machine that trembles does not move the picture.
 
 /// Fractions of the picture's width and height that can be drawn: steps of a twentieth, which are not seen.
-pub const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0];
+pub(super) const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0];
+
+/// Least fraction with which shadows are drawn: they are missed less than more pixels would be.
+const SHADOWED: f64 = 0.5;
+
+/// What is drawn of a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PictureRung {
+    /// Fraction of its width and height, one of [`SCALES`].
+    pub scale: f64,
+    /// Whether objects throw shadows.
+    pub shadows: bool,
+}
+
+/// From the least to the most: all scales of a range, without shadows up to half the width and height, with them from there on. What has
+/// one scale alone is fixed, with its shadows.
+fn rungs(range: (f64, f64)) -> Vec<PictureRung> {
+    let most = SCALES.iter().rposition(|scale| *scale <= range.1 + NEAR).unwrap_or(0);
+    let least = SCALES.iter().position(|scale| *scale >= range.0 - NEAR).map_or(most, |least| least.min(most));
+    let shadowed_from = SHADOWED.min(SCALES[most]);
+    let of = |shadows: bool| move |scale: &f64| PictureRung { scale: *scale, shadows };
+    let bare =
+        SCALES[least..most].iter().chain(&SCALES[most..=most]).filter(|scale| **scale <= shadowed_from && least < most);
+    let lit = SCALES[least..=most].iter().filter(|scale| **scale >= shadowed_from);
+    bare.map(of(false)).chain(lit.map(of(true))).collect()
+}
 
 /// Frames of the means, in seconds …
 const WINDOW_S: f64 = 1.0;
@@ -121,8 +146,8 @@ struct Change {
 /// Chooses the scale of every picture.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RenderScale {
-    /// Numbers of the least and the most of [`SCALES`] allowed.
-    range: (usize, usize),
+    /// From the least to the most; there is one at least.
+    rungs: Vec<PictureRung>,
     at: usize,
     /// Times of the frames at this scale, and of the newest that are unlike them.
     times: Times,
@@ -152,12 +177,10 @@ impl Default for RenderScale {
 impl RenderScale {
     /// A controller that stays inside `range`; at the scale below it where none lies inside.
     pub fn new(range: (f64, f64)) -> Self {
-        let most = SCALES.iter().rposition(|scale| *scale <= range.1 + NEAR).unwrap_or(0);
-        let least = SCALES.iter().position(|scale| *scale >= range.0 - NEAR).unwrap_or(most);
-        let range = (least.min(most), most);
+        let rungs = rungs(range);
         Self {
-            range,
-            at: range.1,
+            at: rungs.len() - 1,
+            rungs,
             times: Times::default(),
             unlike: Times::default(),
             odd: 0.0,
@@ -172,39 +195,39 @@ impl RenderScale {
         }
     }
 
-    /// The scale of the next picture.
-    pub fn scale(&self) -> f64 {
-        SCALES[self.at]
+    /// The next picture.
+    pub fn rung(&self) -> PictureRung {
+        self.rungs[self.at]
     }
 
-    /// Whether pixels are taken: what else there is may not take the time that they need.
+    /// Whether anything is taken of the picture: what else there is may not take the time that it needs.
     pub fn is_reduced(&self) -> bool {
-        self.at < self.range.1
+        self.at + 1 < self.rungs.len()
     }
 
-    /// The scale of a picture from which no pixels are taken.
-    pub fn most(&self) -> f64 {
-        SCALES[self.range.1]
+    /// A picture of which nothing is taken.
+    pub fn most(&self) -> PictureRung {
+        self.rungs[self.rungs.len() - 1]
     }
 
-    /// Whether pixels are taken, and frames are in time.
+    /// Whether something is taken, and frames are in time.
     pub fn helps(&self) -> bool {
         self.is_reduced() && !self.late
     }
 
-    /// The least and the most that it may be.
+    /// The least and the most that the scale may be.
     pub fn bounds(&self) -> (f64, f64) {
-        (SCALES[self.range.0], SCALES[self.range.1])
+        (self.rungs[0].scale, self.most().scale)
     }
 
-    /// Gives all pixels back, and starts anew: others choose now.
+    /// Gives all back, and starts anew: others choose now.
     pub fn release(&mut self) {
         *self = Self::new(self.bounds());
     }
 
     /// Whether there is nothing to choose.
     pub fn is_fixed(&self) -> bool {
-        self.range.0 == self.range.1
+        self.rungs.len() == 1
     }
 
     /// Forgets the frames at this scale: they were unlike those to come.
@@ -212,8 +235,8 @@ impl RenderScale {
         (self.times, self.unlike, self.odd, self.change) = (Times::default(), Times::default(), 0.0, None);
     }
 
-    /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture at a scale by the prices, with all else at its coarsest.
-    pub fn observe(&mut self, frame: ScaledFrame, priced_s: impl Fn(f64) -> f64) {
+    /// Takes a frame, and chooses. `priced_s` is the time of drawing the picture so by the prices, with all else at its coarsest.
+    pub fn observe(&mut self, frame: ScaledFrame, priced_s: impl Fn(PictureRung) -> f64) {
         let ScaledFrame { coarsest_s, draw_s, spent, set_s, period_s } = frame;
         let sound = [coarsest_s, draw_s, set_s, period_s].iter().all(|s| s.is_finite() && *s > 0.0);
         if self.is_fixed() || !sound {
@@ -262,19 +285,19 @@ impl RenderScale {
     }
 
     /// Goes to the largest scale that frames of `most_s` are predicted to be early with, were pixels a standard deviation dearer than is known.
-    fn give(&mut self, most_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
+    fn give(&mut self, most_s: f64, set_s: f64, priced_s: &impl Fn(PictureRung) -> f64) {
         let factor = self.factor + libm::sqrt(self.doubt);
         let early = |at: &usize| most_s + factor * self.priced_change_s(*at, priced_s) <= FIT * set_s;
-        if let Some(to) = (self.at + 1..=self.range.1).rev().find(early) {
+        if let Some(to) = (self.at + 1..self.rungs.len()).rev().find(early) {
             self.given_s = 0.0;
             self.go(to, priced_s);
         }
     }
 
     /// Goes to the largest scale that frames of `least_s` are predicted to be in time with; to the fastest if there is none.
-    fn take(&mut self, least_s: f64, set_s: f64, priced_s: &impl Fn(f64) -> f64) {
+    fn take(&mut self, least_s: f64, set_s: f64, priced_s: &impl Fn(PictureRung) -> f64) {
         let change_s = |at: usize| self.factor * self.priced_change_s(at, priced_s);
-        let smaller = (self.range.0..self.at).rev();
+        let smaller = (0..self.at).rev();
         let fits = smaller.clone().find(|at| least_s + change_s(*at) <= FIT * set_s);
         let fastest = smaller.min_by(|a, b| change_s(*a).total_cmp(&change_s(*b)));
         let Some(to) = fits.or(fastest).filter(|to| change_s(*to) < 0.0) else { return };
@@ -288,12 +311,12 @@ impl RenderScale {
     }
 
     /// By how much a frame takes longer at another scale by the prices, seconds.
-    fn priced_change_s(&self, at: usize, priced_s: &impl Fn(f64) -> f64) -> f64 {
-        let here_s = priced_s(self.scale());
-        if here_s > 0.0 { self.times.draw.mean_s() * (priced_s(SCALES[at]) / here_s - 1.0) } else { 0.0 }
+    fn priced_change_s(&self, at: usize, priced_s: &impl Fn(PictureRung) -> f64) -> f64 {
+        let here_s = priced_s(self.rung());
+        if here_s > 0.0 { self.times.draw.mean_s() * (priced_s(self.rungs[at]) / here_s - 1.0) } else { 0.0 }
     }
 
-    fn go(&mut self, to: usize, priced_s: &impl Fn(f64) -> f64) {
+    fn go(&mut self, to: usize, priced_s: &impl Fn(PictureRung) -> f64) {
         let change = Change { before: self.times.work, priced_s: self.priced_change_s(to, priced_s) };
         (self.at, self.held_s) = (to, 0.0);
         self.disturb();

@@ -26,7 +26,7 @@ impl Renderer {
         let inner = self.setup.options.shadow_px - 2;
         pass.set_scissor_rect(1, 1, inner, inner);
         let mut draws = 0;
-        if !picture.environment.throws_shadows() {
+        if !(picture.shadows && picture.environment.throws_shadows()) {
             return draws;
         }
         pass.set_pipeline(&self.pipelines.skin_shadow);

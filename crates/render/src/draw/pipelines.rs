@@ -205,7 +205,7 @@ impl Pipelines {
             Shading::Flat => &self.skin_flat,
             Shading::Gouraud => &self.skin_gouraud,
             Shading::Shadowed => &self.skins_shadowed[usize::from(tissue)],
-            Shading::PerPixel | Shading::Textured if tissue => &self.tissue,
+            Shading::Textured if tissue => &self.tissue,
             Shading::PerPixel | Shading::Textured => &self.skin,
         }
     }
@@ -213,7 +213,7 @@ impl Pipelines {
     /// The pipeline for the skins of soft bodies of a shading.
     pub fn hide_of(&self, tissue: bool, shading: Shading) -> &RenderPipeline {
         match shading {
-            Shading::PerPixel | Shading::Textured if tissue => &self.hides[0],
+            Shading::Textured if tissue => &self.hides[0],
             Shading::Shadowed if tissue => &self.hides[1],
             _ => self.solid_of(shading, false),
         }

@@ -118,7 +118,7 @@ fn quarters() -> RgbaImage {
 /// Draws a scene's only mesh, a square of side 2 that faces −y, and looks for [`quarters`] on it.
 fn shows_quarters(scene: &Scene) {
     let it = &scene.scenery[0];
-    assert_eq!((it.appearance.shading, it.appearance.colour), (ShadingKind::Textured, [255; 3]));
+    assert_eq!((it.appearance.shading, it.appearance.colour), (ShadingKind::Any, [255; 3]));
     let (Some(gpu), Some(texture)) = (gpu(), &it.texture) else { return };
     let picture = draw(&gpu, (&it.model, texture), Shading::Textured);
     let [low_left, low_right, high_left] = [(60, 180), (180, 180), (60, 60)].map(|(x, y)| picture.get_pixel(x, y).0);
@@ -170,7 +170,7 @@ fn textures_are_shared_and_wrong_ones_refused_where_they_stand() {
         let said = load(folder.path(), object).expect_err(object);
         assert!(said.contains(told), "{object}\n{said}");
     }
-    let other = "generate = \"sphere\"\nshading = \"any\"\ntexture = \"planks\"\ncolour = \"#804020\"";
+    let other = "generate = \"sphere\"\nshading = \"flat\"\ntexture = \"planks\"\ncolour = \"#804020\"";
     let appearance = load(folder.path(), other).unwrap().scenery[0].appearance;
-    assert_eq!((appearance.shading, appearance.colour), (ShadingKind::Any, [0x80, 0x40, 0x20]));
+    assert_eq!((appearance.shading, appearance.colour), (ShadingKind::Flat, [0x80, 0x40, 0x20]));
 }

@@ -151,15 +151,16 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
 
 /// Colour and material of an object without a texture; `default` is the material of the model.
 pub(super) fn appearance(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Appearance {
-    if file.shading == Some(ShadingKind::Textured) {
+    let appearance = painted_appearance(c, place, file, default);
+    if file.shading == Some(ShadingKind::Textured) && appearance.material != Material::Tissue {
         c.wrong(
             place,
             "shading",
             "is `textured`, but the object has no texture",
-            "expected `texture` beside it, which only a mesh can have",
+            "expected `texture` beside it, which only a mesh can have, or `material = \"tissue\"`",
         );
     }
-    painted_appearance(c, place, file, default)
+    appearance
 }
 
 /// The same for an object that may have a texture.

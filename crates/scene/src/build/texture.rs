@@ -61,8 +61,7 @@ pub(super) fn apply(
     if let Some(texture) = found {
         for (_, part) in &mut parts {
             let colour = if entry.common.colour.is_some() { part.appearance.colour } else { [255; 3] };
-            let shading = entry.common.shading.unwrap_or(ShadingKind::Textured);
-            part.appearance = Appearance { colour, shading, ..part.appearance };
+            part.appearance = Appearance { colour, ..part.appearance };
             part.texture = Some(Arc::clone(&texture));
         }
     }

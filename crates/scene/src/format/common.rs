@@ -57,7 +57,8 @@ pub struct CommonFile {
     pub colour: Option<String>,
     /// Material of its surface. Default: tissue for a tube, sheet or solid, metal for a tool, plastic for the rest.
     pub material: Option<Material>,
-    /// Shading of its surface: `flat`, `gouraud`, `per-pixel` (default), or `any`, which leaves it to the policy.
+    /// Shading of its surface: `flat`, `gouraud`, `per-pixel`, `textured` of tissue and of meshes with a texture, or `any` (default), which
+    /// leaves it to the policy.
     pub shading: Option<ShadingKind>,
     /// Whether it stops stepping when it is at rest and nothing touches it. Default true.
     pub sleep: Option<bool>,

@@ -31,6 +31,8 @@ pub struct ChoiceSummary {
     pub holes: Option<u64>,
     /// Fraction of its width and height that the picture was drawn with; `None` without a frame.
     pub render_scale: Option<ScaleSummary>,
+    /// Share of the frames in which objects threw shadows, where the light does; `None` without a frame.
+    pub shadows: Option<f64>,
 }
 
 /// The scales of a run's pictures.
@@ -66,6 +68,7 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         lag_ms: spread(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
         render_scale: scales(frames),
+        shadows: Spread::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
     }
 }
 

@@ -17,6 +17,7 @@ impl Session {
         let started = self.now();
         self.gather();
         self.scene_view.set_scale(self.control.render_scale());
+        self.scene_view.set_shadows(self.control.shadows());
         self.survey(camera, size);
         self.visible_resolution.update(started, self.scene_view.seen(), camera, size);
         let culled = self.now();
@@ -65,7 +66,8 @@ impl Session {
         self.levels.extend(self.views.iter().zip(&plan.levels).map(|(view, demand)| assemble::level(view, demand)));
         self.chosen.objects = self.scene_view.seen().iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
-        self.chosen.objects_s = self.declared.objects_s(self.views.iter(), &plan.levels);
+        let declared = self.declared.with_shadows(self.control.shadows());
+        self.chosen.objects_s = declared.objects_s(self.views.iter(), &plan.levels);
         self.chosen.n = self.mean_level();
     }
 

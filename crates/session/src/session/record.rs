@@ -38,6 +38,7 @@ impl Session {
             eps: self.control.eps_hat(),
             n,
             render_scale: self.scene_view.picture().scale,
+            shadows: self.scene_view.picture().shadows,
         }
     }
 

@@ -227,6 +227,8 @@ pub struct Status {
     pub triangles: u64,
     /// Fraction of its width and height that it was drawn with, 0 … 1.
     pub render_scale: f64,
+    /// Whether shadows are drawn in it, where the light throws any.
+    pub shadows: bool,
     /// Total mechanical energy, joules.
     pub energy_j: f64,
     /// Hash of every agent's state, where the run computes one.

@@ -211,8 +211,9 @@ fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
     value(
         ui,
         "Scale",
-        &format!("{:.0} %", 100.0 * status.render_scale),
-        "Fraction of its width and height that the picture is drawn with; less where everything is at its coarsest and frames would be late",
+        &format!("{:.0} %{}", 100.0 * status.render_scale, if status.shadows { "" } else { ", no shadows" }),
+        "Fraction of its width and height that the picture is drawn with, and whether objects throw shadows; less where everything is at its \
+         coarsest and frames would be late",
     );
 }
 
@@ -344,9 +345,11 @@ mod tests {
 
     #[test]
     fn the_scale_of_the_picture_is_shown() {
-        let status = Status { render_scale: 0.65, ..Status::default() };
-        let harness = Harness::new_ui(|ui| picture(ui, &mut DrawingOptions::default(), &status));
-        assert!(harness.query_by_label("65 %").is_some());
+        for (shadows, text) in [(true, "65 %"), (false, "65 %, no shadows")] {
+            let status = Status { render_scale: 0.65, shadows, ..Status::default() };
+            let harness = Harness::new_ui(|ui| picture(ui, &mut DrawingOptions::default(), &status));
+            assert!(harness.query_by_label(text).is_some(), "{text}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::super::ladder::Rung;
 use super::super::plan::{LevelDemand, SizedView, steers};
 use super::super::policy::Policy;
 use super::super::price::{Backdrop, Prices};
-use super::super::render_scale::ScaledFrame;
+use super::super::render_scale::{PictureRung, ScaledFrame};
 use super::super::view::Shading;
 use super::PictureControl;
 
@@ -34,12 +34,21 @@ impl PictureControl {
             return self.scale.disturb();
         }
         let prices = self.policy.prices(&self.prices);
-        let here = self.scale.scale();
+        let here = self.scale.rung();
         let coarsest: Vec<_> = self.drawn().map(|(at, seen, level)| self.coarsest(at, seen, level)).collect();
         let backdrop = self.backdrop;
-        let priced_s = |scale: f64| coarsest_s(&prices, &coarsest, backdrop, Scales { here, asked: scale });
-        let levels_s: f64 = self.drawn().map(|(_, seen, level)| object_s(&prices, seen, level)).sum();
-        let (all_s, least_s) = (prices.backdrop_s(backdrop) + levels_s, priced_s(here));
+        let priced_s = |asked: PictureRung| {
+            let part = asked.scale / here.scale;
+            coarsest_s(
+                &prices.with_shadows(asked.shadows),
+                &coarsest,
+                scaled(backdrop, here.scale, asked.scale),
+                part * part,
+            )
+        };
+        let drawn_by = prices.with_shadows(here.shadows);
+        let levels_s: f64 = self.drawn().map(|(_, seen, level)| object_s(&drawn_by, seen, level)).sum();
+        let (all_s, least_s) = (drawn_by.backdrop_s(backdrop) + levels_s, priced_s(here));
         // what levels take above their least, by the prices and as fast as this frame was drawn
         let levels_s = if all_s > 0.0 { drawn_s * (1.0 - least_s / all_s).max(0.0) } else { 0.0 };
         let frame = ScaledFrame {
@@ -50,6 +59,9 @@ impl PictureControl {
             period_s: 1.0 / self.target_hz,
         };
         self.scale.observe(frame, priced_s);
+        if self.scale.rung().shadows != here.shadows {
+            self.forget_ladders();
+        }
     }
 
     /// Whether nothing but pixels is left to take; `levels` is the part of the frame that levels take above their least.
@@ -78,26 +90,19 @@ impl PictureControl {
     }
 }
 
-/// The scale of a frame, and another one.
-#[derive(Debug, Clone, Copy)]
-struct Scales {
-    here: f64,
-    asked: f64,
-}
-
 fn object_s(prices: &Prices, seen: &SizedView, level: &LevelDemand) -> f64 {
     prices.object_s(level.shading, level.polygons, seen.view.pixels)
 }
 
-/// Time of drawing everything at its coarsest at another scale than the frame's, seconds.
-fn coarsest_s(prices: &Prices, objects: &[Coarsest], backdrop: Backdrop, Scales { here, asked }: Scales) -> f64 {
-    let part = (asked / here) * (asked / here);
+/// The backdrop of a frame drawn at the scale `here`, drawn at another.
+fn scaled(backdrop: Backdrop, here: f64, asked: f64) -> Backdrop {
     let full = backdrop.pixels / (here * here);
-    let backdrop = Backdrop {
-        pixels: part * backdrop.pixels,
-        enlarged: if asked < 1.0 { full } else { 0.0 },
-        triangles: backdrop.triangles,
-    };
+    let enlarged = if asked < 1.0 { full } else { 0.0 };
+    Backdrop { pixels: asked * asked * full, enlarged, triangles: backdrop.triangles }
+}
+
+/// Time of drawing everything at its coarsest, each object on this `part` of its pixels, seconds.
+fn coarsest_s(prices: &Prices, objects: &[Coarsest], backdrop: Backdrop, part: f64) -> f64 {
     let objects = objects.iter().map(|object| prices.object_s(object.shading, object.polygons, part * object.pixels));
     prices.backdrop_s(backdrop) + objects.fold(0.0, |sum, s| sum + s)
 }

@@ -5,7 +5,7 @@
 use super::super::policy::{Law, Policy};
 use super::super::price::{Backdrop, Prices};
 use super::super::quality_boost::QualityBoost;
-use super::super::render_scale::RenderScale;
+use super::super::render_scale::{PictureRung, RenderScale};
 use super::PictureControl;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
@@ -120,7 +120,22 @@ impl PictureControl {
     /// picture.
     #[must_use]
     pub fn render_scale(&self) -> f64 {
-        if self.policy.scales_pictures() { self.scale.scale() } else { self.scale.most() }
+        self.rung().scale
+    }
+
+    /// Whether objects throw shadows in the next picture.
+    #[must_use]
+    pub fn shadows(&self) -> bool {
+        self.rung().shadows
+    }
+
+    /// Prices of the next picture, as the policy reckons with them.
+    pub(super) fn picture_prices(&self) -> Prices {
+        self.policy.prices(&self.prices.with_shadows(self.shadows()))
+    }
+
+    fn rung(&self) -> PictureRung {
+        if self.policy.scales_pictures() { self.scale.rung() } else { self.scale.most() }
     }
 
     /// Freezes all levels, or releases them; objects that come or go are an exception.
@@ -140,7 +155,7 @@ impl PictureControl {
         self.frozen
     }
 
-    fn forget_ladders(&mut self) {
+    pub(super) fn forget_ladders(&mut self) {
         self.ladders.clear();
         self.adaptive.clear();
     }

@@ -44,20 +44,20 @@ impl Loop {
     /// Plays seconds with all else at its coarsest and noise of this standard deviation.
     fn play(&mut self, seconds: f64, noise: f64) -> f64 {
         for _ in 0..(seconds / PERIOD_S) as usize {
-            let before = self.law.scale();
+            let before = self.law.rung().scale;
             // a sum of twelve is nearly normal, of variance 4
             let tremble = (0..12).map(|_| self.random()).sum::<f64>() / 2.0;
             let took_s = self.plant.frame_s(before) * (1.0 + noise * tremble).max(0.1);
             let frame =
                 ScaledFrame { coarsest_s: took_s, draw_s: took_s, spent: true, set_s: PERIOD_S, period_s: PERIOD_S };
             let priced = self.priced;
-            self.law.observe(frame, |scale| priced.frame_s(scale));
+            self.law.observe(frame, |rung| priced.frame_s(rung.scale));
             self.time_s += PERIOD_S;
-            if self.law.scale() != before {
-                self.changes.push((self.time_s, self.law.scale()));
+            if self.law.rung().scale != before {
+                self.changes.push((self.time_s, self.law.rung().scale));
             }
         }
-        self.law.scale()
+        self.law.rung().scale
     }
 }
 
@@ -96,16 +96,16 @@ fn steady_load_under_noise_of_a_fifth_reverses_nothing() {
     run.play(120.0, 0.2);
     let rises = run.changes.windows(2).filter(|pair| pair[1].1 > pair[0].1).count();
     assert_eq!(rises, 0, "{:?}", run.changes);
-    let took = SLOW.frame_s(run.law.scale()) / PERIOD_S;
+    let took = SLOW.frame_s(run.law.rung().scale) / PERIOD_S;
     // it is not taken for late by less than two errors of the mean of a second, 0.08
-    assert!((0.75..1.08).contains(&took), "{took} of the time at {}", run.law.scale());
+    assert!((0.75..1.08).contains(&took), "{took} of the time at {}", run.law.rung().scale);
 }
 
 #[test]
 fn pixels_come_back_after_the_load_has_gone_and_not_at_once() {
     let mut run = Loop::new(SLOW);
     run.play(4.0, 0.05);
-    let (low, then) = (run.law.scale(), run.time_s);
+    let (low, then) = (run.law.rung().scale, run.time_s);
     run.plant = Plant { fixed_s: 0.002, pixels_s: 0.015, enlarge_s: 0.002 };
     assert_eq!(run.play(15.0, 0.05), 1.0, "{:?}", run.changes);
     let after: Vec<_> = run.changes.iter().filter(|(at, _)| *at > then).collect();
@@ -137,28 +137,51 @@ fn a_load_that_comes_and_goes_is_one() {
         set_s: PERIOD_S,
         period_s: PERIOD_S,
     };
-    (0..90).for_each(|_| law.observe(frame(20.0), |s| s * s));
-    (0..40).for_each(|_| [60.0, 60.0, 20.0].into_iter().for_each(|ms| law.observe(frame(ms), |s| s * s)));
+    (0..90).for_each(|_| law.observe(frame(20.0), |rung| rung.scale * rung.scale));
+    (0..40).for_each(|_| {
+        [60.0, 60.0, 20.0].into_iter().for_each(|ms| law.observe(frame(ms), |rung| rung.scale * rung.scale))
+    });
     assert!(law.is_reduced(), "two frames of three are late");
 }
 
 #[test]
 fn a_range_bounds_it_and_no_number_moves_it() {
-    assert_eq!(RenderScale::new((0.62, 0.9)).range, (6, 11));
-    assert_eq!(
-        [(0.37, 0.37), (0.97, 1.0), (0.1, 0.2)].map(|range| RenderScale::new(range).range),
-        [(0, 0), (13, 13), (0, 0)]
-    );
+    assert_eq!(RenderScale::new((0.62, 0.9)).bounds(), (0.65, 0.9));
+    for (range, scale) in [((0.37, 0.37), 0.35), ((0.97, 1.0), 1.0), ((0.1, 0.2), 0.35)] {
+        assert_eq!(rungs(range), [PictureRung { scale, shadows: true }], "{range:?}");
+    }
     let mut law = RenderScale::new((0.6, 0.9));
     let late = ScaledFrame { coarsest_s: 0.5, draw_s: 0.4, spent: true, set_s: PERIOD_S, period_s: PERIOD_S };
-    (0..50).for_each(|_| law.observe(ScaledFrame { coarsest_s: f64::NAN, ..late }, |s| s));
+    (0..50).for_each(|_| law.observe(ScaledFrame { coarsest_s: f64::NAN, ..late }, |rung| rung.scale));
     (0..50).for_each(|_| law.observe(late, |_| f64::NAN));
-    assert_eq!(law.scale(), 0.9);
-    (0..50).for_each(|_| law.observe(late, |s| s * s));
-    assert_eq!(law.scale(), 0.6);
+    assert_eq!(law.rung().scale, 0.9);
+    (0..50).for_each(|_| law.observe(late, |rung| rung.scale * rung.scale));
+    assert_eq!(law.rung().scale, 0.6);
     let mut fixed = RenderScale::default();
-    (0..50).for_each(|_| fixed.observe(late, |s| s * s));
-    assert_eq!((fixed.scale(), fixed.most()), (1.0, 1.0));
+    (0..50).for_each(|_| fixed.observe(late, |rung| rung.scale * rung.scale));
+    assert_eq!((fixed.rung().scale, fixed.most().scale), (1.0, 1.0));
+}
+
+#[test]
+fn shadows_go_when_half_the_width_is_left_and_come_back_first() {
+    let all = |range| rungs(range).iter().map(|rung| (rung.scale, rung.shadows)).collect::<Vec<_>>();
+    let from_half = &all((0.35, 1.0))[..6];
+    assert_eq!(from_half, [(0.35, false), (0.4, false), (0.45, false), (0.5, false), (0.5, true), (0.55, true)]);
+    assert_eq!(all((0.9, 1.0)), [(0.9, true), (0.95, true), (1.0, true)]);
+    assert_eq!(all((0.35, 0.4)), [(0.35, false), (0.4, false), (0.4, true)]);
+    // of a frame of 32 ms at half the width 4 ms are shadows: 28 fit
+    let mut law = RenderScale::new((0.35, 1.0));
+    let frame_s = |rung: PictureRung| 0.026 + 0.008 * rung.scale * rung.scale + if rung.shadows { 0.004 } else { 0.0 };
+    let mut play = |set_s: f64| {
+        for _ in 0..300 {
+            let took_s = frame_s(law.rung());
+            let frame = ScaledFrame { coarsest_s: took_s, draw_s: took_s, spent: true, set_s, period_s: PERIOD_S };
+            law.observe(frame, frame_s);
+        }
+        law.rung()
+    };
+    assert_eq!(play(0.029), PictureRung { scale: 0.5, shadows: false });
+    assert_eq!(play(0.050), PictureRung { scale: 1.0, shadows: true });
 }
 
 #[test]
@@ -173,5 +196,5 @@ fn a_load_that_comes_is_answered_after_three_frames_and_a_stall_is_not() {
     let then = run.time_s;
     run.plant = Plant { fixed_s: 0.006, pixels_s: 0.050, enlarge_s: 0.001 };
     run.play(1.0, 0.02);
-    assert!(run.changes[0].0 - then < 5.0 * PERIOD_S && run.law.scale() < 0.75, "{:?} after {then}", run.changes);
+    assert!(run.changes[0].0 - then < 5.0 * PERIOD_S && run.law.rung().scale < 0.75, "{:?} after {then}", run.changes);
 }
