@@ -74,6 +74,47 @@ fn where_there_is_time_for_all_nothing_is_shared_out() {
     assert_eq!(picture(&few), picture(&many));
 }
 
+/// The resolution of the first strand, which counts a hundred times as much as the others, over the mean of theirs, at the end: ε of
+/// its simulation, its steps, and ε of its picture.
+fn of_the_important_one(outcome: &Outcome) -> [f64; 3] {
+    let all = outcome.agents.iter().map(|agent| {
+        let eps_m = |at: Option<metachron_core::Resolution>| at.expect("a tube has an ε").eps_m;
+        [eps_m(agent.stats.resolution), agent.stats.dt.as_secs_f64(), eps_m(agent.picture)]
+    });
+    let all: Vec<_> = all.collect();
+    [0, 1, 2].map(|k| all[0][k] * (all.len() - 1) as f64 / all[1..].iter().map(|row| row[k]).sum::<f64>())
+}
+
+#[test]
+fn what_counts_more_has_finer_eps_steps_and_picture_wherever_the_picture_is_drawn() {
+    // drawn on the cores: one price; drawn by a card of its own: two, of which a scene may pay both or one
+    for (card, unit_us, triangle_us) in [(false, 20.0, 3.0), (true, 25.0, 3.0), (true, 25.0, 0.003)] {
+        let more = format!("graphics_card = {card}\n");
+        let text = strands(8, 2, unit_us, &more)
+            .replace("draw_triangle_us = 3.0", &format!("draw_triangle_us = {triangle_us:?}"));
+        // the work of three and of four cores, of which ε can save two thirds
+        let text = text.replace("eps_m = [0.005, 0.2]", "eps_m = [0.005, 0.015]");
+        let text = text.replacen("rate_hz = 100.0", "rate_hz = 100.0\nimportance = 100.0", 1);
+        let [eps, dt, picture] = of_the_important_one(&play(&text, 600));
+        assert!(eps < 0.7 && dt < 0.9, "drawn by a card: {card}; ε {eps}, dt {dt} of the others'");
+        assert!(
+            if triangle_us > 1.0 { picture < 0.7 } else { picture == 1.0 },
+            "drawn by a card: {card}; picture {picture}"
+        );
+    }
+}
+
+#[test]
+fn what_a_frame_takes_beside_a_card_is_not_the_agents() {
+    let came_to_eps = |choosing_ns: &str| {
+        let more = format!("graphics_card = true\ncull_object_ns = {choosing_ns}\nchoose_object_ns = {choosing_ns}\n");
+        came_to(&play(&strands(6, 1, 50.0, &more), 480)).0
+    };
+    // a core of which finding and choosing take nothing, or seven tenths
+    let (free, busy) = (came_to_eps("0.0"), came_to_eps("1_000_000.0"));
+    assert!(busy > 1.3 * free, "{busy} {free}");
+}
+
 /// Until 8 s, in every `every_s` seconds, steps take six times as long for a tenth of them.
 fn bursts(every_s: f64) -> String {
     let entry = |at_s: f64, factor: f64| format!("{{ at_s = {at_s:.3}, factor = {factor:?} }}");

@@ -15,6 +15,8 @@ pub struct Machine {
     pub steps: Vec<StepPrice>,
     /// Price of a frame.
     pub draw: DrawPrice,
+    /// Whether a graphics card draws: then drawing keeps no core busy.
+    pub graphics_card: bool,
     /// Nanoseconds per object for the visibility test, and per visible object for choosing its level, ≥ 0.
     pub choice_ns: (f64, f64),
     /// Relative standard deviation of every cost, `0..=1`.
@@ -106,6 +108,7 @@ impl Machine {
                 enlarge_ns: 2.0,
                 objects: [price_of_objects(5.0, 0.22); 4],
             },
+            graphics_card: false,
             choice_ns: (0.0, 0.0),
             noise_sd: 0.0,
             wander_sd: 0.0,
@@ -129,6 +132,7 @@ impl Machine {
                 enlarge_ns: enlarge_ns / 20.0,
                 objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 4],
             },
+            graphics_card: true,
             ..base
         }
     }

@@ -60,7 +60,7 @@ fn fair_share(cores: u32, agents: usize) -> f64 {
 /// Share of all cores that the agents together may plan with; the rest is reserved for the frame loop.
 pub(super) const ROOM: f64 = 0.75;
 /// Largest share of its period that an agent may take even if cores are idle: past it every hiccup makes the agent late.
-const SHARE_MAX: f64 = 0.6;
+pub(super) const SHARE_MAX: f64 = 0.6;
 
 /// The governor of the agent's dt and ε; none where the scene fixes both.
 fn governor(member: &Member, share: f64, controlled: &mut ControlledAgents) -> Option<Box<dyn Governor>> {

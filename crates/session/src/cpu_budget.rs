@@ -1,13 +1,14 @@
-//! The CPU budget: shares one processor between agents' steps and the picture's levels at one price.
+//! The CPU budget: shares the cores among agents' steps at one price, which the picture pays too where it is drawn on them.
 //!
-//! In: the agents' load at their finest, the picture's demand and its λ. Out: a share for every agent, and the time budget of the picture.
+//! In: the agents' load at their finest, what the frame loop takes or would like to. Out: a share for every agent, and the time budget of
+//! the picture.
 //! Never here: the market's law (`metachron_lod::adaptive::joint` has it), steps, drawing. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 //!
 //! Agents and the frame loop exchange these numbers through atomics, without waiting.
 
-use super::assemble::ROOM;
+use super::assemble::{ROOM, SHARE_MAX};
 use metachron_core::AgentId;
-use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, temporal_error_px};
+use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, price, temporal_error_px};
 use metachron_lod::control::ObjectView;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -74,10 +75,19 @@ impl AgentBudget {
 /// The processor time of one frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FramePeriod {
-    /// Cores that agents and the picture share.
+    /// Cores that agents and the frame loop share.
     pub cores: u32,
     /// Time until the next frame is due, seconds.
     pub period_s: f64,
+}
+
+/// What the frame loop has of the cores.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum FrameLoop {
+    /// It draws on them, and pays the agents' price for more than the rest.
+    Draws(Drawing),
+    /// A graphics card draws; so many seconds of a core go into a frame beside it.
+    Takes(f64),
 }
 
 /// The processor shared by agents and pictures.
@@ -100,12 +110,12 @@ impl CpuBudget {
         Self { agents, ..Self::default() }
     }
 
-    /// Shares the processor for the next frame; returns the seconds that the picture may take, `None` if there is enough for all.
-    /// `weight` is the weight of an object in view in the picture's value, pixels.
+    /// Shares the processor for the next frame; returns the seconds that a picture drawn on it may take, `None` if there is enough for all
+    /// or a card draws. `weight` is the weight of an object in view in the picture's value, pixels.
     pub fn settle(
         &mut self,
         frame: FramePeriod,
-        drawing: Drawing,
+        frame_loop: FrameLoop,
         views: &[ObjectView],
         weight: impl Fn(usize) -> f64,
     ) -> Option<f64> {
@@ -116,17 +126,32 @@ impl CpuBudget {
             let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), agent.rate_hz));
             Worker { full: period_s * agent.full(), least: agent.least, loss }
         }));
-        // the agents' reported work includes waiting for a core: the picture's own core comes on top of their share
-        let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
-        let settled = self.market.settle(&self.workers, capacity, drawing);
-        if settled.is_some() || self.open {
+        let (lambda, limit_s) = match frame_loop {
+            FrameLoop::Draws(drawing) => {
+                // the agents' reported work includes waiting for a core: the picture's own core comes on top of their share
+                let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
+                self.market.settle(&self.workers, capacity, drawing).unzip()
+            }
+            FrameLoop::Takes(taken_s) => {
+                // what is not the agents' room is the frame loop's; if that takes more, they have less
+                let capacity = (ROOM * f64::from(cores) * period_s).min(f64::from(cores) * period_s - taken_s);
+                (Some(price(&self.workers, capacity)).filter(|lambda| *lambda > 0.0), None)
+            }
+        };
+        self.pay(lambda);
+        limit_s
+    }
+
+    /// Gives every agent the share that it buys at a price; its fair share where there is none.
+    fn pay(&mut self, lambda: Option<f64>) {
+        if lambda.is_some() || self.open {
             for (agent, worker) in self.agents.iter().zip(&self.workers) {
-                let bought = settled.map(|(lambda, _)| agent.full() * worker.part(lambda));
-                agent.set_share(bought.filter(|share| *share > 0.0).unwrap_or(agent.fair));
+                let bought = lambda.map(|lambda| agent.full() * worker.part(lambda)).filter(|share| *share > 0.0);
+                // an agent steps on one core
+                agent.set_share(bought.map_or(agent.fair, |share| share.min(SHARE_MAX)));
             }
         }
-        self.open = settled.is_some();
-        settled.map(|(_, limit_s)| limit_s)
+        self.open = lambda.is_some();
     }
 
     /// Ends the sharing: every agent returns to its fair share.

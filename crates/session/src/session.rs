@@ -19,6 +19,7 @@ use super::event_record::events;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::trace::Trace;
 use super::visible_resolution::VisibleResolution;
+use cpu_time::ThreadTime;
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimTime};
 use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
@@ -43,6 +44,9 @@ pub struct Session {
     /// Whether pictures are drawn on the processor that agents step on.
     shares_processor: bool,
     cpu_budget: CpuBudget,
+    /// Seconds of a core that the frame loop takes a frame beside an adapter, smoothed; and the CPU time of its thread at the last frame.
+    frame_cpu_s: f64,
+    thread_time: Option<Duration>,
     error_statuses: Vec<Arc<ErrorStatus>>,
     visible_resolution: VisibleResolution,
     reader: Reader,
@@ -112,6 +116,9 @@ const WARM_UP_FRAMES: u64 = 3;
 /// The weight of a new measurement in the smoothed lag.
 const LAG_NEWS: f64 = 0.2;
 
+/// The weight of a new measurement in the smoothed CPU time of a frame.
+const CPU_NEWS: f64 = 0.05;
+
 /// Frames over which meshes blend to a new level.
 const GEOMORPH_FRAMES: u8 = 6;
 
@@ -130,9 +137,11 @@ impl Session {
         scene_view.set_geomorph_frames(GEOMORPH_FRAMES);
         Ok(Self {
             control: assemble::picture_control(&scene),
-            shares_processor: scene.executor == ExecutorKind::Lockstep,
+            shares_processor: scene.executor == ExecutorKind::Lockstep && !machine.graphics_card,
             visible_resolution: VisibleResolution::new(&controlled.budgets),
             cpu_budget: CpuBudget::new(controlled.budgets),
+            frame_cpu_s: 0.0,
+            thread_time: None,
             error_statuses: controlled.error_statuses,
             reader: Reader::new(world.agents()),
             scene_view,
@@ -231,7 +240,7 @@ impl Session {
     /// Applies the prices of the adapter that draws, if they are known or can be measured; declared costs stay as they are. `on_processor`:
     /// the adapter draws on the processor.
     pub fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
-        self.shares_processor |= on_processor;
+        self.shares_processor |= on_processor && !self.is_virtual();
         if self.control.policy().predicts() && !self.is_virtual() {
             let prices = calibrate::prices(adapter, open, self.report_progress);
             self.unpriced = prices.is_none();
@@ -361,6 +370,7 @@ impl Session {
         let record = self.record(started, finished);
         let lag_s = 1e-3 * record.lag_ms;
         self.lag_s = if self.finished == 0 { lag_s } else { self.lag_s + LAG_NEWS * (lag_s - self.lag_s) };
+        self.measure_thread();
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
@@ -368,6 +378,21 @@ impl Session {
         self.store(record);
         self.control.observe(FrameWork { work, draw, skip: skip || cold });
         record
+    }
+
+    /// Learns what a frame takes of a core: CPU time of this thread where time is real, else what is declared.
+    fn measure_thread(&mut self) {
+        let Chosen { cull, select, select_next, .. } = self.chosen;
+        let declared = Some(cull + select + select_next.unwrap_or_default());
+        let taken = if self.is_virtual() {
+            declared
+        } else {
+            let now = ThreadTime::try_now().ok().map(|time| time.as_duration());
+            std::mem::replace(&mut self.thread_time, now).and_then(|before| now?.checked_sub(before))
+        };
+        if let Some(taken) = taken {
+            self.frame_cpu_s += CPU_NEWS * (taken.as_secs_f64() - self.frame_cpu_s);
+        }
     }
 
     /// Ends a frame that is not counted: it enters neither the report nor the controller.

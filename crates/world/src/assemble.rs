@@ -129,6 +129,7 @@ pub fn machine(scene: &Scene) -> Machine {
         price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);
         price.pixel_ns = own.pixel_ns.unwrap_or(price.pixel_ns);
     }
+    machine.graphics_card = wish.graphics_card.unwrap_or(machine.graphics_card);
     machine.choice_ns = (wish.cull_object_ns.unwrap_or(0.0), wish.choose_object_ns.unwrap_or(0.0));
     machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
     machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);

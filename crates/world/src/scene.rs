@@ -163,6 +163,8 @@ pub struct Machine {
     pub draw_pixel_ns: Option<f64>,
     /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
     pub draw_enlarge_ns: Option<f64>,
+    /// Whether a graphics card draws, and not the cores that agents step on.
+    pub graphics_card: Option<bool>,
     /// Nanoseconds per object for culling.
     pub cull_object_ns: Option<f64>,
     /// Nanoseconds per object in view for choosing its level.

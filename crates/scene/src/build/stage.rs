@@ -188,6 +188,7 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
         draw_triangle_us,
         draw_pixel_ns,
         draw_enlarge_ns,
+        graphics_card: file.graphics_card,
         cull_object_ns,
         choose_object_ns,
         shading,

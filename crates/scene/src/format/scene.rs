@@ -187,6 +187,8 @@ pub struct MachineFile {
     pub draw_pixel_ns: Option<f64>,
     /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to, 0 … 1e6.
     pub draw_enlarge_ns: Option<f64>,
+    /// Whether a graphics card draws, and not the cores that agents step on. Default: as the preset has it, a card in `workstation`.
+    pub graphics_card: Option<bool>,
     /// Nanoseconds per object for culling, 0 … 1e6. Default 0.
     pub cull_object_ns: Option<f64>,
     /// Nanoseconds per object in view for choosing its level, 0 … 1e6. Default 0.

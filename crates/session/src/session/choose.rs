@@ -3,7 +3,7 @@
 //! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, measuring a frame.
 
 use super::super::assemble;
-use super::super::cpu_budget::FramePeriod;
+use super::super::cpu_budget::{FrameLoop, FramePeriod};
 use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
@@ -39,9 +39,16 @@ impl Session {
         let backdrop = self.backdrop(size, other_triangles);
         let seconds = self.declared.backdrop_s(backdrop) + objects_s;
         let draw = self.machine.frame_time(seconds, self.frames(), self.now());
-        let started = self.now();
-        self.world.spend(cull + select + draw.max(select_next.unwrap_or_default()));
-        self.now().saturating_sub(started + cull + select)
+        let (started, next) = (self.now(), select_next.unwrap_or_default());
+        if self.shares_processor {
+            self.world.spend(cull + select + draw.max(next));
+            return self.now().saturating_sub(started + cull + select);
+        }
+        self.world.spend(cull + select);
+        let begun = self.now();
+        self.world.spend(next);
+        self.world.wait_until(begun + draw);
+        self.now().saturating_sub(begun)
     }
 
     /// Finds the objects seen by `camera`, with the pixels that they are drawn with.
@@ -107,18 +114,20 @@ impl Session {
         Duration::try_from_secs_f64(seconds).unwrap_or_default()
     }
 
-    /// Shares the processor between agents and the picture, if it also draws.
+    /// Shares the processor among agents, and with the picture if it draws that too.
     fn share_processor(&mut self) {
-        let wants = self.control.wants().filter(|_| self.shares_processor);
-        let Some((wants, lambda)) = wants else {
+        let Some((wants, lambda)) = self.control.wants() else {
             self.cpu_budget.close();
             return self.control.set_reserve(0.0);
         };
         let period_s = 1.0 / self.control.target_hz();
-        let drawing = Drawing { wants, lambda };
+        let frame_loop = match self.shares_processor {
+            true => FrameLoop::Draws(Drawing { wants, lambda }),
+            false => FrameLoop::Takes(self.frame_cpu_s),
+        };
         let (cores, control) = (self.cores(), &self.control);
         let limit_s =
-            self.cpu_budget.settle(FramePeriod { cores, period_s }, drawing, &self.views, |at| control.weight(at));
+            self.cpu_budget.settle(FramePeriod { cores, period_s }, frame_loop, &self.views, |at| control.weight(at));
         let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
         self.control.set_reserve(reserve_s);
     }
