@@ -1,12 +1,13 @@
 //! An integer level from a real number, with hysteresis: no chatter when the number fluctuates about an integer.
 //!
-//! In: ρ. Out: ⌊ρ⌋, held until ρ is a quarter past an edge. Never here: where ρ comes from.
+//! In: ρ. Out: ⌊ρ⌋, held until ρ is half a level past an edge. Never here: where ρ comes from.
 //! Theory: `docs/theory/control.md`, eq. 15.
 
-/// How far past an edge ρ must be, in levels. Two switches of the same edge are half a level apart: a factor √2 of polygons.
-pub const BAND: f64 = 0.25;
+/// How far past an edge ρ must be, in levels. Two switches of the same edge are a level apart, a factor 2 of polygons: a load that is steady to
+/// a fifth changes a tube's polygons by a factor 1.9.
+pub const BAND: f64 = 0.5;
 
-/// The level for `rho` when `held` is the present one: `held` as long as held − ¼ ≤ ρ < held + 1¼, otherwise ⌊ρ⌋.
+/// The level for `rho` when `held` is the present one: `held` as long as held − ½ ≤ ρ < held + 1½, otherwise ⌊ρ⌋.
 ///
 /// With no level held, ⌊ρ⌋. The result is inside `0..=255`; a NaN keeps the level, or gives 0.
 #[must_use]
@@ -36,11 +37,11 @@ mod tests {
     }
 
     #[test]
-    fn a_level_changes_a_quarter_past_its_edges() {
-        assert_eq!(floor(Some(3), 4.249), 3);
-        assert_eq!(floor(Some(3), 4.25), 4);
-        assert_eq!(floor(Some(3), 2.75), 3);
-        assert_eq!(floor(Some(3), 2.749), 2);
+    fn a_level_changes_half_a_level_past_its_edges() {
+        assert_eq!(floor(Some(3), 4.499), 3);
+        assert_eq!(floor(Some(3), 4.5), 4);
+        assert_eq!(floor(Some(3), 2.5), 3);
+        assert_eq!(floor(Some(3), 2.499), 2);
     }
 
     #[test]

@@ -2,8 +2,11 @@
 
 mod plant;
 
+use metachron_core::{AgentId, ResolutionRange};
 use metachron_lod::adaptive::Settings;
+use metachron_lod::control::{FrameWork, Kind, Law, ObjectView, PictureControl, Shading};
 use plant::{AdaptivePolicy, Feedback, Full, Greedy, Machine, Policy, Run, Static, WALK, run, spread};
+use std::time::Duration;
 
 const SEEDS: std::ops::Range<u64> = 1..6;
 
@@ -97,4 +100,58 @@ fn certificate_is_below_a_hundredth_in_nearly_every_frame() {
     run(&mut policy, &mut Machine::s1(1), WALK, 1);
     let near = policy.gaps.iter().filter(|g| **g <= 0.01).count();
     assert!(near * 100 >= policy.gaps.len() * 95, "{near} of {}", policy.gaps.len());
+}
+
+/// n of a tube alone under feedback at 60 Hz over 20 s, on a machine whose speed is what `load` says of the seconds passed.
+fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
+    let hz = 60.0;
+    let mut control = PictureControl::new(metachron_lod::control::Policy::Feedback, Law::CORRECTED, hz);
+    let range = ResolutionRange { eps_m: (5e-4, 0.02), n: (0, 6) };
+    let kind = Kind::Tube { length_m: 1.5, radius_m: 0.015 };
+    let shading = (Shading::PerPixel, Shading::PerPixel);
+    let view = ObjectView {
+        id: AgentId(0),
+        kind,
+        range,
+        shading,
+        pixels: 1e9,
+        distance_m: 0.5,
+        speed_px_s: 0.0,
+        importance: 1.0,
+        off_centre: 0.0,
+        from_focus_m: 0.0,
+        visible: true,
+    };
+    let polygon_s = 0.6 / hz / start;
+    let frame = |k: u32| {
+        let plan = control.plan(&[view]);
+        let (n, polygons) = (plan.levels[0].resolution.n, plan.polygons);
+        let work = Duration::from_secs_f64((0.3 / hz + polygon_s * polygons) * load(f64::from(k) / hz, k));
+        control.observe(FrameWork { work, draw: work, skip: false });
+        n
+    };
+    (0..1200).map(frame).collect()
+}
+
+#[test]
+fn under_a_load_that_is_steady_to_a_fifth_n_changes_by_a_level_at_most_and_does_not_come_back_within_two_seconds() {
+    let noise = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 8) / f64::from(1_u32 << 24);
+    // trembling from frame to frame, swinging in seconds, and a neighbour that comes and goes
+    let loads: [&dyn Fn(f64, u32) -> f64; 4] = [
+        &|_, k| 0.8 + 0.4 * noise(k),
+        &|t, _| 1.0 + 0.2 * (2.0 * std::f64::consts::PI * t / 3.0).sin(),
+        &|t, _| 1.0 + 0.2 * (2.0 * std::f64::consts::PI * t / 0.5).sin(),
+        &|t, _| if t % 1.0 < 0.3 { 1.2 } else { 0.8 },
+    ];
+    for (which, load) in loads.into_iter().enumerate() {
+        // at every distance from a switch of n
+        for step in 0..24 {
+            let levels = levels_of_a_tube(4000.0 * 1.06_f64.powi(step), load);
+            let settled = &levels[120..];
+            let (least, most) = (settled.iter().min().unwrap(), settled.iter().max().unwrap());
+            assert!(most - least <= 1, "load {which}, start {step}: n from {least} to {most}");
+            let changes: Vec<usize> = (1..settled.len()).filter(|k| settled[*k] != settled[k - 1]).collect();
+            assert!(changes.windows(2).all(|pair| pair[1] - pair[0] > 120), "load {which}, start {step}: {changes:?}");
+        }
+    }
 }

@@ -5,6 +5,7 @@
 
 mod ahead;
 mod choose;
+mod limit;
 mod record;
 
 use super::assemble;
@@ -22,7 +23,7 @@ use super::visible_resolution::VisibleResolution;
 use cpu_time::ThreadTime;
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimTime};
-use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
+use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices};
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
@@ -268,14 +269,6 @@ impl Session {
             Law::Printed { .. } => LawKind::Printed.name(),
             Law::Corrected { .. } => LawKind::Corrected.name(),
         }
-    }
-
-    /// Message if the controller rests on a limit: which one; `None` if it does not.
-    #[must_use]
-    pub fn clamp(&self) -> Option<String> {
-        let status = self.control.status();
-        matches!(status, Status::Clamped(_) | Status::Reduced | Status::BetweenLevels | Status::Fixed)
-            .then(|| status.to_string())
     }
 
     /// The force between the user spring and an agent, newtons.

@@ -23,7 +23,7 @@ const PATCH_TRIANGLES: f64 = 12.0;
 const HOLD: f64 = 0.03;
 
 /// Ranges of ε narrower than this factor leave no room between two switches of n (a level and the band at both its ends).
-const NARROW: f64 = 2.83;
+const NARROW: f64 = 4.0;
 
 /// Shares are met to 1e-9: a request this near to an end of its range, relatively, counts as that end.
 const AT_AN_END: f64 = 1e-6;
@@ -180,7 +180,7 @@ fn tube_level(polygons: f64, length_m: f64, radius_m: f64, range: ResolutionRang
     hysteresis::floor(before, rho)
 }
 
-/// The highest level whose triangles fit, with hysteresis of a quarter of an octave in both directions.
+/// The highest level whose triangles fit, with hysteresis of half an octave in both directions.
 fn primitive_level(wish: f64, triangles: &[u32; PRIMITIVE_LEVELS], range: (u8, u8), before: Option<u8>) -> u8 {
     let band = if before.is_some() { libm::exp2(BAND) } else { 1.0 };
     let at = |n: u8| f64::from(triangles[level(n)]);
@@ -234,7 +234,7 @@ mod tests {
         let span = Span::of(&view);
         for start in 0..200 {
             let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), LastCut::default());
-            let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, √2 wide
+            let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, a factor 2 wide
             let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).resolution.n).collect();
             levels.dedup();
             assert!(levels.len() <= 2, "{middle}: {levels:?}");
@@ -278,13 +278,13 @@ mod tests {
     }
 
     #[test]
-    fn a_primitive_takes_the_level_that_fits_and_keeps_it_for_half_an_octave() {
+    fn a_primitive_takes_the_level_that_fits_and_keeps_it_for_an_octave() {
         let triangles: [u32; PRIMITIVE_LEVELS] = std::array::from_fn(|n| 48 << n);
         assert_eq!(primitive_level(400.0, &triangles, (0, 6), None), 3); // 384 of 400
-        assert_eq!(primitive_level(800.0, &triangles, (0, 6), Some(3)), 3); // 768 fits, but not by a quarter of an octave
-        assert_eq!(primitive_level(920.0, &triangles, (0, 6), Some(3)), 4);
-        assert_eq!(primitive_level(650.0, &triangles, (0, 6), Some(4)), 4);
-        assert_eq!(primitive_level(640.0, &triangles, (0, 6), Some(4)), 3);
+        assert_eq!(primitive_level(800.0, &triangles, (0, 6), Some(3)), 3); // 768 fits, but not by half an octave
+        assert_eq!(primitive_level(1090.0, &triangles, (0, 6), Some(3)), 4);
+        assert_eq!(primitive_level(550.0, &triangles, (0, 6), Some(4)), 4);
+        assert_eq!(primitive_level(540.0, &triangles, (0, 6), Some(4)), 3);
         assert_eq!(primitive_level(1.0, &triangles, (2, 6), Some(4)), 2);
         assert_eq!(primitive_level(12.0, &[12; PRIMITIVE_LEVELS], (1, 6), None), 6, "levels that cost the same");
     }
