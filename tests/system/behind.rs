@@ -25,7 +25,9 @@ fn at(report: &Value, watched: &str) -> [f64; 3] {
 /// The report of a built-in scene where each step of `model` takes so many microseconds, whatever it has to do; nobody flies apart.
 fn put_off(scene: &str, seconds: &str, (model, step_us): (&str, u32)) -> Value {
     let slow = [format!("machine.step.{model}.base_us={step_us}"), format!("machine.step.{model}.unit_us=0")];
-    let report = lockstep(scene, &["--seconds", seconds, "--set", &slow[0], "--set", &slow[1]]);
+    // its own share each: nothing is bought at a common price
+    let own = ["--seconds", seconds, "--policy", "feedback", "--set", &slow[0], "--set", &slow[1]];
+    let report = lockstep(scene, &own);
     for agent in report["agents"].as_array().unwrap() {
         assert!(!agent["parked"].as_bool().unwrap(), "{scene}: {agent}");
     }

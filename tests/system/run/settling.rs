@@ -1,4 +1,4 @@
-//! The picture's controller in a whole session: it settles, stays, rests on its clamps and leaves them.
+//! The feedback law in a whole session: it settles, stays, rests on its clamps and leaves them.
 
 use crate::play::{agent, lockstep, number};
 use metachron_lod::control::Status;
@@ -18,7 +18,7 @@ const WIDE: [(&str, &str); 3] = [
     ("target.margin", "0.1"),
 ];
 
-/// A built-in scene in virtual time.
+/// A built-in scene in virtual time, held by feedback.
 struct Play {
     session: Session,
     due: Duration,
@@ -28,6 +28,7 @@ impl Play {
     fn of(scene: &str, target_hz: f64, changes: &[(&str, &str)]) -> Self {
         let mut overrides: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         overrides.push(("executor".to_owned(), "\"lockstep\"".to_owned()));
+        overrides.push(("target.policy".to_owned(), "\"feedback\"".to_owned()));
         overrides.push(("target.frame_hz".to_owned(), target_hz.to_string()));
         metachron::scenes::provide();
         let source = builtin::find(scene).unwrap().source().unwrap();
@@ -95,7 +96,8 @@ fn past_its_reach_the_picture_rests_on_its_clamp_and_leaves_without_windup() {
 
 #[test]
 fn the_report_says_on_which_clamp_the_picture_rests() {
-    let clamped = |hz| lockstep("tube", &["--seconds", "2", "--target-fps", hz])["budget"]["clamped"].clone();
+    let feedback = ["--policy", "feedback", "--seconds", "2", "--target-fps"];
+    let clamped = |hz| lockstep("tube", &[&feedback[..], &[hz]].concat())["budget"]["clamped"].clone();
     assert!(clamped("5").as_str().unwrap().contains("finest"));
     assert!(clamped("190").as_str().unwrap().contains("coarsest"));
     assert!(clamped("30").is_null());
@@ -116,7 +118,10 @@ fn the_overload_scene_is_back_at_its_frame_rate_after_two_seconds_and_says_what_
     assert!(missed * 100 <= 3 * rest.len(), "{missed} of {}", rest.len());
     let changes: Vec<_> = changes.iter().map(|(key, value)| format!("{key}={value}")).collect();
     let changes = changes.iter().flat_map(|change| ["--set", change]);
-    let report = lockstep("overload", &["--seconds", "2"].into_iter().chain(changes).collect::<Vec<_>>());
+    let report = lockstep(
+        "overload",
+        &["--policy", "feedback", "--seconds", "2"].into_iter().chain(changes).collect::<Vec<_>>(),
+    );
     let strand = agent(&report, "strand 01");
     let gave_up = number(strand, "/eps_m") > 0.004 || number(strand, "/dt_ms") > 2.0;
     // while it was behind it made longer steps: nothing is lost
