@@ -25,6 +25,7 @@ mod local;
 mod matter;
 mod member;
 mod memory;
+mod motors;
 mod outside;
 mod plan;
 mod progress;
@@ -32,6 +33,7 @@ mod remote;
 mod scene;
 mod search;
 mod solve;
+mod spin_friction;
 mod springs;
 mod tearing;
 mod ties;
@@ -58,7 +60,8 @@ pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
-use search::Search;
+use search::{Judge, Round, Search};
+use spin_friction::{Spin, SpinFriction};
 use tearing::Tearing;
 pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
@@ -111,7 +114,12 @@ impl Participant<'_> {
             [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
             _ => law != Some(Law::Ledger),
         };
-        !(off || self.member.spares(other.id) || other.member.spares(self.id))
+        !(off || self.member.spares(other.id) || other.member.spares(self.id)) && self.meets(other)
+    }
+
+    /// Whether neither lets the other pass by its collision groups.
+    fn meets(&self, other: &Self) -> bool {
+        self.member.skin().zip(other.member.skin()).is_some_and(|(mine, theirs)| mine.form.meets(theirs.form))
     }
 }
 
@@ -164,6 +172,7 @@ pub struct ClusterStepper {
     search: Search,
     ties: Ties,
     joints: Joints,
+    spins: SpinFriction,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
@@ -203,6 +212,7 @@ impl ClusterStepper {
             search: Search::default(),
             ties: Ties::default(),
             joints: Joints::default(),
+            spins: SpinFriction::default(),
             progress: Vec::new(),
             members: Vec::new(),
             totals: Vec::new(),
@@ -354,6 +364,7 @@ impl ClusterStepper {
         if heap.is_on() {
             search.find_near(all, progress, h_s);
         }
+        search.sense(&Round { scene, all, progress, h_s, judge: Judge::Foreseen });
         heap.is_on()
     }
 
@@ -453,6 +464,12 @@ impl ClusterStepper {
         self.torn().is_empty() && self.yielded().is_empty()
     }
 
+    /// Whether a motor kept a joint moving in the last fine step: what is driven does not rest, however slow it is.
+    #[must_use]
+    pub const fn is_driven(&self) -> bool {
+        self.joints.drives
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
@@ -500,14 +517,16 @@ impl ClusterStepper {
 
     /// Starts every contact from what the last step gave.
     fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
-        for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
+        for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
             let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
+            owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
         }
     }
 
     /// Notes what the next step starts from.
     fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+        self.remember_spins(all, h_s);
         let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
@@ -515,7 +534,7 @@ impl ClusterStepper {
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
             // a blow is over
             let lasting = if contact.restitution > 0.0 { DVec3::ZERO } else { impulse };
-            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m };
+            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m, spin: owner.spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
@@ -534,7 +553,8 @@ impl ClusterStepper {
             if let Partner::Link(_) = owner.partner {
                 total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
             }
-            let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
+            let owed_slip_m = owner.owed_slip_m(row, *impulse, &self.progress, h_s);
+            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
@@ -542,11 +562,32 @@ impl ClusterStepper {
             let (now, other) = (all[a].context.time + dt, all[b].id);
             all[a].memory.meet(other, now);
         }
+        let mut sensed = search.sensed.as_slice();
         for (member, one) in all.iter_mut().enumerate() {
+            let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
+            sensed = others;
+            let begins = SimSpan::from_secs_f64(outside.after_s).unwrap_or(SimSpan::ZERO);
+            one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
             one.memory.turn(one.context.time + dt);
             if last {
                 ties.grips(member, &solution.rows_n_s, h_s, one.grips);
             }
+        }
+    }
+
+    /// Notes what the spins of contacts were given.
+    fn remember_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
+        let Self { solver, search, ties, spins, outside, progress, .. } = self;
+        let solution = solver.solution();
+        for (contact, row) in spins.rows(ties) {
+            let (impulse, row) = (solution.rows_n_s[row], &ties.rows[row]);
+            let owner = &mut search.owners[contact];
+            let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
+            let most = pressed * solution.contacts_n_s[contact].dot(normal);
+            let [a, b] = row.sides.map(|side| search::velocity(&side, |member| &progress[member].solved[..]));
+            owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
+            owner.spin.torque_n_m = impulse.dot(normal) / h_s;
+            outside.note(all, owner.member, &row.sides[1], -impulse);
         }
     }
 

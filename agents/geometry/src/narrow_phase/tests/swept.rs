@@ -217,7 +217,16 @@ fn static_solids_stop_what_falls_on_them_and_let_through_what_comes_from_behind(
         let obstacle = |rotation: DQuat| {
             let position = rotation * position;
             let (name, solid) = ("ground".to_owned(), solid.clone());
-            StaticSolid::new(&Obstacle { name, solid, position, rotation, friction: 0.0, restitution: 0.0 }).unwrap()
+            StaticSolid::new(&Obstacle {
+                name,
+                solid,
+                position,
+                rotation,
+                friction: 0.0,
+                restitution: 0.0,
+                traits: ContactTraits::default(),
+            })
+            .unwrap()
         };
         for turn in [DQuat::IDENTITY, tilt] {
             let ground = obstacle(turn);
