@@ -5,8 +5,9 @@
 //! Never here: bodies that bend, rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::between_steps::total_of;
 use super::progress::Progress;
-use super::{ClusterScene, PairTotal, Participant, Partner, Role, total_of};
+use super::{ClusterScene, PairTotal, Participant, Partner, Role};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, StepError};
 use metachron_geometry::narrow_phase::StaticSolid;

@@ -204,7 +204,9 @@ impl Search {
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
         });
         self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
-        self.near.retain(|&[a, b]| !(all[a].member.is_remote() && all[b].member.is_remote()));
+        let apart =
+            |[a, b]: [usize; 2]| all[a].member.is_remote() && all[b].member.is_remote() || !all[a].meets(&all[b]);
+        self.near.retain(|pair| !apart(*pair));
     }
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns

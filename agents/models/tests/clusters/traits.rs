@@ -256,3 +256,28 @@ fn what_spins_on_a_plate_gives_it_all_the_spin_that_it_loses() {
     assert!((after / before - 1.0).abs() < 1e-6, "{after} of {before} N m s");
     assert!(apart.abs() < 1e-4, "they turn as one in the end: {apart} rad/s");
 }
+
+#[test]
+fn a_heap_knows_groups_and_sensors() {
+    // four contacts each
+    let traits = |member_of| grouped(member_of, member_of);
+    let flat = Solid::Box { half_extents_m: DVec3::new(0.04, 0.04, 0.01) };
+    let at = |i: u32| DVec3::new(f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1, 0.01 - 2e-5);
+    let boxes = (0..300).map(|i| RigidSpec {
+        traits: if i < 295 { traits(TISSUE) } else { traits(TOOLS) },
+        ..rigid(flat.clone(), at(i), 0.1)
+    });
+    let sensor = ContactTraits { is_sensor: true, ..ContactTraits::default() };
+    let gate = Obstacle {
+        solid: Solid::Box { half_extents_m: DVec3::splat(0.02) },
+        position: DVec3::Z * 0.01,
+        ..floor(sensor)
+    };
+    let mut table = Table::among(boxes.map(body).collect(), &[floor(traits(TISSUE)), gate]);
+    table.play(0.2);
+    let heights: Vec<f64> = (0..300).map(|i| state(&table, i).position.z).collect();
+    assert!(heights[..295].iter().all(|z| (z - 0.01).abs() < 1e-3), "those of the floor's group lie");
+    assert!(heights[295..].iter().all(|z| *z < -0.1), "the others fall through it: {:?}", &heights[295..]);
+    let seen = sensed(&mut table, 0, SensorPartner::Static(1), 0.21);
+    assert!(seen.touching && seen.begins == 1, "{seen:?}");
+}
