@@ -3,6 +3,7 @@
 use super::closest_points::{near_segments, near_triangle};
 use super::signed_distance::{Ball, Field};
 use super::{Aabb, Obstacle, Solid};
+use crate::ContactTraits;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 

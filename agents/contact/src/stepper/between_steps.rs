@@ -29,8 +29,9 @@ impl ClusterStepper {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
             // a blow is over
-            let lasting = if contact.restitution > 0.0 { DVec3::ZERO } else { impulse };
-            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m, spin: owner.spin };
+            let (lasting, spin) =
+                if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {

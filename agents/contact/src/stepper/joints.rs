@@ -98,6 +98,16 @@ struct Together {
     name: Name,
 }
 
+/// What a joint is made of.
+struct Parts {
+    points: Together,
+    turns: Together,
+    /// The direction that it leaves free, world axes, of length 1.
+    axis: DVec3,
+    /// Its name for what neither tears nor yields it.
+    lasting: Name,
+}
+
 /// A row of a joint as it is laid out.
 struct LaidRow {
     /// The joint, by its place here.
@@ -169,8 +179,14 @@ impl Joints {
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
         self.held.push(Held { joint: *joint, members: (first, second), now, rotations: [a.rotation, b.rotation] });
+        self.lay_all(step, ties, &Parts { points, turns, axis: joint.axis(&a, anchors[1] - anchors[0]), lasting });
+    }
+
+    /// Lays out the rows of the joint that was noted last.
+    fn lay_all(&mut self, step: &FineStep<'_, '_>, ties: &mut Ties, parts: &Parts) {
+        let Parts { points, turns, axis, lasting } = *parts;
         let held = self.held.len() - 1;
-        let axis = joint.axis(&a, anchors[1] - anchors[0]);
+        let Held { joint, members: (_, second), now, .. } = self.held[held];
         let (mut key, mut driven) = (0, None);
         let mut push = |way: Way, of: Together, hold: Hold| {
             self.lay(step, ties, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
@@ -205,11 +221,9 @@ impl Joints {
         }
         if let Some((motor, Together { sides, .. })) = driven {
             let turns = matches!(joint.kind, JointKind::Revolute { .. });
-            let row = motor.row(&Motored { sides, axis, travel: now.travel, turns }, step.h_s);
-            // what it gives is not what holds the joint together
-            let owes = row.compliance_per_kg.is_none();
-            ties.push(step, row, RowOwner { owes, ..lasting.row(MOTOR, second) });
             self.drives |= motor.moves();
+            let row = motor.row(&Motored { sides, axis, travel: now.travel, turns }, step.h_s);
+            ties.motor(step, row, lasting.row(MOTOR, second));
         }
     }
 

@@ -3,6 +3,7 @@
 //! In: what a motor drives its joint to, where the joint is. Out: a row that gives at most what the motor may. Never here: joints' own
 //! rows (`joints.rs`). Theory: docs/theory/clusters.md, section 8.
 
+use super::ties::{FineStep, RowOwner, Ties};
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::joint::{Motor, MotorGoal};
 use glam::DVec3;
@@ -19,6 +20,14 @@ pub(super) struct Motored {
     pub travel: f64,
     /// Whether travel is known but for whole turns.
     pub turns: bool,
+}
+
+impl Ties {
+    /// Lays out the row of a motor. What it gives is not what holds its joint together.
+    pub fn motor(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) {
+        let owes = row.compliance_per_kg.is_none();
+        self.push(step, row, RowOwner { owes, ..owner });
+    }
 }
 
 impl Motor {

@@ -2,7 +2,7 @@
 
 use super::surfaces::{block_skin, flat_sheet};
 use super::*;
-use crate::{Obstacle, ShapeError, StaticSolid, StaticSolidError};
+use crate::{ContactTraits, Obstacle, ShapeError, StaticSolid, StaticSolidError};
 
 fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
     Obstacle {
