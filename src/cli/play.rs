@@ -3,7 +3,7 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
-use metachron_core::{AgentId, AttachmentEvent, ClusterState};
+use metachron_core::{AgentId, AttachmentEvent, ClusterState, SensorPartner, SensorTouch};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
@@ -11,11 +11,11 @@ use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
 use metachron_runtime::{AgentState, Spread};
 use metachron_session::report::{
     AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, MovedReport, OverlapReport,
-    ProbeReport, Quantiles, ReferenceReport, Report, summarise, summarise_choices, summarise_undrawn,
+    ProbeReport, Quantiles, ReferenceReport, Report, SensorReport, summarise, summarise_choices, summarise_undrawn,
 };
 use metachron_session::{
     AgentOutcome, Coupling, Drawing, End, Event, FrameRecord, Headless, Outcome, PairError, ProbeOutcome,
-    ReferenceComparison, Session, compare_with_reference, play_headless,
+    ReferenceComparison, Sensing, Session, compare_with_reference, play_headless,
 };
 #[cfg(feature = "viewer")]
 use metachron_viewer::ui::WindowError;
@@ -193,6 +193,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
         events: outcome.events.iter().map(|one| event(scene, one)).collect(),
+        sensors: outcome.sensors.iter().map(|one| sensor(scene, one)).collect(),
         clusters: clusters(scene, &outcome.clusters),
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
@@ -307,6 +308,16 @@ fn event(scene: &Scene, event: &Event) -> EventReport {
         b: with.map_or_else(|| "world".to_owned(), name),
         force_n,
     }
+}
+
+fn sensor(scene: &Scene, sensing: &Sensing) -> SensorReport {
+    let SensorTouch { with, touching, begins, ends, changed } = sensing.what;
+    let b = match with {
+        SensorPartner::Agent(id) => scene.name_of(id),
+        SensorPartner::Static(number) => scene.obstacles.get(number as usize).map_or("", |solid| solid.name.as_str()),
+    };
+    let (a, b) = (scene.name_of(sensing.agent).to_owned(), b.to_owned());
+    SensorReport { a, b, touching, begins, ends, changed_s: changed.as_secs_f64() }
 }
 
 fn reference_report(scene: &Scene, oracle: &ReferenceComparison) -> ReferenceReport {

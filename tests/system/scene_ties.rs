@@ -61,7 +61,7 @@ fn a_hinge_without_a_second_anchor_holds_both_objects_at_the_same_point() {
         r#"joint = [{ kind = "revolute", a = "left", b = "right", at_a_m = [0.5, 0, 0], axis = [0, 0, 2], range_deg = [-90, 0] }]"#,
     );
     let joint = scene.joints[0];
-    let JointKind::Revolute { axis, range_rad: Some([least, greatest]) } = joint.kind else { panic!("{joint:?}") };
+    let JointKind::Revolute { axis, range_rad: Some([least, greatest]), .. } = joint.kind else { panic!("{joint:?}") };
     assert_eq!((axis, greatest), (DVec3::Z, 0.0));
     assert!((least + std::f64::consts::FRAC_PI_2).abs() < 1e-15);
     // half a metre before the right box, whose axes are turned by 90 degrees about z

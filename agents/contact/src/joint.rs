@@ -41,6 +41,8 @@ pub enum JointKind {
         axis: DVec3,
         /// Range of b's rotation relative to a about the axis, radians about the zero of `rest`, within −π … π.
         range_rad: Option<[f64; 2]>,
+        /// What drives it, in radians and newton metres.
+        motor: Option<Motor>,
     },
     /// Rotation about every axis, like a ball in its socket.
     Spherical,
@@ -50,6 +52,8 @@ pub enum JointKind {
         axis: DVec3,
         /// Range of b's anchor relative to a's along the axis, metres.
         range_m: Option<[f64; 2]>,
+        /// What drives it, in metres and newtons.
+        motor: Option<Motor>,
     },
     /// A spring between the anchors.
     Spring {
@@ -65,6 +69,58 @@ pub enum JointKind {
         /// Length, metres, > 0.
         length_m: f64,
     },
+}
+
+/// A motor of a joint: of a hinge in radians and newton metres, of a slide in metres and newtons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motor {
+    /// What it drives the joint to.
+    pub goal: MotorGoal,
+    /// The most effort that it gives, N·m or N, > 0; infinite for as much as it takes.
+    pub max_effort: f64,
+}
+
+/// What a motor drives a joint to: how b moves relative to a.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MotorGoal {
+    /// A velocity, rad/s or m/s, kept as exactly as the bound of the motor allows.
+    Velocity(f64),
+    /// A spring and a damper: the effort stiffness · (position − travel) + damping · (velocity − rate of travel), implicit. Of a hinge the
+    /// position is reached the shorter way around.
+    Spring {
+        /// Where the spring rests, rad or m.
+        position: f64,
+        /// The velocity at which the damper gives nothing, rad/s or m/s.
+        velocity: f64,
+        /// Stiffness, N·m/rad or N/m, ≥ 0.
+        stiffness: f64,
+        /// Damping, N·m·s/rad or N·s/m, ≥ 0; one of both above zero.
+        damping: f64,
+    },
+}
+
+impl Motor {
+    /// Whether every number is in its range.
+    fn check(&self) -> Result<(), JointError> {
+        if self.max_effort.is_nan() || self.max_effort <= 0.0 {
+            let (what, value, wanted) = ("motor's greatest effort", self.max_effort, "above zero");
+            return Err(JointError::BadNumber { what, value, wanted });
+        }
+        let goal = |what, value: f64| {
+            let wanted = "at most 1e9 in magnitude";
+            if value.abs() <= NUMBER_MAX { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
+        };
+        match self.goal {
+            MotorGoal::Velocity(velocity) => goal("motor's velocity", velocity),
+            MotorGoal::Spring { position, velocity, stiffness, damping } => {
+                goal("motor's position", position)?;
+                goal("motor's velocity", velocity)?;
+                number("motor's stiffness", stiffness, 0.0)?;
+                number("motor's damping", damping, 0.0)?;
+                number("motor's stiffness and damping together", stiffness + damping, 1e-9)
+            }
+        }
+    }
 }
 
 /// Why a joint is invalid.
@@ -151,12 +207,14 @@ impl Joint {
         }
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
-            JointKind::Revolute { axis, range_rad } => {
+            JointKind::Revolute { axis, range_rad, motor } => {
                 direction(axis)?;
+                motor.as_ref().map_or(Ok(()), Motor::check)?;
                 range_rad.map_or(Ok(()), |r| range("angle range", r, std::f64::consts::PI, "between −π and π rad"))
             }
-            JointKind::Prismatic { axis, range_m } => {
+            JointKind::Prismatic { axis, range_m, motor } => {
                 direction(axis)?;
+                motor.as_ref().map_or(Ok(()), Motor::check)?;
                 range_m.map_or(Ok(()), |r| range("travel range", r, NUMBER_MAX, "at most 1e9 m"))
             }
             JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
@@ -176,7 +234,7 @@ impl Joint {
         let between = b.0 + b.1 * self.anchor_b_m - (a.0 + a.1 * self.anchor_a_m);
         let apart_m = match self.kind {
             JointKind::Fixed | JointKind::Revolute { .. } | JointKind::Spherical => between.length(),
-            JointKind::Prismatic { axis, range_m } => {
+            JointKind::Prismatic { axis, range_m, .. } => {
                 let axis = a.1 * axis.normalize();
                 let along = between.dot(axis);
                 let outside = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
@@ -248,7 +306,7 @@ mod tests {
         assert_eq!(Joint { yields_above_n: 1.9, tears_above_n: 2.0, ..rope(1.0) }.check(), Ok(()));
         let to_itself = Joint { b: Some(AgentId(0)), ..rope(1.0) };
         assert_eq!(to_itself.check(), Err(JointError::SameBody));
-        let hinge = |axis, range_rad| Joint { kind: JointKind::Revolute { axis, range_rad }, ..rope(1.0) };
+        let hinge = |axis, range_rad| Joint { kind: JointKind::Revolute { axis, range_rad, motor: None }, ..rope(1.0) };
         assert!(matches!(hinge(DVec3::ZERO, None).check(), Err(JointError::BadVector { .. })));
         assert!(matches!(hinge(DVec3::X, Some([4.0, 5.0])).check(), Err(JointError::BadNumber { .. })));
         assert!(matches!(hinge(DVec3::X, Some([1.0, 0.5])).check(), Err(JointError::EmptyRange { .. })));
@@ -263,7 +321,7 @@ mod tests {
         let socket = Joint { kind: JointKind::Spherical, anchor_a_m: DVec3::X, ..rope(1.0) };
         assert_eq!(socket.check_start(at(0.0), at(1.0)), Ok(()));
         assert!(matches!(socket.check_start(at(0.0), at(0.9)), Err(JointError::Apart { .. })));
-        let slide = JointKind::Prismatic { axis: DVec3::X, range_m: Some([0.0, 2.0]) };
+        let slide = JointKind::Prismatic { axis: DVec3::X, range_m: Some([0.0, 2.0]), motor: None };
         let slide = Joint { kind: slide, ..rope(1.0) };
         assert_eq!(slide.check_start(at(0.0), at(1.5)), Ok(()));
         assert!(matches!(slide.check_start(at(0.0), at(2.5)), Err(JointError::Apart { .. })));

@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{AttachmentEvent, Ledger, LocalModel, PairState};
+use crate::{AttachmentEvent, Ledger, LocalModel, PairState, SensorTouch};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -52,6 +52,8 @@ pub struct Snapshot {
     pub bonds: Vec<AgentId>,
     /// What happened to its attachments since the start; each is reported by one of its two agents.
     pub events: Vec<AttachmentEvent>,
+    /// What touched a sensor, or sensed it, since the start; each pair is reported by one of its two agents.
+    pub sensed: Vec<SensorTouch>,
 }
 
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
@@ -81,6 +83,7 @@ impl Snapshot {
         self.cluster = None;
         self.bonds.clear();
         self.events.clear();
+        self.sensed.clear();
     }
 
     /// The scene time that it belongs to: its own time plus its delay.

@@ -7,8 +7,8 @@ use metachron_geometry::narrow_phase::{
     NarrowPhaseScratch, RestShape, SweptReach, SweptShape, VoronoiRegions, first_touch, self_touches, touches,
 };
 use metachron_geometry::{
-    CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape, StaticSolid,
-    SurfaceShape, Touch,
+    CollisionShape, ContactTraits, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape,
+    StaticSolid, SurfaceShape, Touch,
 };
 use std::error::Error;
 use std::time::Instant;
@@ -83,7 +83,7 @@ fn time(what: &str, size: u32, mut search: impl FnMut(&mut NarrowPhaseScratch, &
 /// The search of a tube that is wound up in turns that touch.
 fn coil(segments: u32) -> impl FnMut(&mut NarrowPhaseScratch, &mut Vec<Touch>) {
     let kind = ShapeKind::Chain;
-    let form = CollisionShape { kind, friction: 0.5, restitution: 0.0 };
+    let form = CollisionShape::new(kind, 0.5);
     let node = |i: u32| {
         let angle = 0.25 * f64::from(i);
         let rise_m = 0.0101 / std::f64::consts::TAU * angle;
@@ -101,7 +101,7 @@ fn coil(segments: u32) -> impl FnMut(&mut NarrowPhaseScratch, &mut Vec<Touch>) {
 
 fn rigid(solid: Solid) -> Result<CollisionShape, ShapeError> {
     let kind = ShapeKind::Solid(SolidShape::new(solid, DVec3::ZERO)?);
-    Ok(CollisionShape { kind, friction: 0.5, restitution: 0.0 })
+    Ok(CollisionShape::new(kind, 0.5))
 }
 
 /// The points and triangles of a flat square of so many cells a side.
@@ -120,7 +120,15 @@ fn ground(cells: u32) -> Result<StaticSolid, Box<dyn Error>> {
     let (points, triangles) = square(cells);
     let solid = Solid::Mesh { points_m: points.into(), triangles: triangles.into() };
     let (position, rotation) = (DVec3::ZERO, DQuat::IDENTITY);
-    let ground = Obstacle { name: "ground".to_owned(), solid, position, rotation, friction: 0.5, restitution: 0.0 };
+    let ground = Obstacle {
+        name: "ground".to_owned(),
+        solid,
+        position,
+        rotation,
+        friction: 0.5,
+        restitution: 0.0,
+        traits: ContactTraits::default(),
+    };
     Ok(StaticSolid::new(&ground)?)
 }
 
@@ -140,5 +148,5 @@ fn sheet(cells: u32) -> (CollisionShape, Vec<DVec3>) {
         edge_m: 1.14 * CELL_M,
         closed: false,
     };
-    (CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }, points)
+    (CollisionShape::new(ShapeKind::Surface(surface), 0.5), points)
 }

@@ -4,7 +4,7 @@
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
 
 use super::narrow_phase::{TouchKey, VoronoiRegions};
-use crate::{Aabb, ShapeError, Solid, ToolShape};
+use crate::{Aabb, CombineRule, ContactTraits, ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
@@ -14,10 +14,61 @@ use std::sync::Arc;
 pub struct CollisionShape {
     /// Its shape.
     pub kind: ShapeKind,
-    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
+    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean, where neither side's traits say otherwise.
     pub friction: f64,
-    /// Coefficient of restitution, 0 … 1; a pair takes the larger.
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger, where neither side's traits say otherwise.
     pub restitution: f64,
+    /// What else it says about its contacts.
+    pub traits: ContactTraits,
+}
+
+impl CollisionShape {
+    /// A shape of this friction that does not rebound, with the traits of most.
+    #[must_use]
+    pub fn new(kind: ShapeKind, friction: f64) -> Self {
+        Self { kind, friction, restitution: 0.0, traits: ContactTraits::default() }
+    }
+
+    /// Whether the two collide or sense each other where they meet.
+    #[must_use]
+    pub const fn meets(&self, other: &Self) -> bool {
+        self.traits.groups.meet(other.traits.groups)
+    }
+
+    /// Whether the two only sense each other: no force acts between them.
+    #[must_use]
+    pub const fn senses(&self, other: &Self) -> bool {
+        self.traits.is_sensor || other.traits.is_sensor
+    }
+
+    /// Whether contacts of the two give forces.
+    #[must_use]
+    pub const fn presses(&self, other: &Self) -> bool {
+        self.meets(other) && !self.senses(other)
+    }
+
+    /// Coulomb's coefficient of the two (contact.md, eq. 13).
+    #[must_use]
+    pub fn friction_with(&self, other: &Self) -> f64 {
+        let rules = [self.traits.friction_rule, other.traits.friction_rule];
+        CombineRule::of_pair(rules, CombineRule::GeometricMean).combine([self.friction, other.friction])
+    }
+
+    /// The radius of the patch by which the two resist spin about the normals of their contacts, metres (contact.md, eq. 13).
+    #[must_use]
+    pub const fn spin_radius_with_m(&self, other: &Self) -> f64 {
+        self.traits.spin_radius_m.max(other.traits.spin_radius_m)
+    }
+
+    /// The coefficient of restitution of the two (contact.md, eq. 13): what bends gives back what it has stored, and has none.
+    #[must_use]
+    pub fn restitution_with(&self, other: &Self) -> f64 {
+        if [self, other].iter().any(|side| matches!(side.kind, ShapeKind::Chain | ShapeKind::Surface(_))) {
+            return 0.0;
+        }
+        let rules = [self.traits.restitution_rule, other.traits.restitution_rule];
+        CombineRule::of_pair(rules, CombineRule::Max).combine([self.restitution, other.restitution])
+    }
 }
 
 /// The kinds of shapes.

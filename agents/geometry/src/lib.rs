@@ -10,7 +10,7 @@
 //!
 //! let kind = |solid| ShapeKind::Solid(SolidShape::new(solid, DVec3::ZERO).unwrap());
 //! let [ball, block] = [Solid::Ball { radius_m: 0.5 }, Solid::Box { half_extents_m: DVec3::ONE }]
-//!     .map(|solid| CollisionShape { kind: kind(solid), friction: 0.5, restitution: 0.0 });
+//!     .map(|solid| CollisionShape::new(kind(solid), 0.5));
 //! let at = |form, x: f64| {
 //!     let view = ShapePose::Solid { position: DVec3::X * x, rotation: DQuat::IDENTITY };
 //!     PlacedShape { form, view }
@@ -25,6 +25,7 @@ pub mod cage;
 pub mod capsule_chain;
 pub mod closest_points;
 pub mod collision_shape;
+pub mod contact_traits;
 pub mod foliage;
 pub mod furniture;
 pub mod generate;
@@ -52,6 +53,7 @@ pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
+pub use contact_traits::{CollisionGroups, CombineRule, ContactTraits};
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate, generate_surface};
 pub use geodesic::geodesic_edges;

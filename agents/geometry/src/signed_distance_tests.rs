@@ -3,12 +3,22 @@
 use super::closest_points::{near_segments, near_triangle};
 use super::signed_distance::{Ball, Field};
 use super::{Aabb, Obstacle, Solid};
+use crate::ContactTraits;
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 fn place(solid: Solid) -> Field {
     let (position, rotation) = (DVec3::new(0.3, -0.2, 0.1), DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -0.7, 1.1));
-    Field::new(&Obstacle { name: String::new(), solid, position, rotation, friction: 0.0, restitution: 0.0 }).unwrap()
+    Field::new(&Obstacle {
+        name: String::new(),
+        solid,
+        position,
+        rotation,
+        friction: 0.0,
+        restitution: 0.0,
+        traits: ContactTraits::default(),
+    })
+    .unwrap()
 }
 
 fn corners(half: DVec3) -> Vec<DVec3> {
@@ -137,6 +147,7 @@ fn quads(quads: &[[DVec3; 4]]) -> Field {
         rotation: DQuat::IDENTITY,
         friction: 0.0,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     })
     .unwrap()
 }
@@ -186,6 +197,7 @@ fn a_thin_plate_touches_on_the_near_side_only() {
         rotation: DQuat::IDENTITY,
         friction: 0.0,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     })
     .unwrap();
     for (z, normal, distance) in [(0.01, DVec3::Z, 0.009), (-0.01, DVec3::NEG_Z, 0.009), (0.0005, DVec3::Z, -0.0005)] {

@@ -1,5 +1,6 @@
 //! Solid shapes of rigid bodies and static obstacles.
 
+use crate::ContactTraits;
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -77,4 +78,6 @@ pub struct Obstacle {
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1.
     pub restitution: f64,
+    /// What else it says about its contacts.
+    pub traits: ContactTraits,
 }

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_geometry::ContactTraits;
 use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::time::Instant;
 
@@ -46,6 +47,7 @@ fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
         velocity: DVec3::ZERO,
         held: vec![held],
         friction: 0.5,
+        traits: ContactTraits::default(),
         gravity: DVec3::Z * -9.81,
         self_contact: false,
         sleep: false,

@@ -3,7 +3,7 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour};
 use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange, SimSpan, Snapshot};
-use metachron_geometry::Solid;
+use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::conformance::fall_deviation;
 use metachron_models::conformance::{Suite, check};
 use metachron_models::rigid::RigidBody;
@@ -49,6 +49,7 @@ fn brick() -> RigidSpec {
         mass_kg: 0.7,
         restitution: 0.5,
         friction: 0.4,
+        traits: ContactTraits::default(),
         gravity: GRAVITY,
         sleep: true,
     }
@@ -194,6 +195,7 @@ fn check_grasping(pivot_m: Option<DVec3>) {
         graspable: vec![held],
         pivot_m,
         starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
     };
     let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let suite = Suite {
@@ -235,6 +237,7 @@ fn a_tool_driven_at_constant_speed_keeps_every_promise() {
         graspable: vec![],
         pivot_m: None,
         starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
     };
     let make = || Box::new(Tool::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let straight = |agent: &dyn Agent, t: f64| {
@@ -288,6 +291,7 @@ fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
             velocity: DVec3::ZERO,
             held: vec![],
             friction: 0.3,
+            traits: ContactTraits::default(),
             gravity: GRAVITY,
             self_contact: false,
             sleep: false,

@@ -151,6 +151,8 @@ impl ClusterSeat {
         into.grips.clone_from(&self.grips);
         into.pairs.clone_from(&self.pairs);
         into.events.clone_from(&self.events);
+        into.sensed.clear();
+        into.sensed.extend_from_slice(self.memory.sensed());
         into.bonds.clone_from(&self.bonds);
         into.touches.clone_from(&self.sleepers);
         into.cluster = self.state;
@@ -288,7 +290,8 @@ impl AgentRunner {
                     doubling.compare(&list);
                 }
                 // what held until now may have kept them still
-                let calm = stepper.held_fast() && list.iter().all(|one| one.member.is_calm());
+                let still = stepper.held_fast() && !stepper.is_driven();
+                let calm = still && list.iter().all(|one| one.member.is_calm());
                 Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
             })
         });

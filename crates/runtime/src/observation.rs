@@ -77,7 +77,7 @@ impl Peer {
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
         let (Some(mine), Some(theirs)) = (&self.form, &other.form) else { return false };
-        !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
+        mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
     /// The neighbour `other` as seen by this agent.

@@ -241,7 +241,7 @@ fn recorded(context: &StepContext<'_>) -> RecordedStep {
 
 fn ball_form(radius_m: f64) -> Arc<CollisionShape> {
     let solid = SolidShape::new(Solid::Ball { radius_m }, DVec3::ZERO).unwrap();
-    Arc::new(CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.0, restitution: 0.0 })
+    Arc::new(CollisionShape::new(ShapeKind::Solid(solid), 0.0))
 }
 
 impl Agent for Dummy {

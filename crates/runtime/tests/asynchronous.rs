@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Body, PairKind, Snapshot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::{AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Run, StepPrice};
 use std::sync::Arc;
@@ -27,6 +27,7 @@ fn body(name: &str, solid: Solid, height_m: f64, mass_kg: f64, rate_hz: f64) -> 
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     };
     let scene = Arc::new(ClusterScene::new(&[floor]).unwrap());
     AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(RigidBody::new(spec).unwrap()), rate_hz) }

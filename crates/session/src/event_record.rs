@@ -1,8 +1,9 @@
-//! What happened once in a run: attachments that yielded or tore.
+//! What happened in a run: attachments that yielded or tore, sensors that were touched.
 //!
-//! In: the last states of all agents, each of which has all that it tells of. Out: events in the order of time. Never here: forces, names.
+//! In: the last states of all agents, each of which has all that it tells of. Out: events in the order of time, sensors by agents.
+//! Never here: forces, names.
 
-use metachron_core::{AgentId, AttachmentEvent, Snapshot};
+use metachron_core::{AgentId, AttachmentEvent, SensorTouch, Snapshot};
 
 /// What happened to an attachment in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +21,21 @@ pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Even
     let mut events: Vec<Event> = (0..).map(AgentId).zip(states).flat_map(reported).collect();
     events.sort_by_key(|event| (event.what.at, event.what.attachment, event.what.kind, event.agent));
     events
+}
+
+/// What a sensor was touched by in a run, or what touched a sensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensing {
+    /// The agent that tells of it: of two the one of lower number.
+    pub agent: AgentId,
+    /// By what, and how often.
+    pub what: SensorTouch,
+}
+
+/// What the agents in `states`, by rising numbers, tell of sensors.
+pub(super) fn sensed<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Sensing> {
+    let told = |(agent, state): (AgentId, &'a Snapshot)| state.sensed.iter().map(move |&what| Sensing { agent, what });
+    (0..).map(AgentId).zip(states).flat_map(told).collect()
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ pub use assemble::law;
 pub use coupling_record::Coupling;
 pub use error::SessionError;
 pub use error_control::ToleranceStatus;
-pub use event_record::Event;
+pub use event_record::{Event, Sensing};
 pub use experiment::{Design, Experiment, ExperimentResult, experiment};
 #[cfg(feature = "picture")]
 pub use fly_through::FlyThrough;

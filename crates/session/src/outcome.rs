@@ -4,7 +4,7 @@
 
 use super::coupling_record::Coupling;
 use super::error_control::ToleranceStatus;
-use super::event_record::Event;
+use super::event_record::{Event, Sensing};
 use super::trace::Trace;
 use glam::DVec3;
 use metachron_core::{ClusterState, Resolution};
@@ -121,6 +121,8 @@ pub struct Outcome {
     pub couplings: Vec<Coupling>,
     /// What happened once, in the order of time.
     pub events: Vec<Event>,
+    /// What touched sensors.
+    pub sensors: Vec<Sensing>,
     /// Each agent's part in the contact cluster that it was stepped in last.
     pub clusters: Vec<Option<ClusterState>>,
     /// States of the agents over time, if requested ([`crate::Session::keep_trace`]).

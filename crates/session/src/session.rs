@@ -16,7 +16,7 @@ use super::cpu_budget::CpuBudget;
 use super::error::SessionError;
 use super::error_control;
 use super::error_control::ErrorStatus;
-use super::event_record::events;
+use super::event_record::{events, sensed};
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::trace::Trace;
 use super::visible_resolution::VisibleResolution;
@@ -438,6 +438,7 @@ impl Session {
                 .collect(),
             couplings: self.couplings.all().to_vec(),
             events: events(last.iter().map(|state| &**state)),
+            sensors: sensed(last.iter().map(|state| &**state)),
             clusters: last.iter().map(|state| state.cluster).collect(),
             trace: self.trace,
             clamp,

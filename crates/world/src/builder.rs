@@ -10,8 +10,8 @@ use super::kinds::{
 use super::scene::{Appearance, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Obstacle, Solid};
-use metachron_models::rigid::RigidSpec;
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
 use std::sync::Arc;
 
@@ -40,6 +40,20 @@ pub enum SceneBuildError {
         /// The name.
         name: String,
     },
+    /// A joint names what is no rigid body.
+    #[error("a joint names \"{name}\", which is no rigid body of the scene")]
+    NoBody {
+        /// The name.
+        name: String,
+    },
+    /// A joint cannot be.
+    #[error("the joint of \"{name}\" cannot be: {reason}")]
+    BadJoint {
+        /// The first body.
+        name: String,
+        /// Why.
+        reason: String,
+    },
     /// A rate is outside its range.
     #[error("the rate of \"{name}\" is {rate_hz} Hz; expected 1 to 100000 Hz")]
     BadRate {
@@ -56,6 +70,16 @@ pub struct SceneBuilder {
     gravity: DVec3,
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
+    joints: Vec<Joined>,
+}
+
+/// A joint by the names of its bodies; no second one is the world.
+#[derive(Debug, Clone)]
+struct Joined {
+    a: String,
+    b: Option<String>,
+    kind: JointKind,
+    at_m: DVec3,
 }
 
 /// What can be added to a scene: a [`Rigid`] body or a [`Tube`].
@@ -163,6 +187,13 @@ impl Rigid {
         self
     }
 
+    /// What it says about its contacts: whom it meets, rules of pairs, whether it only senses.
+    #[must_use]
+    pub const fn contact(mut self, traits: ContactTraits) -> Self {
+        self.spec.traits = traits;
+        self
+    }
+
     /// Steps a simulated second, 1 … 100000.
     #[must_use]
     pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
@@ -267,7 +298,7 @@ impl Tube {
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
     pub(super) const fn new() -> Self {
-        Self { gravity: GRAVITY_DEFAULT, fixed: Vec::new(), parts: Vec::new() }
+        Self { gravity: GRAVITY_DEFAULT, fixed: Vec::new(), parts: Vec::new(), joints: Vec::new() }
     }
 
     /// Gravity, m/s².
@@ -285,10 +316,24 @@ impl SceneBuilder {
 
     /// A solid that never moves, with its axes at `position_m`, metres, turned by `rotation`.
     #[must_use]
-    pub fn fixed_at(mut self, name: impl Into<String>, solid: Solid, position_m: [f64; 3], rotation: DQuat) -> Self {
+    pub fn fixed_at(self, name: impl Into<String>, solid: Solid, position_m: [f64; 3], rotation: DQuat) -> Self {
         let (friction, restitution) = SURFACE;
         let (name, position) = (name.into(), position_m.into());
-        self.fixed.push(Obstacle { name, solid, position, rotation, friction, restitution });
+        self.obstacle(Obstacle { name, solid, position, rotation, friction, restitution, traits: ContactTraits::NONE })
+    }
+
+    /// A solid that never moves, with its own friction, restitution and traits.
+    #[must_use]
+    pub fn obstacle(mut self, obstacle: Obstacle) -> Self {
+        self.fixed.push(obstacle);
+        self
+    }
+
+    /// Joins the rigid bodies `a` and `b`, or `a` and the world, at a place where both are at the start, metres. The joint's axis is in
+    /// the axes of a's shape. Springs and ropes, which have two ends, are not for this.
+    #[must_use]
+    pub fn joint(mut self, a: &str, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
+        self.joints.push(Joined { a: a.to_owned(), b: b.map(str::to_owned), kind, at_m: at_m.into() });
         self
     }
 
@@ -304,7 +349,7 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
-        let Self { gravity, fixed, parts } = self;
+        let Self { gravity, fixed, parts, joints } = self;
         let names: Vec<&String> =
             fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
         if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
@@ -314,6 +359,8 @@ impl SceneBuilder {
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
+        let agents = agents?;
+        let joints: Result<Arc<[_]>, _> = joints.iter().map(|joined| joined.between(&agents)).collect();
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -334,13 +381,13 @@ impl SceneBuilder {
             },
             camera: None,
             machine: Machine::default(),
-            agents: agents?,
+            agents,
             obstacle_appearances: obstacles.iter().map(|_| DEFAULT_APPEARANCE).collect(),
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
             contacts: true,
-            joints: Arc::new([]),
+            joints: joints?,
             couplings: Vec::new(),
             probes: Vec::new(),
             overlaps: Vec::new(),
@@ -348,6 +395,30 @@ impl SceneBuilder {
         };
         scene.resolve_initial_overlaps();
         Ok(scene)
+    }
+}
+
+impl Joined {
+    /// The joint of these agents.
+    fn between(&self, agents: &[Member]) -> Result<Joint, SceneBuildError> {
+        let body = |name: &String| {
+            let found = agents.iter().find(|member| member.name == *name);
+            let spec = found.and_then(|member| if let Spec::Rigid(spec) = &member.spec { Some(spec) } else { None });
+            let id = found.map_or(AgentId(0), |member| member.id);
+            spec.map(|spec| (id, spec)).ok_or_else(|| SceneBuildError::NoBody { name: name.clone() })
+        };
+        let (id, a) = body(&self.a)?;
+        let b = self.b.as_ref().map(body).transpose()?;
+        let local = |spec: &RigidSpec| spec.rotation.conjugate() * (self.at_m - spec.position);
+        let joint = Joint {
+            anchor_a_m: local(a),
+            anchor_b_m: b.map_or(self.at_m, |(_, spec)| local(spec)),
+            ..Joint::new(id, b.map(|(id, _)| id), self.kind)
+        };
+        let joint = joint.at_rest_in(a.rotation, b.map_or(DQuat::IDENTITY, |(_, spec)| spec.rotation));
+        let bad = |error: JointError| SceneBuildError::BadJoint { name: self.a.clone(), reason: error.to_string() };
+        joint.check().map_err(bad)?;
+        Ok(joint)
     }
 }
 

@@ -198,7 +198,7 @@ impl OverlapSearch<'_> {
         }
         // a tool passes through static solids
         for obstacle in self.scene.obstacles.iter().filter(|_| shape.shaft_direction().is_none()) {
-            if let Some(fixed) = shape.obstacle_shape(obstacle) {
+            if let Some(fixed) = shape.obstacle_shape(obstacle).filter(|fixed| shape.form.presses(&fixed.form)) {
                 look(&fixed, &mut self.scratch);
             }
         }

@@ -77,7 +77,7 @@ impl StartShape {
         };
         let form = SolidShape::new(solid, DVec3::ZERO).ok()?;
         let radius = DVec3::splat(form.radius_m);
-        let form = CollisionShape { kind: ShapeKind::Solid(form), friction: 0.0, restitution: 0.0 };
+        let form = CollisionShape { traits: obstacle.traits, ..CollisionShape::new(ShapeKind::Solid(form), 0.0) };
         let fixed =
             Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
         self.box_touches(&fixed, 0.0).then_some(fixed)
@@ -96,7 +96,8 @@ impl StartShape {
 
 /// The shape of an agent at its start; `None` for one without contact.
 pub(super) fn shape(member: &Member) -> Option<StartShape> {
-    let form = |kind| CollisionShape { kind, friction: 0.0, restitution: 0.0 };
+    let traits = member.spec.traits();
+    let form = |kind| CollisionShape { traits, ..CollisionShape::new(kind, 0.0) };
     let (kind, place, low, high) = match &member.spec {
         Spec::Rigid(spec) => {
             let solid = SolidShape::new(spec.solid.clone(), DVec3::ZERO).ok()?;

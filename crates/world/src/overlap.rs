@@ -69,6 +69,9 @@ impl Scene {
             let held = !(self.is_free(shape.id) || matches!(self.agents[shape.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {
                 let Some(fixed) = shape.obstacle_shape(obstacle) else { continue };
+                if !shape.form.presses(&fixed.form) {
+                    continue;
+                }
                 touches(&shape.placed(), &fixed.placed(), 0.0, &mut scratch, &mut found);
                 let counts = |touch: &&Touch| match touch.on_a {
                     Place::Chain { radius_m, .. } if held => touch.gap_m < -radius_m - OVERLAP_MIN_M,
@@ -131,6 +134,6 @@ impl Scene {
     pub(super) fn collide(&self, one: &StartShape, two: &StartShape, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
         let led = |shape: &StartShape| matches!(shape.form.kind, ShapeKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
-        named != self.contacts && !(led(one) && led(two))
+        named != self.contacts && !(led(one) && led(two)) && one.form.presses(&two.form)
     }
 }

@@ -7,7 +7,7 @@ use crate::scene::{Member, Spec};
 use glam::DVec3;
 use metachron_contact::Agent;
 use metachron_core::{Body, CurveState, ResolutionRange, Snapshot};
-use metachron_geometry::{Aabb, cage_counts};
+use metachron_geometry::{Aabb, ContactTraits, cage_counts};
 use metachron_models::rod::{Integrator, Tube, TubeSpec};
 use metachron_models::soft::{MaterialLaw, NodeSpacing, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
@@ -54,6 +54,18 @@ impl Spec {
     #[must_use]
     pub const fn is_deformable(&self) -> bool {
         matches!(self, Self::Tube(_) | Self::Soft(_))
+    }
+
+    /// What the object says about its contacts.
+    #[must_use]
+    pub const fn traits(&self) -> ContactTraits {
+        match self {
+            Self::Tube(spec) => spec.traits,
+            Self::Rigid(spec) => spec.traits,
+            Self::Soft(spec) => spec.traits,
+            Self::Tool(spec) => spec.traits,
+            Self::Synthetic(_) => ContactTraits::NONE,
+        }
     }
 
     /// Moves the start of a body by `by` metres; a tool stays on its path.
@@ -180,6 +192,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
         velocity: DVec3::ZERO,
         held: held.filter(|(_, end)| tube.clamp[*end] || tube.pin[*end]).map(|(side, _)| side).collect(),
         friction: tube.friction,
+        traits: tube.traits,
         gravity: tube.gravity,
         self_contact: false,
         sleep: tube.sleep,

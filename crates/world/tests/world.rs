@@ -1,7 +1,9 @@
 //! Worlds built in code: what they give against closed forms, on every executor.
 
-use metachron_core::{Body, SimSpan, Snapshot};
-use metachron_geometry::Solid;
+use glam::{DQuat, DVec3};
+use metachron_core::{Body, SensorPartner, SimSpan, Snapshot};
+use metachron_geometry::{CollisionGroups, ContactTraits, Obstacle, Solid};
+use metachron_models::rigid::{JointKind, Motor, MotorGoal};
 use metachron_runtime::Command;
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError};
@@ -136,4 +138,45 @@ fn a_pressure_that_a_program_sets_widens_a_tube_on_every_executor() {
         assert!(((radius() - radius_m) / wanted_m - 1.0).abs() < 1e-9, "{executor:?}: {} m", radius() - radius_m);
         assert!(world.send(hose.id(), Command::SetPressure(f64::NAN)).is_err());
     }
+}
+
+#[test]
+fn a_sensor_a_motor_and_groups_are_said_in_code_as_in_scenes() {
+    let sensor = ContactTraits { is_sensor: true, ..ContactTraits::NONE };
+    let ghost =
+        ContactTraits { groups: CollisionGroups { member_of: 0b01, collides_with: 0b01 }, ..ContactTraits::NONE };
+    let grounded =
+        ContactTraits { groups: CollisionGroups { member_of: 0b10, collides_with: 0b10 }, ..ContactTraits::NONE };
+    let still = |name: &str, solid, z: f64, traits| Obstacle {
+        name: name.to_owned(),
+        solid,
+        position: DVec3::Z * z,
+        rotation: DQuat::IDENTITY,
+        friction: 0.5,
+        restitution: 0.0,
+        traits,
+    };
+    let motor = Some(Motor { goal: MotorGoal::Velocity(2.0), max_effort: f64::INFINITY });
+    let hinge = JointKind::Revolute { axis: DVec3::Z, range_rad: None, motor };
+    let gate = Solid::Box { half_extents_m: DVec3::splat(0.1) };
+    let builder = Scene::builder()
+        .obstacle(still("floor", Solid::Plane, 0.0, grounded))
+        .obstacle(still("gate", gate, 0.3, sensor))
+        .add("ghost", Rigid::ball(0.05).at([0.0, 0.0, 0.6]).contact(ghost))
+        .add("wheel", Rigid::ball(0.05).at([2.0, 0.0, 1.0]));
+    // the world turns by −2 rad/s against what is a
+    let scene = builder.clone().joint("wheel", None, hinge, [2.0, 0.0, 1.0]).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    world.advance(span(1.0));
+    let state = world.latest(world.object("ghost").unwrap());
+    assert!(height_m(&state) < -3.0, "it falls through the floor: {} m", height_m(&state));
+    let [touch] = state.sensed.as_slice() else { panic!("{:?}", state.sensed) };
+    assert_eq!((touch.with, touch.begins, touch.ends), (SensorPartner::Static(1), 1, 1));
+    let Body::Rigid(wheel) = &world.latest(world.object("wheel").unwrap()).body.clone() else { panic!("a rigid body") };
+    assert!((wheel.spin.z + 2.0).abs() < 1e-3, "{}", wheel.spin);
+    assert_eq!(wheel.position, DVec3::new(2.0, 0.0, 1.0).with_z(wheel.position.z));
+    let nobody = builder.clone().joint("wheel", Some("nobody"), hinge, [0.0; 3]).build().unwrap_err();
+    assert_eq!(nobody, SceneBuildError::NoBody { name: "nobody".to_owned() });
+    let endless = JointKind::Rope { length_m: f64::NAN };
+    assert!(matches!(builder.joint("wheel", None, endless, [0.0; 3]).build(), Err(SceneBuildError::BadJoint { .. })));
 }

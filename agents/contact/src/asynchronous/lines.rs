@@ -120,8 +120,9 @@ impl Lines {
         };
         let velocity = side.velocity(one.member.velocities()) + led_m_s - far_m_s;
         let slip = velocity - along(velocity);
-        let frictions = [one.member.skin().map_or(0.0, |skin| skin.form.friction), friction(other)];
-        let rub = slip * (-(frictions[0] * frictions[1]).sqrt() * line.pushed_n / slip.length().max(STICK_M_S));
+        let forms = one.member.skin().map(|skin| skin.form).zip(other.form.as_deref());
+        let friction = forms.map_or(0.0, |(mine, theirs)| mine.friction_with(theirs));
+        let rub = slip * (-friction * line.pushed_n / slip.length().max(STICK_M_S));
         stepper.outside().known.push(KnownImpulse { member: place, side, impulse: rub * dt_s });
         let row = LineRow {
             member: place,
@@ -238,8 +239,4 @@ impl LineAt {
             lines.push(row);
         }
     }
-}
-
-fn friction(other: &Neighbour) -> f64 {
-    other.form.as_deref().map_or(0.0, |form| form.friction)
 }

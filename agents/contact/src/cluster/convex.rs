@@ -75,6 +75,7 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, p
     }
     for finished in 1..passes_max {
         iterate.keep(&mut stores.pass);
+        iterate.press();
         let hardened = harden(iterate, aim.yield_m_s);
         if !hardened && largest_miss(iterate, Form::Disc) < aim.tolerance_m_s {
             return Passes { finished, settled: true };
@@ -86,6 +87,7 @@ pub(super) fn solve(iterate: &mut Iterate, stores: &mut Stores, aim: &Aim<'_>, p
             return Passes { finished, settled: false };
         }
     }
+    iterate.press();
     Passes { finished: passes_max, settled: largest_miss(iterate, Form::Disc) < aim.tolerance_m_s }
 }
 
@@ -116,6 +118,7 @@ fn restart(iterate: &mut Iterate, stores: &mut Stores, full: Pass<'_>) -> bool {
 
 /// Minimises eq. 10; on success impulses and velocities are those of its minimum, else neither is of use.
 fn descend(iterate: &mut Iterate, shifts: &[f64], pass: Pass<'_>) -> bool {
+    iterate.press();
     for step in 0..=pass.steps {
         evaluate(iterate, shifts);
         let mut led = iterate.look_ahead(pass.members, false);

@@ -213,8 +213,14 @@ impl Iterate {
         any
     }
 
+    /// Bounds rows by what presses their contacts now.
+    pub fn press(&mut self) {
+        self.rows.press(&self.state.lambda);
+    }
+
     /// Makes impulses those that laws allow; returns whether any was not.
     pub fn allow(&mut self) -> bool {
+        self.press();
         let mut any = false;
         for (row, impulse) in self.rows.rows.iter().zip(&mut self.state.lambda) {
             let allowed = row.law.project(Form::Disc, *impulse).value;

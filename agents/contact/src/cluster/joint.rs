@@ -3,6 +3,7 @@
 //! In: sides, directions, bounds. Out: the same with names. Never here: which rows make up a joint of a model, its state.
 //! Theory: `docs/theory/clusters.md`, section 2.
 
+use super::problem::STICK_SHARE;
 use super::side::Side;
 use crate::push_out::push_out_m_s;
 use glam::{DMat3, DVec3};
@@ -50,6 +51,19 @@ pub struct JointRow {
     pub compliance_per_kg: Option<f64>,
     /// The impulse of the last step, world axes; zero where there is none.
     pub warm_n_s: DVec3,
+    /// The way beyond its target that it has crept while it held, and owes back (eq. 13), world axes, metres or radians.
+    pub owed_slip_m: DVec3,
+    /// What bounds its impulse, where that is what presses a contact; bounds of its own count as well.
+    pub pressed: Option<Pressed>,
+}
+
+/// A contact by whose pressure the impulse of a row is bounded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pressed {
+    /// The contact, by its place in the problem.
+    pub contact: usize,
+    /// The row gives at most this times the contact's impulse along its normal, either way, ≥ 0: metres where it turns.
+    pub reach_m: f64,
 }
 
 /// A spring with a damper between two points, or two spins.
@@ -153,7 +167,8 @@ impl JointRow {
     /// A row at rest, with the compliance of contacts and no impulse of a last step.
     #[must_use]
     pub fn new(sides: [Side; 2], hold: Hold) -> Self {
-        Self { sides, hold, target_m_s: DVec3::ZERO, compliance_per_kg: None, warm_n_s: DVec3::ZERO }
+        let (target_m_s, warm_n_s, owed_slip_m) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        Self { sides, hold, target_m_s, compliance_per_kg: None, warm_n_s, owed_slip_m, pressed: None }
     }
 
     /// The same row as a spring that is implicit at both ends (eq. 14).
@@ -171,5 +186,13 @@ impl JointRow {
         let opening = if gap_m >= 0.0 { -gap_m / h_s } else { -push_out_m_s(gap_m, h_s) };
         let axis = self.hold.frame().x_axis;
         Self { target_m_s: axis * opening, ..self }
+    }
+
+    /// The way owed after a step that gave `impulse_n_s` and left the sides `velocity_m_s` against each other, `most_n_s` being the most that
+    /// the row could give (eq. 13).
+    #[must_use]
+    pub fn owed_slip_after(&self, impulse_n_s: DVec3, velocity_m_s: DVec3, most_n_s: f64, h_s: f64) -> DVec3 {
+        let holds = impulse_n_s.length() < STICK_SHARE * most_n_s;
+        if holds { self.owed_slip_m + self.hold.held_part(velocity_m_s - self.target_m_s) * h_s } else { DVec3::ZERO }
     }
 }

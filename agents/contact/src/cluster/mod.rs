@@ -70,7 +70,7 @@ mod tiles;
 mod validate;
 
 pub use error::ProblemError;
-pub use joint::{Hold, JointRow, Spring};
+pub use joint::{Hold, JointRow, Pressed, Spring};
 pub use problem::{Block, Contact, Member, Problem, Response, multiply};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
 pub use solver::{Report, Settings, Solution, Solver, Way};

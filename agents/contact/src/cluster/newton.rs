@@ -52,6 +52,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
     // the cone's shift makes steps too far off to go on from
     let bold = if aim.form == Form::Disc && iterate.follows_pressure() { BOLD_STEPS } else { 0 };
     for step in 0..=STEPS_MAX {
+        iterate.press();
         let mut missed = sum_of_squares(iterate, aim, 0.0).sqrt();
         // the loads of a bold step that went astray would leave rows too hard for all that follows
         if step > 0 && (step > bold || missed < last) {
@@ -109,6 +110,7 @@ pub(super) fn largest_miss(iterate: &Iterate, form: Form) -> f64 {
 
 /// Gains and pulls of all rows; returns the largest miss, that of momentum among them.
 pub(super) fn linearise(iterate: &mut Iterate, form: Form) -> f64 {
+    iterate.press();
     let mut largest = iterate.system.members.measure(&iterate.state.left).fastest_m_s;
     for k in 0..iterate.rows.len() {
         let (row, at) = (&iterate.rows.rows[k], iterate.state.point(k));

@@ -11,9 +11,9 @@ use metachron_core::ParallelFor;
 use std::fmt;
 
 /// The share of the slip owed that one step takes back.
-const SLIP_SHARE: f64 = 0.2;
+pub(super) const SLIP_SHARE: f64 = 0.2;
 /// A contact sticks while its friction is below this share of the most that Coulomb allows.
-const STICK_SHARE: f64 = 0.999;
+pub(super) const STICK_SHARE: f64 = 0.999;
 
 /// A 3 × 3 block of a member's matrix, in or below its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@
 //! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
 
 use super::cone::{Form, Law, Projection, tangential};
-use super::joint::{Hold, JointRow};
-use super::problem::{Contact, Problem};
+use super::joint::{Hold, JointRow, Pressed};
+use super::problem::{Contact, Problem, SLIP_SHARE};
 use super::side::Side;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
@@ -67,6 +67,16 @@ pub(super) struct Point {
 pub(super) struct Rows {
     pub rows: Vec<Row>,
     terms: Vec<Term>,
+    /// Rows that are bounded by what presses a contact.
+    pressed: Vec<PressedRow>,
+}
+
+/// A row that gives at most a multiple of what presses a contact.
+#[derive(Debug, Clone, Copy)]
+struct PressedRow {
+    row: usize,
+    contact: usize,
+    reach_m: f64,
 }
 
 impl Row {
@@ -101,13 +111,14 @@ impl Row {
         self.bias.x = -parting_m_s - gained_m_s;
     }
 
-    fn of_joint(joint: &JointRow) -> Self {
+    fn of_joint(joint: &JointRow, h_s: f64) -> Self {
         let (frame, held) = (joint.hold.frame(), joint.hold.held());
         let law = match joint.hold {
             Hold::All { limit_n_s } | Hold::Across { limit_n_s, .. } => Law::Bounded { limit: limit_n_s },
             Hold::Along { low_n_s, high_n_s, .. } => Law::Between { low: low_n_s, high: high_n_s },
         };
-        let bias = frame.transpose() * -joint.target_m_s * held;
+        let owed = joint.owed_slip_m * (SLIP_SHARE / h_s);
+        let bias = frame.transpose() * (owed - joint.target_m_s) * held;
         Self { held, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
     }
 
@@ -185,11 +196,15 @@ impl Rows {
     pub fn gather(&mut self, problem: &Problem<'_>, offsets: &[usize], free: &[DVec3]) {
         self.rows.clear();
         self.terms.clear();
+        self.pressed.clear();
         for contact in problem.contacts {
             self.push(Row::of_contact(contact, problem), &contact.sides, offsets);
         }
         for joint in problem.rows {
-            self.push(Row::of_joint(joint), &joint.sides, offsets);
+            if let Some(Pressed { contact, reach_m }) = joint.pressed {
+                self.pressed.push(PressedRow { row: self.rows.len(), contact, reach_m });
+            }
+            self.push(Row::of_joint(joint, problem.h_s), &joint.sides, offsets);
         }
         for k in 0..self.rows.len() {
             let moving = self.velocity(k, free) - self.rows[k].surface;
@@ -216,6 +231,16 @@ impl Rows {
             }
         }
         self.rows.push(Row { start, end: self.terms.len(), ..row });
+    }
+
+    /// Bounds rows by what presses their contacts in these impulses.
+    pub fn press(&mut self, impulses: &[DVec3]) {
+        for &PressedRow { row, contact, reach_m } in &self.pressed {
+            if let Law::Between { low, high } = &mut self.rows[row].law {
+                let most = reach_m * impulses[contact].x.max(0.0);
+                (*low, *high) = (-most, most);
+            }
+        }
     }
 
     /// Sets the scale of a row from the trace of its block of W; one that nothing answers is idle.

@@ -194,7 +194,11 @@ impl Solver {
         let given = problem.contacts.iter().map(|c| c.warm_n_s).chain(problem.rows.iter().map(|r| r.warm_n_s));
         self.warm.clear();
         self.compliances.clear();
-        for (row, warm) in rows.rows.iter().zip(given) {
+        for (k, warm) in given.enumerate() {
+            if k == problem.contacts.len() {
+                rows.press(&self.warm);
+            }
+            let row = &rows.rows[k];
             let warm = row.law.project(Form::Disc, row.frame.transpose() * warm * row.held).value;
             self.warm.push(warm);
             self.compliances.push(row.compliance_under(warm, yield_m_s));

@@ -28,7 +28,8 @@ pub(super) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
         named(fault, |reason| ProblemError::Contact { contact: place, reason })?;
     }
     for (place, row) in problem.rows.iter().enumerate() {
-        let fault = row_fault(row).or_else(|| sides_fault(&row.sides, problem.members));
+        let sides = || sides_fault(&row.sides, problem.members);
+        let fault = row_fault(row).or_else(|| pressed_fault(row, problem.contacts.len())).or_else(sides);
         named(fault, |reason| ProblemError::Row { row: place, reason })?;
     }
     Ok(())
@@ -89,8 +90,8 @@ fn contact_fault(contact: &Contact) -> Option<&'static str> {
 }
 
 fn row_fault(row: &JointRow) -> Option<&'static str> {
-    if !(row.target_m_s.is_finite() && row.warm_n_s.is_finite()) {
-        return Some("its target or its impulse of the last step is not finite");
+    if !(row.target_m_s.is_finite() && row.warm_n_s.is_finite() && row.owed_slip_m.is_finite()) {
+        return Some("its target, its slip owed or its impulse of the last step is not finite");
     }
     if row.compliance_per_kg.is_some_and(|r| !(r.is_finite() && r > 0.0)) {
         return Some("its compliance must be finite and above zero");
@@ -105,6 +106,17 @@ fn row_fault(row: &JointRow) -> Option<&'static str> {
         return Some("its axis is not of length 1");
     }
     (!bounded).then_some("zero must lie within the bounds of its impulse")
+}
+
+fn pressed_fault(row: &JointRow, contacts: usize) -> Option<&'static str> {
+    let pressed = row.pressed?;
+    if pressed.contact >= contacts {
+        return Some("it is pressed by a contact that there is not");
+    }
+    if !matches!(row.hold, Hold::Along { .. }) {
+        return Some("only a row along an axis can be bounded by what presses a contact");
+    }
+    (!(pressed.reach_m >= 0.0 && pressed.reach_m.is_finite())).then_some("its reach must be finite and not below zero")
 }
 
 fn sides_fault(sides: &[Side; 2], members: &[Member<'_>]) -> Option<&'static str> {

@@ -5,17 +5,20 @@
 //! Never here: bodies that bend, rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::between_steps::total_of;
 use super::progress::Progress;
-use super::{ClusterScene, PairTotal, Participant, Partner, Role, total_of};
+use super::{ClusterScene, PairTotal, Participant, Partner, Role};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, StepError};
 use metachron_geometry::narrow_phase::StaticSolid;
-use metachron_geometry::{ShapeKind, ShapePose, Solid, SolidShape};
+use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
     SpringCoefficients,
 };
-use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ContactPair, SharedShape};
+use rapier3d::geometry::{
+    ColliderBuilder, ColliderHandle, ContactPair, Group, InteractionGroups, InteractionTestMode, SharedShape,
+};
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
@@ -82,6 +85,7 @@ struct Known {
 
 /// A place of a rigid member: its centre of mass and its rotation.
 struct Placed<'a> {
+    form: &'a CollisionShape,
     shape: &'a SolidShape,
     centre_m: DVec3,
     rotation: DQuat,
@@ -156,7 +160,7 @@ impl Heap {
     pub fn place(&self, all: &mut [Participant<'_>]) {
         let Some(world) = &self.world else { return };
         for (known, one) in world.bodies.iter().zip(all).filter(|(known, _)| known.touched) {
-            let Some(Placed { shape, centre_m, rotation }) = placed(one) else { continue };
+            let Some(Placed { shape, centre_m, rotation, .. }) = placed(one) else { continue };
             let pose = world.physics.bodies[known.handle].position();
             let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
             let goal = DQuat::from_xyzw(x, y, z, w).normalize();
@@ -168,12 +172,23 @@ impl Heap {
     }
 }
 
-/// Whether rapier3d can step these members: rigid bodies of which none passes through another or through a static solid.
+/// Whether rapier3d can step these members: rigid bodies of which none passes through another or through a static solid but by its groups,
+/// with the usual rules for pairs and without friction about normals.
 fn fits(scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
     let has = |id: AgentId| all.binary_search_by_key(&id, |one| one.id).is_ok();
     let is_rigid = |one: &Participant<'_>| one.member.role() == Role::Rigid && !one.member.is_remote();
     let is_free = |one: &Participant<'_>| !one.laws.iter().any(|(other, _)| has(*other));
-    all.iter().all(|one| is_rigid(one) && is_free(one) && placed(one).is_some()) && scene.stops_all_of(has)
+    let is_usual = |one: &Participant<'_>| one.member.skin().is_some_and(|skin| rubs_as_usual(skin.form));
+    all.iter().all(|one| is_rigid(one) && is_free(one) && is_usual(one) && placed(one).is_some())
+        && scene.statics().iter().all(|solid| rubs_as_usual(&solid.form))
+        && scene.stops_all_of(has)
+}
+
+/// Whether a skin leaves to rapier3d nothing that it has not: other rules than the usual ones, which in rapier3d come after all others, and
+/// friction about normals.
+fn rubs_as_usual(form: &CollisionShape) -> bool {
+    let ContactTraits { friction_rule, restitution_rule, spin_radius_m, .. } = form.traits;
+    friction_rule.is_none() && restitution_rule.is_none() && spin_radius_m == 0.0
 }
 
 impl World {
@@ -345,7 +360,7 @@ fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
     let (ShapeKind::Solid(shape), ShapePose::Solid { position, rotation }) = (&skin.form.kind, skin.view) else {
         return None;
     };
-    Some(Placed { shape, centre_m: position, rotation })
+    Some(Placed { form: skin.form, shape, centre_m: position, rotation })
 }
 
 fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, origin_m: DVec3) -> Known {
@@ -361,8 +376,7 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
         .allow_fast_rotation(true)
         // the members' own flight, which is part of what changes their velocities, has the gyroscopic part
         .gyroscopic_forces_enabled(false);
-    let form = one.member.skin().map(|skin| (skin.form.friction, skin.form.restitution)).unwrap_or_default();
-    let collider = skin(body.shape.shape.clone(), form.0, form.1).mass_properties(matter);
+    let collider = skin(body.shape.shape.clone(), body.form).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
     Known { id: one.id, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
 }
@@ -372,15 +386,21 @@ fn of_static(solid: &StaticSolid, origin_m: DVec3) -> Option<ColliderBuilder> {
     let ShapeKind::Solid(SolidShape { solid: kind, shape, .. }) = &solid.form.kind else { return None };
     let shape = if matches!(kind, Solid::Plane) { SharedShape::halfspace(Vec3::Z) } else { shape.clone() };
     let at = pose(solid.position() - origin_m, solid.rotation());
-    Some(skin(shape, solid.form.friction, solid.form.restitution).position(at))
+    Some(skin(shape, &solid.form).position(at))
 }
 
-/// A shape with its skin: a pair takes the geometric mean of both frictions, and the larger restitution.
-fn skin(shape: SharedShape, friction: f64, restitution: f64) -> ColliderBuilder {
+/// A shape with its skin: a pair takes the geometric mean of both frictions, and the larger restitution. What only senses is found
+/// elsewhere.
+fn skin(shape: SharedShape, form: &CollisionShape) -> ColliderBuilder {
+    let CollisionShape { friction, restitution, traits, .. } = form;
+    let [member_of, collides_with] =
+        [traits.groups.member_of, traits.groups.collides_with].map(Group::from_bits_retain);
     ColliderBuilder::new(shape)
+        .sensor(traits.is_sensor)
+        .collision_groups(InteractionGroups::new(member_of, collides_with, InteractionTestMode::And))
         .friction(friction.sqrt() as f32)
         .friction_combine_rule(CoefficientCombineRule::Multiply)
-        .restitution(restitution as f32)
+        .restitution(*restitution as f32)
         .restitution_combine_rule(CoefficientCombineRule::Max)
 }
 

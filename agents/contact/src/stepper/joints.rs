@@ -11,6 +11,7 @@
 use super::Participant;
 use super::member::{MaterialPoint, Pose};
 use super::memory::Partner;
+use super::motors::Motored;
 use super::scene::ClusterScene;
 use super::search::velocity;
 use super::springs::{End, Name, Pull};
@@ -27,9 +28,14 @@ use std::f64::consts::{PI, TAU};
 /// A row that gave this share of the most that it may is not asked whether it holds.
 const YIELDS_SHARE: f64 = 0.999;
 
+/// The key of a motor's row: above those of what holds its joint.
+const MOTOR: u32 = 16;
+
 /// The joints of a fine step.
 #[derive(Debug, Default)]
 pub(super) struct Joints {
+    /// Whether a motor keeps one of them moving.
+    pub drives: bool,
     held: Vec<Held>,
     parts: Vec<Part>,
 }
@@ -92,6 +98,16 @@ struct Together {
     name: Name,
 }
 
+/// What a joint is made of.
+struct Parts {
+    points: Together,
+    turns: Together,
+    /// The direction that it leaves free, world axes, of length 1.
+    axis: DVec3,
+    /// Its name for what neither tears nor yields it.
+    lasting: Name,
+}
+
 /// A row of a joint as it is laid out.
 struct LaidRow {
     /// The joint, by its place here.
@@ -117,6 +133,7 @@ impl Joints {
         let FineStep { all, progress, .. } = *step;
         self.held.clear();
         self.parts.clear();
+        self.drives = false;
         for (a, one) in all.iter().enumerate() {
             for (number, joint) in scene.joints_of(one.id) {
                 if one.memory.has_torn(Partner::Joint(number)) {
@@ -162,9 +179,15 @@ impl Joints {
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
         self.held.push(Held { joint: *joint, members: (first, second), now, rotations: [a.rotation, b.rotation] });
+        self.lay_all(step, ties, &Parts { points, turns, axis: joint.axis(&a, anchors[1] - anchors[0]), lasting });
+    }
+
+    /// Lays out the rows of the joint that was noted last.
+    fn lay_all(&mut self, step: &FineStep<'_, '_>, ties: &mut Ties, parts: &Parts) {
+        let Parts { points, turns, axis, lasting } = *parts;
         let held = self.held.len() - 1;
-        let axis = joint.axis(&a, anchors[1] - anchors[0]);
-        let mut key = 0;
+        let Held { joint, members: (_, second), now, .. } = self.held[held];
+        let (mut key, mut driven) = (0, None);
         let mut push = |way: Way, of: Together, hold: Hold| {
             self.lay(step, ties, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
             key += 1;
@@ -174,7 +197,8 @@ impl Joints {
                 push(Way::Point, points, Hold::ALL);
                 push(Way::Turn, turns, Hold::ALL);
             }
-            JointKind::Revolute { range_rad, .. } => {
+            JointKind::Revolute { range_rad, motor, .. } => {
+                driven = motor.map(|motor| (motor, turns));
                 push(Way::Point, points, Hold::ALL);
                 push(Way::Turn, turns, Hold::across(axis));
                 if let Some([low, high]) = range_rad {
@@ -183,7 +207,8 @@ impl Joints {
                 }
             }
             JointKind::Spherical => push(Way::Point, points, Hold::ALL),
-            JointKind::Prismatic { range_m, .. } => {
+            JointKind::Prismatic { range_m, motor, .. } => {
+                driven = motor.map(|motor| (motor, points));
                 push(Way::Point, points, Hold::across(axis));
                 push(Way::Turn, turns, Hold::ALL);
                 if let Some([low, high]) = range_m {
@@ -193,6 +218,12 @@ impl Joints {
             }
             JointKind::Rope { length_m } => push(Way::Below(length_m), points, Hold::pushing(axis)),
             JointKind::Spring { .. } => {}
+        }
+        if let Some((motor, Together { sides, .. })) = driven {
+            let turns = matches!(joint.kind, JointKind::Revolute { .. });
+            self.drives |= motor.moves();
+            let row = motor.row(&Motored { sides, axis, travel: now.travel, turns }, step.h_s);
+            ties.motor(step, row, lasting.row(MOTOR, second));
         }
     }
 

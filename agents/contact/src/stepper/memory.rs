@@ -3,9 +3,10 @@
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
+use super::spin_friction::Spin;
 use super::yielding::Slip;
 use glam::DVec3;
-use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_core::{AgentId, SensorPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::TouchKey;
 
 /// Two bodies belong together until they have not been near each other for this long, seconds.
@@ -43,6 +44,16 @@ pub(super) struct Remembered {
     pub force_n: DVec3,
     /// The slip owed, world axes, metres.
     pub owed_slip_m: DVec3,
+    /// The same of its friction about the normal.
+    pub spin: Spin,
+}
+
+impl Remembered {
+    /// A place that owes nothing.
+    pub const fn new(key: TouchKey, force_n: DVec3) -> Self {
+        let spin = Spin { radius_m: 0.0, torque_n_m: 0.0, owed_rad: 0.0 };
+        Self { key, force_n, owed_slip_m: DVec3::ZERO, spin }
+    }
 }
 
 /// One pair, with its places by rising keys.
@@ -80,6 +91,8 @@ pub struct ContactMemory {
     slips: Vec<Slip>,
     /// What attachments that may tear have given in macro steps that were cut short.
     unfinished: Vec<UnfinishedLoad>,
+    /// What touched a sensor, or sensed the body, sorted by partners. They stay.
+    sensed: Vec<SensorTouch>,
 }
 
 /// What an attachment has given since its force was last looked at.
@@ -93,16 +106,18 @@ pub(super) struct UnfinishedLoad {
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        let Self { pairs, torn, slips, unfinished } = self;
-        Self { pairs: pairs.clone(), torn: torn.clone(), slips: slips.clone(), unfinished: unfinished.clone() }
+        let Self { pairs, torn, slips, unfinished, sensed } = self;
+        let (pairs, torn, slips) = (pairs.clone(), torn.clone(), slips.clone());
+        Self { pairs, torn, slips, unfinished: unfinished.clone(), sensed: sensed.clone() }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { pairs, torn, slips, unfinished } = self;
+        let Self { pairs, torn, slips, unfinished, sensed } = self;
         pairs.clone_from(&from.pairs);
         torn.clone_from(&from.torn);
         slips.clone_from(&from.slips);
         unfinished.clone_from(&from.unfinished);
+        sensed.clone_from(&from.sensed);
     }
 }
 
@@ -179,6 +194,33 @@ impl ContactMemory {
         None
     }
 
+    /// Counts touches of which one side only senses: `now` are the partners that touch the body `at` this time, by rising names.
+    pub(super) fn sense(&mut self, now: impl Iterator<Item = Partner>, at: SimTime) {
+        let with = |partner| match partner {
+            Partner::Agent(id) => Some(SensorPartner::Agent(id)),
+            Partner::Static(number) => Some(SensorPartner::Static(number)),
+            _ => None,
+        };
+        let mut place = 0;
+        for with in now.filter_map(with) {
+            let ended = self.sensed[place..].iter().take_while(|known| known.with < with).count();
+            self.sensed[place..place + ended].iter_mut().for_each(|known| known.note(false, at));
+            place += ended;
+            if self.sensed.get(place).is_none_or(|known| known.with != with) {
+                self.sensed.insert(place, SensorTouch::new(with));
+            }
+            self.sensed[place].note(true, at);
+            place += 1;
+        }
+        self.sensed[place..].iter_mut().for_each(|known| known.note(false, at));
+    }
+
+    /// What touched a sensor, or sensed the body, by rising partners.
+    #[must_use]
+    pub fn sensed(&self) -> &[SensorTouch] {
+        &self.sensed
+    }
+
     /// Whether an attachment of the body has torn.
     #[must_use]
     pub fn has_torn(&self, partner: Partner) -> bool {
@@ -222,7 +264,7 @@ mod tests {
         let mut memory = ContactMemory::default();
         let (partner, now) = (Partner::Static(3), SimTime::ZERO);
         let key = |vertex: u32| TouchKey { features: [vertex, 0], ..TouchKey::default() };
-        let place = Remembered { key: key(70_000), force_n: DVec3::Z, owed_slip_m: DVec3::X };
+        let place = Remembered { key: key(70_000), force_n: DVec3::Z, owed_slip_m: DVec3::X, ..Remembered::default() };
         memory.pair(partner).next.push(place);
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)), place);

@@ -15,6 +15,7 @@
 //! tear      attachments that gave more than they can bear are gone from the next macro step on
 
 mod arms;
+mod between_steps;
 mod blows;
 mod doubling;
 mod foresight;
@@ -25,6 +26,7 @@ mod local;
 mod matter;
 mod member;
 mod memory;
+mod motors;
 mod outside;
 mod plan;
 mod progress;
@@ -32,6 +34,7 @@ mod remote;
 mod scene;
 mod search;
 mod solve;
+mod spin_friction;
 mod springs;
 mod tearing;
 mod ties;
@@ -49,7 +52,6 @@ use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
 pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, Pose, Role};
-use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
 use metachron_core::{AgentId, Grip, ParallelFor, SimSpan, StepError, check_span};
@@ -58,10 +60,11 @@ pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{ClusterScene, Passage};
-use search::Search;
+use search::{Judge, Round, Search};
+use spin_friction::SpinFriction;
 use tearing::Tearing;
 pub use tearing::Torn;
-use ties::{FineStep, Ties, place_key};
+use ties::{FineStep, Ties};
 pub use yielding::Yielded;
 use yielding::Yielding;
 
@@ -111,7 +114,12 @@ impl Participant<'_> {
             [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
             _ => law != Some(Law::Ledger),
         };
-        !(off || self.member.spares(other.id) || other.member.spares(self.id))
+        !(off || self.member.spares(other.id) || other.member.spares(self.id)) && self.meets(other)
+    }
+
+    /// Whether neither lets the other pass by its collision groups.
+    fn meets(&self, other: &Self) -> bool {
+        self.member.skin().zip(other.member.skin()).is_some_and(|(mine, theirs)| mine.form.meets(theirs.form))
     }
 }
 
@@ -164,6 +172,7 @@ pub struct ClusterStepper {
     search: Search,
     ties: Ties,
     joints: Joints,
+    spins: SpinFriction,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
@@ -203,6 +212,7 @@ impl ClusterStepper {
             search: Search::default(),
             ties: Ties::default(),
             joints: Joints::default(),
+            spins: SpinFriction::default(),
             progress: Vec::new(),
             members: Vec::new(),
             totals: Vec::new(),
@@ -354,6 +364,7 @@ impl ClusterStepper {
         if heap.is_on() {
             search.find_near(all, progress, h_s);
         }
+        search.sense(&Round { scene, all, progress, h_s, judge: Judge::Foreseen });
         heap.is_on()
     }
 
@@ -453,6 +464,12 @@ impl ClusterStepper {
         self.torn().is_empty() && self.yielded().is_empty()
     }
 
+    /// Whether a motor kept a joint moving in the last fine step: what is driven does not rest, however slow it is.
+    #[must_use]
+    pub const fn is_driven(&self) -> bool {
+        self.joints.drives
+    }
+
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
     #[must_use]
     pub fn work_of(&self, member: usize) -> f64 {
@@ -498,58 +515,6 @@ impl ClusterStepper {
         ties.add_inertia(&step);
     }
 
-    /// Starts every contact from what the last step gave.
-    fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
-        for (owner, contact) in self.search.owners.iter().zip(&mut self.search.contacts) {
-            let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
-            (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
-        }
-    }
-
-    /// Notes what the next step starts from.
-    fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
-        let solution = solver.solution();
-        for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
-            let impulse = solution.contacts_n_s[k];
-            let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            // a blow is over
-            let lasting = if contact.restitution > 0.0 { DVec3::ZERO } else { impulse };
-            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m };
-            all[owner.member].memory.pair(owner.partner).next.push(place);
-            outside.note(all, owner.member, &contact.sides[1], -impulse);
-            if impulse != DVec3::ZERO {
-                let total = total_of(&mut self.totals, owner.member, owner.partner);
-                total.add(impulse, -contact.gap_m);
-                if impulse.length() > total.most_n_s {
-                    total.most_n_s = impulse.length();
-                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
-                }
-            }
-        }
-        for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
-            outside.note(all, owner.member, &row.sides[1], -*impulse);
-            outside.note_line(owner, *impulse);
-            tearing.note(owner, *impulse);
-            if let Partner::Link(_) = owner.partner {
-                total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
-            }
-            let place = Remembered { key: place_key(owner.key), force_n: *impulse / h_s, ..Remembered::default() };
-            all[owner.member].memory.pair(owner.partner).next.push(place);
-        }
-        yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
-        for &[a, b] in &search.near {
-            let (now, other) = (all[a].context.time + dt, all[b].id);
-            all[a].memory.meet(other, now);
-        }
-        for (member, one) in all.iter_mut().enumerate() {
-            one.memory.turn(one.context.time + dt);
-            if last {
-                ties.grips(member, &solution.rows_n_s, h_s, one.grips);
-            }
-        }
-    }
-
     /// Moves all members; the step of some ends (eq. 26, 27).
     fn end(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
@@ -583,25 +548,4 @@ fn times(strain: f64) -> u32 {
         times *= 2;
     }
     times
-}
-
-impl PairTotal {
-    /// Adds the impulse of a contact or of a link's row.
-    fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
-        self.impulse_n_s += impulse_n_s;
-        self.depth_m = self.depth_m.max(depth_m);
-        self.contacts += 1;
-    }
-}
-
-/// The total of a pair, made where it is new.
-fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
-    let order = |total: &PairTotal| (total.member, total.partner);
-    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
-        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
-        let (most_n_s, inverse_mass_per_kg) = (0.0, [0.0; 2]);
-        totals.insert(at, PairTotal { member, partner, impulse_n_s, contacts, depth_m, most_n_s, inverse_mass_per_kg });
-        at
-    });
-    &mut totals[at]
 }

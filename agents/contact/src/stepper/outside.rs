@@ -138,7 +138,7 @@ impl Ties {
                 ..JointRow::new(sides, line.hold)
             };
             let (member, partner, tears_above_n) = (line.member, Partner::Line(number), f64::INFINITY);
-            let owner = RowOwner { member, other: None, partner, key: 0, hold: None, tears_above_n };
+            let owner = RowOwner { member, other: None, partner, key: 0, hold: None, tears_above_n, owes: false };
             self.push(step, row, owner);
         }
     }

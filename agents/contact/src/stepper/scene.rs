@@ -87,6 +87,11 @@ impl ClusterScene {
         !(apart || self.passages.iter().any(|passage| has(passage.body)))
     }
 
+    /// Whether one of the static solids only senses.
+    pub fn has_sensors(&self) -> bool {
+        self.statics.iter().any(|solid| solid.form.traits.is_sensor)
+    }
+
     /// The static solids, by their numbers.
     pub fn statics(&self) -> &[StaticSolid] {
         &self.statics

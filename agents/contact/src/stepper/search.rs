@@ -4,17 +4,20 @@
 //! Theory: docs/theory/clusters.md, section 9.
 
 mod boxes;
+mod sense;
 mod sweep;
 
 use super::memory::Partner;
 use super::remote;
 use super::scene::{ClusterScene, Passage};
+use super::spin_friction::Spin;
 use super::{Participant, Progress};
 use crate::cluster::{Contact, Side};
 use boxes::Boxes;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey, self_touches, touches};
-use metachron_geometry::{CollisionShape, ContactSide, Place, ShapeKind, Touch};
+use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
+pub(super) use sense::Sensed;
 use sweep::{FAR_M, Meeting, Sought, Sweep, Sweeping};
 
 /// A place is taken up if its gap may close below this within the step, metres.
@@ -34,6 +37,8 @@ pub(super) struct Owner {
     pub other: Option<usize>,
     /// The name of the place within its pair.
     pub key: TouchKey,
+    /// Its friction about the normal.
+    pub spin: Spin,
     /// When its sides meet, seconds from the start of the fine step; `None` where they do not rebound, or where that is not decided yet.
     pub meets_s: Option<f64>,
 }
@@ -127,6 +132,9 @@ pub(super) struct Search {
     pub owners: Vec<Owner>,
     /// Pairs of participants that are near each other, the lower first.
     pub near: Vec<[usize; 2]>,
+    /// Pairs that touch and of which one side only senses, by rising names.
+    pub sensed: Vec<Sensed>,
+    point: sense::Point,
     /// What was looked at in this fine step, by rising names once it is sorted.
     looks: Vec<Look>,
     /// How many contacts were found before the solve.
@@ -196,7 +204,9 @@ impl Search {
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
         });
         self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
-        self.near.retain(|&[a, b]| !(all[a].member.is_remote() && all[b].member.is_remote()));
+        let apart =
+            |[a, b]: [usize; 2]| all[a].member.is_remote() && all[b].member.is_remote() || !all[a].meets(&all[b]);
+        self.near.retain(|pair| !apart(*pair));
     }
 
     /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
@@ -230,8 +240,10 @@ impl Search {
             if one.member.is_led() {
                 continue; // what leads it is stronger than what never moves
             }
+            let Some(form) = one.member.skin().map(|skin| skin.form) else { continue };
             let met = |number: u32| !scene.has_passage(Passage { body: one.id, solid: number });
-            for (number, solid) in (0..).zip(scene.statics()).filter(|(number, _)| met(*number)) {
+            let all = (0..).zip(scene.statics());
+            for (number, solid) in all.filter(|(number, solid)| met(*number) && form.meets(&solid.form)) {
                 self.find_of(round, Pair { member, against: Against::Static { number, solid } });
             }
         }
@@ -250,6 +262,9 @@ impl Search {
                 (Partner::Agent(all[other].id), skin.form, there.skin, there.speed_m_s)
             }
         };
+        if skin.form.senses(form) {
+            return;
+        }
         let way_m = (reach.speed_m_s + their_m_s) * h_s;
         if !round.foresees() && !self.may_have_passed(member, partner, way_m) {
             return;
@@ -258,12 +273,13 @@ impl Search {
         self.touches.clear();
         let meets = reach.skin.grown(reach_m).meets(bounds);
         // a blow acts where the sides meet, what goes far meets what is not near yet
-        let rebounds = restitution([skin.form, form]) > 0.0 && way_m > 10.0 * MET_M;
+        let rebounds = skin.form.restitution_with(form) > 0.0 && way_m > 10.0 * MET_M;
         let far_m = (reach_m > FAR_M).then_some(LOOK_M);
         let swept_m = if rebounds { Some(MET_M) } else { far_m };
         let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
-        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), meets_s: None };
+        let spin = Spin { radius_m: skin.form.spin_radius_with_m(form), ..Spin::default() };
+        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), spin, meets_s: None };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
 
@@ -457,12 +473,6 @@ fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned
     Contact { surface_m_s: found.surface_m_s + remote::slower_push_out(touch, round.h_s, late_s), ..found }
 }
 
-/// The restitution of a pair: the larger of both; what bends gives back what it has stored.
-fn restitution(skins: [&CollisionShape; 2]) -> f64 {
-    let bends = skins.iter().any(|skin| matches!(skin.kind, ShapeKind::Chain | ShapeKind::Surface(_)));
-    if bends { 0.0 } else { skins[0].restitution.max(skins[1].restitution) }
-}
-
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
     let Facing { sides, led_m_s, .. } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
@@ -472,9 +482,8 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         normal: touch.normal,
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
-        // a pair takes the geometric mean of both frictions
-        friction: (skins[0].friction * skins[1].friction).sqrt(),
-        restitution: restitution(skins),
+        friction: skins[0].friction_with(skins[1]),
+        restitution: skins[0].restitution_with(skins[1]),
         approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
         gained_m_s: 0.0,
         surface_m_s,

@@ -49,12 +49,14 @@ impl ClusterStepper {
         }
         let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
         for round in 1..=ROUNDS_MAX {
+            self.spins.lay(&self.search, all, &mut self.ties, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
             let Self {
                 solver,
                 search,
                 ties,
+                spins,
                 joints,
                 joints_ask,
                 joints_missed_m,
@@ -72,6 +74,10 @@ impl ClusterStepper {
             }
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
+            }
+            for (contact, row) in spins.rows(ties) {
+                let normal = search.contacts[contact].normal;
+                search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;
             }
             let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;

@@ -54,7 +54,7 @@ impl Name {
 
     pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
         let Self { member, partner, hold, tears_above_n, .. } = self;
-        RowOwner { member, other, partner, key, hold, tears_above_n }
+        RowOwner { member, other, partner, key, hold, tears_above_n, owes: false }
     }
 }
 

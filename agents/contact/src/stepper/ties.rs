@@ -4,6 +4,7 @@
 
 use super::arms::Arms;
 use super::memory::Partner;
+use super::search::velocity;
 use super::yielding::SlidingRow;
 use super::{Participant, Progress};
 use crate::cluster::JointRow;
@@ -38,9 +39,20 @@ pub(super) struct RowOwner {
     pub hold: Option<Holders>,
     /// The force above which its tie tears, N: infinite of one that never does, and of rows that hold turns.
     pub tears_above_n: f64,
+    /// Whether it takes back what it has crept: of one that knows its velocity, and no place.
+    pub owes: bool,
 }
 
 impl RowOwner {
+    /// The way that its row owes after a step that gave `impulse_n_s` (eq. 13).
+    pub fn owed_slip_m(&self, row: &JointRow, impulse_n_s: DVec3, progress: &[Progress], h_s: f64) -> DVec3 {
+        if !self.owes {
+            return DVec3::ZERO;
+        }
+        let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].solved[..]));
+        row.owed_slip_after(impulse_n_s, a - b, row.hold.most_n_s(impulse_n_s), h_s)
+    }
+
     /// Its participants.
     pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
         std::iter::once(self.member).chain(self.other)
@@ -57,8 +69,9 @@ pub(super) struct Holders {
 /// The rows of a fine step.
 #[derive(Debug, Default)]
 pub(super) struct Ties {
+    /// Behind those with an owner are the spins of contacts.
     pub rows: Vec<JointRow>,
-    /// One for each row.
+    /// One for each row but for those.
     pub owners: Vec<RowOwner>,
     /// Those that may slip.
     pub sliding: Vec<SlidingRow>,
@@ -82,7 +95,8 @@ impl Ties {
         }
         let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
         let warm_n_s = remembered.force_n * step.h_s;
-        self.rows.push(JointRow { warm_n_s, ..row });
+        let owed_slip_m = if owner.owes { remembered.owed_slip_m } else { DVec3::ZERO };
+        self.rows.push(JointRow { warm_n_s, owed_slip_m, ..row });
         self.owners.push(owner);
         true
     }

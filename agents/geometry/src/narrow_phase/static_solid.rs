@@ -66,14 +66,14 @@ impl StaticSolid {
     /// # Errors
     /// [`StaticSolidError`] for an invalid shape or place.
     pub fn new(obstacle: &Obstacle) -> Result<Self, StaticSolidError> {
-        let Obstacle { name, solid, position, friction, restitution, .. } = obstacle;
+        let Obstacle { name, solid, position, friction, restitution, traits, .. } = obstacle;
         let rotation = obstacle.rotation.normalize();
         if !position.is_finite() || !rotation.is_finite() {
             return Err(StaticSolidError::Place { name: name.clone() });
         }
         let bad = |source| StaticSolidError::Shape { name: name.clone(), source };
         let kind = ShapeKind::Solid(SolidShape::new(solid.clone(), DVec3::ZERO).map_err(bad)?);
-        let form = CollisionShape { kind, friction: *friction, restitution: *restitution };
+        let form = CollisionShape { kind, friction: *friction, restitution: *restitution, traits: *traits };
         let mesh = StaticMesh::of(solid).map_err(bad)?;
         let bounds = bounds(solid, *position, rotation);
         Ok(Self { form, position: *position, rotation, mesh, bounds })

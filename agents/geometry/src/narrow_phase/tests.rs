@@ -20,7 +20,7 @@ use proptest::prelude::*;
 fn solid(solid: Solid, radius_m: f64) -> CollisionShape {
     let shape = solid.to_shared_shape().unwrap();
     let kind = ShapeKind::Solid(SolidShape { solid, shape, com_local: DVec3::ZERO, radius_m });
-    CollisionShape { kind, friction: 0.0, restitution: 0.0 }
+    CollisionShape::new(kind, 0.0)
 }
 
 fn ball(radius_m: f64) -> CollisionShape {
@@ -47,11 +47,11 @@ fn hull(half: DVec3) -> CollisionShape {
 }
 
 fn chain() -> CollisionShape {
-    CollisionShape { kind: ShapeKind::Chain, friction: 0.0, restitution: 0.0 }
+    CollisionShape::new(ShapeKind::Chain, 0.0)
 }
 
 fn tool() -> CollisionShape {
-    CollisionShape { kind: ShapeKind::Tool(ToolShape::default()), friction: 0.0, restitution: 0.0 }
+    CollisionShape::new(ShapeKind::Tool(ToolShape::default()), 0.0)
 }
 
 fn at(form: &CollisionShape, position: DVec3, rotation: DQuat) -> PlacedShape<'_> {

@@ -57,7 +57,8 @@ impl RigidBody {
         let shape = SolidShape::moving(&spec.solid, spread.com)?;
         let radius_m = shape.radius_m;
         let kind = ShapeKind::Solid(shape);
-        let form = CollisionShape { kind, friction: spec.friction, restitution: spec.restitution };
+        let RigidSpec { friction, restitution, traits, .. } = spec;
+        let form = CollisionShape { kind, friction, restitution, traits };
         let mut body = Self {
             spread,
             gravity: spec.gravity,

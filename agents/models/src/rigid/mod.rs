@@ -15,7 +15,7 @@ mod motion;
 mod spec;
 
 pub use body::RigidBody;
-pub use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind};
+pub use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind, Motor, MotorGoal};
 pub use spec::{RigidError, RigidSpec};
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ShapeError, Solid};
+use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
 /// A rigid body before it is built.
 #[derive(Debug, Clone)]
@@ -22,6 +22,8 @@ pub struct RigidSpec {
     pub restitution: f64,
     /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
     pub friction: f64,
+    /// What else it says about its contacts.
+    pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// Whether the body may report that it is at rest.
@@ -73,6 +75,7 @@ impl RigidSpec {
             mass_kg,
             restitution: 0.0,
             friction: 0.5,
+            traits: ContactTraits::default(),
             gravity: DVec3::ZERO,
             sleep: false,
         }

@@ -3,6 +3,7 @@
 use super::{Integrator, PressureKey};
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
+use metachron_geometry::ContactTraits;
 
 /// A tube, cable or rod before it is divided into segments.
 #[derive(Debug, Clone)]
@@ -51,6 +52,8 @@ pub struct TubeSpec {
     pub self_contact: bool,
     /// Coulomb friction coefficient of its skin, ≥ 0; a pair takes the geometric mean.
     pub friction: f64,
+    /// What else it says about its contacts.
+    pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// Whether the tube may report that it is at rest.
@@ -162,6 +165,7 @@ impl TubeSpec {
             sealed: false,
             self_contact: false,
             friction: 0.0,
+            traits: ContactTraits::default(),
             gravity: DVec3::ZERO,
             sleep: false,
         }

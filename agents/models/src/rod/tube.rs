@@ -91,7 +91,7 @@ impl Tube {
         };
         wall.iter().for_each(|wall| wall.soften(&mut now.softening));
         now.strain(&matter, &division);
-        let form = CollisionShape { kind: ShapeKind::Chain, friction: spec.friction, restitution: 0.0 };
+        let form = CollisionShape { traits: spec.traits, ..CollisionShape::new(ShapeKind::Chain, spec.friction) };
         let mut tube = Self {
             resolution: nearest_resolution(resolution, &skeleton, count),
             acceleration: spec.gravity,

@@ -73,7 +73,8 @@ impl SoftBody {
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
+        let form = CollisionShape::new(ShapeKind::Surface(surface), spec.friction);
+        let form = CollisionShape { traits: spec.traits, ..form };
         let system = mesh.system(&positions);
         let mut body = Self {
             system,

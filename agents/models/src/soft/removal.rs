@@ -157,7 +157,8 @@ impl SoftBody {
             triangles: triangles.into(),
             ..before.clone()
         };
-        let (friction, restitution) = (self.form.friction, self.form.restitution);
-        self.form = Arc::new(CollisionShape { kind: ShapeKind::Surface(surface), friction, restitution });
+        let traits = self.form.traits;
+        self.form =
+            Arc::new(CollisionShape { traits, ..CollisionShape::new(ShapeKind::Surface(surface), self.form.friction) });
     }
 }

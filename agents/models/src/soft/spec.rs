@@ -4,7 +4,9 @@ use super::grid::Side;
 use super::material::Lame;
 use glam::{DQuat, DVec3};
 use metachron_core::ResolutionRange;
-use metachron_geometry::{Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed};
+use metachron_geometry::{
+    ContactTraits, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
+};
 use std::sync::Arc;
 
 /// A soft body before it is built.
@@ -27,6 +29,8 @@ pub struct SoftSpec {
     pub held: Vec<Side>,
     /// Coulomb friction coefficient of its skin, ≥ 0.
     pub friction: f64,
+    /// What else it says about its contacts.
+    pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// Whether it touches itself.

@@ -14,7 +14,7 @@ use super::{MaterialLaw, RegionMatter, RemovedCells, Side, SoftBody, SoftError, 
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
-use metachron_geometry::{ShapeKind, Tetrahedra, Triangles};
+use metachron_geometry::{ContactTraits, ShapeKind, Tetrahedra, Triangles};
 use std::sync::Arc;
 
 const MATTER: SoftMatter = SoftMatter {
@@ -39,6 +39,7 @@ fn spec(shape: SoftShape) -> SoftSpec {
         velocity: DVec3::ZERO,
         held: vec![],
         friction: 0.5,
+        traits: ContactTraits::default(),
         gravity: DVec3::ZERO,
         self_contact: false,
         sleep: false,

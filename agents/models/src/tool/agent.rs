@@ -88,7 +88,8 @@ impl Tool {
         let spin = DVec3::ZERO;
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
-        let form = Arc::new(CollisionShape { kind: ShapeKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
+        let form = CollisionShape { traits: spec.traits, ..CollisionShape::new(ShapeKind::Tool(shape()), FRICTION) };
+        let form = Arc::new(form);
         let (commanded, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
         let unknowns = Unknowns::new(&tool, drive.mass_kg());
         Ok(Self {

@@ -4,6 +4,7 @@ use super::{Keyframe, Tool, ToolError, ToolSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Body, CurveState, SimSpan, SimTime, Snapshot, StepError, StepReport, ToolState};
+use metachron_geometry::ContactTraits;
 use std::sync::Arc;
 
 const ME: AgentId = AgentId(7);
@@ -25,6 +26,7 @@ fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
         graspable: vec![TUBE],
         pivot_m: None,
         starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
     }
 }
 

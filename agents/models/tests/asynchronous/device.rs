@@ -4,7 +4,7 @@ use super::clocks::{Clocks, GRAVITY, Tamper};
 use glam::{DQuat, DVec3};
 use metachron_contact::{Agent, AnchorSpring, Law};
 use metachron_core::{Anchor, Snapshot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
 
@@ -17,7 +17,7 @@ const PRESS_M: f64 = 0.005;
 
 pub fn floor() -> Obstacle {
     let (name, solid, position, rotation) = ("floor".into(), Solid::Plane, DVec3::ZERO, DQuat::IDENTITY);
-    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0 }
+    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0, traits: ContactTraits::default() }
 }
 
 /// The force of the tip on the column, N.
@@ -82,6 +82,7 @@ fn column(young_pa: f64) -> SoftBody {
         velocity: DVec3::ZERO,
         held: vec![],
         friction: 0.5,
+        traits: ContactTraits::default(),
         gravity: GRAVITY,
         self_contact: false,
         sleep: false,

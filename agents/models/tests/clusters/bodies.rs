@@ -2,7 +2,7 @@
 
 use crate::table::{GRAVITY, Placed, placed};
 use glam::{DQuat, DVec3};
-use metachron_geometry::Solid;
+use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
@@ -28,6 +28,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
         velocity: DVec3::ZERO,
         held: vec![],
         friction: 0.5,
+        traits: ContactTraits::default(),
         gravity: GRAVITY,
         self_contact: false,
         sleep: false,

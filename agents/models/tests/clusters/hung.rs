@@ -40,9 +40,9 @@ pub enum Held {
 pub const ALL: [Held; 10] = [
     Held::Joint(JointKind::Fixed),
     Held::Joint(JointKind::Spherical),
-    Held::Joint(JointKind::Revolute { axis: DVec3::Y, range_rad: Some([-0.1, 0.1]) }),
-    Held::Joint(JointKind::Prismatic { axis: DVec3::Y, range_m: None }),
-    Held::Joint(JointKind::Prismatic { axis: DVec3::Z, range_m: Some([-1.0, 0.0]) }),
+    Held::Joint(JointKind::Revolute { axis: DVec3::Y, range_rad: Some([-0.1, 0.1]), motor: None }),
+    Held::Joint(JointKind::Prismatic { axis: DVec3::Y, range_m: None, motor: None }),
+    Held::Joint(JointKind::Prismatic { axis: DVec3::Z, range_m: Some([-1.0, 0.0]), motor: None }),
     Held::Joint(JointKind::Rope { length_m: 0.5 }),
     Held::Joint(JointKind::Spring { stiffness_n_m: STIFFNESS_N_M, damping_n_s_m: 0.0, rest_m: 0.48 }),
     Held::Beam(JointKind::Fixed),

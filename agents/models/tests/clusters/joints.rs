@@ -8,24 +8,28 @@ use metachron_core::{AgentId, Body, RigidState, Snapshot};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
 
-const G: f64 = -GRAVITY.z;
+pub const G: f64 = -GRAVITY.z;
 
 /// Bodies on joints, far from the floor.
-fn party(specs: impl IntoIterator<Item = RigidSpec>, joints: impl IntoIterator<Item = Joint>, rate_hz: f64) -> Table {
+pub fn party(
+    specs: impl IntoIterator<Item = RigidSpec>,
+    joints: impl IntoIterator<Item = Joint>,
+    rate_hz: f64,
+) -> Table {
     let bodies = specs.into_iter().map(|spec| placed(RigidBody::new(spec).unwrap(), false)).collect();
     let mut table = Table::among(bodies, &[]).jointed(joints);
     table.bodies.iter_mut().for_each(|body| body.rate_hz = rate_hz);
     table
 }
 
-fn state(table: &Table, body: usize) -> RigidState {
+pub fn state(table: &Table, body: usize) -> RigidState {
     let mut snapshot = Snapshot::default();
     table.bodies[body].agent.write_snapshot(&mut snapshot);
     let Body::Rigid(state) = snapshot.body else { panic!("body {body} is not rigid") };
     state
 }
 
-fn block(half_m: DVec3, position: DVec3, mass_kg: f64) -> RigidSpec {
+pub fn block(half_m: DVec3, position: DVec3, mass_kg: f64) -> RigidSpec {
     rigid(Solid::Box { half_extents_m: half_m }, position, mass_kg)
 }
 
@@ -33,14 +37,14 @@ fn rod(length_m: f64, top: DVec3) -> RigidSpec {
     block(DVec3::new(0.05, 0.05, 0.5 * length_m), top - DVec3::Z * (0.5 * length_m), 1.0)
 }
 
-fn on_world(kind: JointKind) -> Joint {
+pub fn on_world(kind: JointKind) -> Joint {
     Joint::new(AgentId(0), None, kind)
 }
 
-const HINGE: JointKind = JointKind::Revolute { axis: DVec3::Y, range_rad: None };
+const HINGE: JointKind = JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
 
 /// A rod of 1 m on a hinge in the origin, tilted.
-fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
+pub fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
     let rotation = DQuat::from_rotation_y(tilt_rad);
     let start = rod(1.0, DVec3::ZERO);
     let spec = RigidSpec { rotation, position: rotation * start.position, ..start };
@@ -48,7 +52,7 @@ fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
 }
 
 /// Moment of inertia of the rod about its end, kg m².
-const ROD_KG_M2: f64 = (1.0 + 0.05 * 0.05) / 3.0;
+pub const ROD_KG_M2: f64 = (1.0 + 0.05 * 0.05) / 3.0;
 
 #[test]
 fn a_pendulum_on_a_hinge_swings_with_its_closed_form_period() {
@@ -256,7 +260,7 @@ fn anchors_are_places_of_the_shape_whatever_its_centre_of_mass() {
 fn a_hinge_stops_at_both_ends_of_its_range() {
     // let go from horizontal it falls towards +x at first, b's angle against a is minus its own
     let range_rad = Some([-0.4, 0.3]);
-    let kind = JointKind::Revolute { axis: DVec3::Y, range_rad };
+    let kind = JointKind::Revolute { axis: DVec3::Y, range_rad, motor: None };
     for (tilt, push) in [(0.0, DVec3::X), (0.0, DVec3::NEG_X)] {
         let mut table = pendulum(tilt, kind, 60.0);
         let mut farthest = 0.0_f64;
@@ -290,7 +294,7 @@ fn a_body_on_a_slide_falls_along_it_and_stops_at_its_end() {
     let axis = rotation * DVec3::X;
     let built = |range_m| {
         // the world is b: it lies behind a by what a has slid, against a's own axis
-        let kind = JointKind::Prismatic { axis: DVec3::NEG_X * 2.0, range_m };
+        let kind = JointKind::Prismatic { axis: DVec3::NEG_X * 2.0, range_m, motor: None };
         let tilted = RigidSpec { rotation, ..block(DVec3::splat(0.1), DVec3::ZERO, 1.0) };
         party([tilted.clone()], [on_world(kind).at_rest_in(rotation, DQuat::IDENTITY)], 100.0)
     };
@@ -326,8 +330,8 @@ fn a_free_jointed_pair_keeps_its_momentum_and_stays_joined() {
     for kind in [
         JointKind::Fixed,
         JointKind::Spherical,
-        JointKind::Revolute { axis: DVec3::new(1.0, 0.3, -0.2), range_rad: Some([-0.5, 0.5]) },
-        JointKind::Prismatic { axis: DVec3::X, range_m: Some([-0.2, 0.2]) },
+        JointKind::Revolute { axis: DVec3::new(1.0, 0.3, -0.2), range_rad: Some([-0.5, 0.5]), motor: None },
+        JointKind::Prismatic { axis: DVec3::X, range_m: Some([-0.2, 0.2]), motor: None },
     ] {
         let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.0) };
         let first = RigidSpec { spin: DVec3::new(2.0, -3.0, 4.0), ..at(0.0) };
@@ -363,7 +367,7 @@ fn jointed_bodies_that_overlap_pass_through_each_other_unless_they_collide() {
     for collide in [false, true] {
         let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.0) };
         // a slide along x, on which one comes to the other at 1 m/s
-        let kind = JointKind::Prismatic { axis: DVec3::X, range_m: None };
+        let kind = JointKind::Prismatic { axis: DVec3::X, range_m: None, motor: None };
         let second = RigidSpec { velocity: DVec3::NEG_X, ..at(0.3) };
         let joint = Joint { collide, ..Joint::new(AgentId(0), Some(AgentId(1)), kind) };
         let mut table = party([at(0.0), second], [joint], 100.0);

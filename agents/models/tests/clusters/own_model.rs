@@ -30,7 +30,7 @@ const DAMPING_N_S_M: f64 = 10.0;
 impl Plate {
     fn new(half_m: DVec3, mass_kg: f64) -> Self {
         let solid = SolidShape::new(Solid::Box { half_extents_m: half_m }, DVec3::ZERO).unwrap();
-        let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.5, restitution: 0.0 };
+        let form = CollisionShape::new(ShapeKind::Solid(solid), 0.5);
         let block = [Block { row: 0, column: 0, value: DMat3::IDENTITY }];
         let zero = [DVec3::ZERO];
         Self {

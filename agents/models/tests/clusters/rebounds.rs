@@ -3,7 +3,7 @@
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 
 const RADIUS_M: f64 = 0.05;
@@ -17,6 +17,7 @@ fn floor(restitution: f64) -> Obstacle {
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution,
+        traits: ContactTraits::default(),
     }
 }
 

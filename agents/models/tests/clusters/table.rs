@@ -7,8 +7,8 @@ use metachron_contact::stepper::{
     Torn, Yielded,
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
-use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SensorTouch, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use std::sync::Arc;
 
 /// Gravity, m/s².
@@ -85,7 +85,7 @@ pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
 /// A plane through the origin whose normal is the z that `rotation` leads to.
 pub fn plane(rotation: DQuat, friction: f64) -> Obstacle {
     let (name, solid, position) = ("floor".into(), Solid::Plane, DVec3::ZERO);
-    Obstacle { name, solid, position, rotation, friction, restitution: 0.0 }
+    Obstacle { name, solid, position, rotation, friction, restitution: 0.0, traits: ContactTraits::default() }
 }
 
 impl Table {
@@ -129,6 +129,11 @@ impl Table {
     /// The forces by which a body was held at the end of the last step.
     pub fn grips(&self, body: usize) -> &[Grip] {
         &self.bodies[body].grips
+    }
+
+    /// What a body has sensed, or what has sensed it.
+    pub fn sensed(&self, body: usize) -> &[SensorTouch] {
+        self.bodies[body].memory.sensed()
     }
 
     /// What tore in the last macro step.

@@ -7,7 +7,9 @@ use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState};
-use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
+use metachron_geometry::{
+    CollisionShape, ContactSide, ContactTraits, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape,
+};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::soft::{self, SoftBody, SoftSpec};
 use metachron_models::tool::{Keyframe, Tool, ToolSpec};
@@ -26,6 +28,7 @@ fn tool(keys: &[(f64, DVec3, f64)], max_force_n: f64, graspable: Vec<AgentId>) -
         graspable,
         pivot_m: None,
         starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
     })
     .unwrap()
 }
@@ -147,6 +150,7 @@ fn what_hangs_on_a_shaft_in_a_pivot_weighs_on_its_tip_by_the_lever() {
         graspable: vec![],
         pivot_m: Some(up(0.5)),
         starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
     };
     let bodies = vec![placed(RigidBody::new(weight).unwrap(), false), placed(Tool::new(spec).unwrap(), false)];
     let mut table = Table::new(bodies).at_rates(240.0, 240.0);
@@ -174,7 +178,7 @@ struct Pusher {
 impl Pusher {
     fn new(half_m: DVec3, place: DVec3, m_s: f64) -> Self {
         let solid = SolidShape::new(Solid::Box { half_extents_m: half_m }, DVec3::ZERO).unwrap();
-        let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.5, restitution: 0.0 };
+        let form = CollisionShape::new(ShapeKind::Solid(solid), 0.5);
         Self { form, place, kept: place, m_s }
     }
 }

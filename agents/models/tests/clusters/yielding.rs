@@ -62,7 +62,7 @@ fn a_slider_stops_where_its_motion_is_used_up_and_is_held_there() {
     for kind in [
         JointKind::Fixed,
         JointKind::Spherical,
-        JointKind::Prismatic { axis: DVec3::Y, range_m: None },
+        JointKind::Prismatic { axis: DVec3::Y, range_m: None, motor: None },
         JointKind::Spring { stiffness_n_m: 1e5, damping_n_s_m: 0.0, rest_m: 0.0 },
     ] {
         let (speed_m_s, yields_above_n) = (1.0, 8.0);

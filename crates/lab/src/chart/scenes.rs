@@ -7,7 +7,7 @@ use super::stability::common::{GRAVITY, TUBE_RADIUS_M, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Anchor};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
 
@@ -47,6 +47,7 @@ fn floor() -> Obstacle {
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     }
 }
 

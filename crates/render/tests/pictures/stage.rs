@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
-use metachron_geometry::{Obstacle, Solid, ToolShape};
+use metachron_geometry::{ContactTraits, Obstacle, Solid, ToolShape};
 use metachron_render::{Actor, Appearance, Camera, Form, Level, Material, SceneView, States, StaticObject};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -86,6 +86,7 @@ fn tray() -> Vec<StaticObject> {
             rotation: DQuat::IDENTITY,
             friction: 0.3,
             restitution: 0.0,
+            traits: ContactTraits::default(),
         },
         appearance: steel,
     };

@@ -67,6 +67,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     check_keys(c, place, file);
+    check_traits(c, place, file, [a, b], objects);
     let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
@@ -138,6 +139,31 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     }
     if attach && file.law == Some(CouplingLaw::Off) {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
+    }
+}
+
+/// Reports contact by a law of its own between objects that do not collide, or of which one only senses.
+fn check_traits(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &CouplingFile,
+    ends: [NamedObject; 2],
+    objects: &Objects,
+) {
+    let traits = |end: NamedObject| {
+        let id = end.agent()?;
+        objects.agents.iter().find(|member| member.id == id).map(|member| member.spec.traits())
+    };
+    let [Some(a), Some(b)] = ends.map(traits) else { return };
+    if file.kind.unwrap_or_default() != Kind::Contact || file.law == Some(CouplingLaw::Off) {
+        return;
+    }
+    if !a.groups.meet(b.groups) {
+        let expected = "expected `law = \"off\"`, no such coupling, or other groups under their `contact`";
+        c.wrong(place, "b", "does not collide with `a` by their groups", expected);
+    } else if a.is_sensor || b.is_sensor {
+        let expected = "expected no such coupling: a sensor gives no force";
+        c.wrong(place, "b", "or `a` only senses", expected);
     }
 }
 

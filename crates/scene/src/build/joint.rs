@@ -176,9 +176,13 @@ impl PlacedJoint {
         let length = from.distance(to);
         let kind = match self.free_motion {
             FreeMotion::Fixed => JointKind::Fixed,
-            FreeMotion::Revolute { range_rad, .. } => JointKind::Revolute { axis: axis(self.axis()), range_rad },
+            FreeMotion::Revolute { range_rad, motor, .. } => {
+                JointKind::Revolute { axis: axis(self.axis()), range_rad, motor }
+            }
             FreeMotion::Spherical => JointKind::Spherical,
-            FreeMotion::Prismatic { range_m, .. } => JointKind::Prismatic { axis: axis(self.axis()), range_m },
+            FreeMotion::Prismatic { range_m, motor, .. } => {
+                JointKind::Prismatic { axis: axis(self.axis()), range_m, motor }
+            }
             FreeMotion::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
                 JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: rest_m.unwrap_or(length) }
             }

@@ -1,9 +1,11 @@
 //! Reads the keys of a joint: which belong to its kind, and the motion that they leave free.
 
+use super::motor::{HINGE, SLIDE};
 use super::{DAMPING, STIFFNESS};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{JointFile, JointKind as Kind};
 use glam::DVec3;
+use metachron_models::rigid::Motor;
 
 /// Longest spring or rope, metres.
 const LENGTH_MAX_M: f64 = 1e4;
@@ -16,9 +18,9 @@ const AXIS_MAX: f64 = 1e6;
 #[derive(Debug, Clone, Copy)]
 pub(super) enum FreeMotion {
     Fixed,
-    Revolute { axis: DVec3, range_rad: Option<[f64; 2]> },
+    Revolute { axis: DVec3, range_rad: Option<[f64; 2]>, motor: Option<Motor> },
     Spherical,
-    Prismatic { axis: DVec3, range_m: Option<[f64; 2]> },
+    Prismatic { axis: DVec3, range_m: Option<[f64; 2]>, motor: Option<Motor> },
     Spring { stiffness_n_m: f64, damping_n_s_m: f64, rest_m: Option<f64> },
     Rope { length_m: Option<f64> },
 }
@@ -27,8 +29,8 @@ pub(super) enum FreeMotion {
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
         Kind::Fixed | Kind::Spherical => (&[], &[]),
-        Kind::Revolute => (&["axis"], &["range_deg"]),
-        Kind::Prismatic => (&["axis"], &["range_m"]),
+        Kind::Revolute => (&["axis"], &["range_deg", "motor"]),
+        Kind::Prismatic => (&["axis"], &["range_m", "motor"]),
         Kind::Spring => (&["stiffness_n_m"], &["damping_n_s_m", "rest_m"]),
         Kind::Rope => (&[], &["length_m"]),
     }
@@ -53,11 +55,14 @@ pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFi
                     "expected [least, greatest] with 0 between them",
                 );
             }
-            FreeMotion::Revolute { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
+            let range_rad = range.map(|r| r.map(f64::to_radians));
+            let motor = HINGE.read(c, place, file.motor.as_ref(), range_rad);
+            FreeMotion::Revolute { axis: axis(c, place, file)?, range_rad, motor }
         }
         Kind::Prismatic => {
             let range_m = range(c, place, "range_m", file.range_m, LENGTH_MAX_M);
-            FreeMotion::Prismatic { axis: axis(c, place, file)?, range_m }
+            let motor = SLIDE.read(c, place, file.motor.as_ref(), range_m);
+            FreeMotion::Prismatic { axis: axis(c, place, file)?, range_m, motor }
         }
         Kind::Spring => {
             let length = allowed(0.0..=LENGTH_MAX_M, "m");
@@ -88,6 +93,7 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool 
         ("axis", file.axis.is_some()),
         ("range_m", file.range_m.is_some()),
         ("range_deg", file.range_deg.is_some()),
+        ("motor", file.motor.is_some()),
         ("stiffness_n_m", file.stiffness_n_m.is_some()),
         ("damping_n_s_m", file.damping_n_s_m.is_some()),
         ("rest_m", file.rest_m.is_some()),

@@ -4,6 +4,7 @@
 //! Never here: text and its syntax.
 
 mod common;
+mod contact;
 mod coupling;
 mod force_limits;
 mod glb;
@@ -14,6 +15,7 @@ mod joint;
 mod joint_keys;
 mod joint_rules;
 mod mesh;
+mod motor;
 mod obj;
 mod object;
 mod rigid;

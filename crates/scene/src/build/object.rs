@@ -1,6 +1,7 @@
 //! Reads the objects of a scene: each by its model, with names and links.
 
 use super::common::{appearance, faults, levels, pace, refuse_tolerance, tolerance};
+use super::contact::{self, GroupNames};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::{rigid, scenery, soft, synthetic, tool, tube};
@@ -13,7 +14,7 @@ use crate::format::{
 use crate::source::Source;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
-use metachron_geometry::Obstacle;
+use metachron_geometry::{ContactTraits, Obstacle};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
@@ -54,6 +55,13 @@ pub(super) struct ModelContext<'a> {
     pub(super) gravity: DVec3,
     pub(super) levels: (u8, u8),
     pub(super) sleep: bool,
+    pub(super) traits: ContactTraits,
+}
+
+/// What an object may refer to by name.
+struct Known<'a> {
+    names: &'a Names,
+    groups: &'a GroupNames,
 }
 
 /// Names and what each denotes.
@@ -192,9 +200,10 @@ pub(crate) fn read_objects(
         entry.copies = copies(c, &entry.place, &entry.common, can_move, most);
     }
     let names = assign_names(c, &entries);
-    let (obstacles, obstacle_appearances) = fixed_objects(c, &entries, context.source);
+    let groups = GroupNames::of(c, entries.iter().filter_map(|e| Some((&e.place, e.common.contact.as_ref()?))));
+    let (obstacles, obstacle_appearances) = fixed_objects(c, &entries, context.source, &groups);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
-    let agents = agents(c, &entries, &names, context);
+    let agents = agents(c, &entries, &Known { names: &names, groups: &groups }, context);
     let scenery = scenery::read(c, &entries, context.source);
     Objects { agents, obstacles, obstacle_appearances, scenery, names }
 }
@@ -297,7 +306,12 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     names
 }
 
-fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> (Vec<Obstacle>, Vec<Appearance>) {
+fn fixed_objects(
+    c: &mut Checker<'_, '_>,
+    entries: &[Entry],
+    source: &Source,
+    groups: &GroupNames,
+) -> (Vec<Obstacle>, Vec<Appearance>) {
     let mut found = (Vec::new(), Vec::new());
     for entry in entries.iter().filter(|e| e.fixed) {
         let ModelFile::Rigid(file) = &entry.model else { continue };
@@ -306,7 +320,9 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
         refuse_tolerance(c, &entry.place, &entry.common);
         levels(c, &entry.place, &entry.common);
         let appearance = appearance(c, &entry.place, &entry.common, Material::Plastic);
+        let traits = groups.traits(c, &entry.place, entry.common.contact.as_ref());
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
+            let obstacle = Obstacle { traits, ..obstacle };
             for (offset, name) in entry.copies.places(&entry.common.name) {
                 found.0.push(Obstacle { name, position: obstacle.position + offset, ..obstacle.clone() });
                 found.1.push(appearance);
@@ -325,7 +341,7 @@ pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: 
     c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
 }
 
-fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, context: &SceneContext<'_>) -> Vec<Member> {
+fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], known: &Known<'_>, context: &SceneContext<'_>) -> Vec<Member> {
     let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
     let count = moving.iter().map(|entry| entry.copies.len()).sum();
     if count > AGENTS_MAX {
@@ -336,7 +352,7 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, context: &S
     let mut firsts = Vec::with_capacity(moving.len());
     let mut next = 0;
     for entry in moving {
-        if let Some(member) = member(c, entry, AgentId(next), names, context) {
+        if let Some(member) = member(c, entry, AgentId(next), known, context) {
             firsts.push((entry, members.len()));
             members.extend(entry.copies.members(&member));
         }
@@ -381,7 +397,7 @@ fn member(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
     id: AgentId,
-    names: &Names,
+    known: &Known<'_>,
     context: &SceneContext<'_>,
 ) -> Option<Member> {
     let Entry { place, common, model, .. } = entry;
@@ -391,6 +407,7 @@ fn member(
         gravity: context.gravity,
         levels: levels(c, place, common),
         sleep: common.sleep.unwrap_or(true),
+        traits: known.groups.traits(c, place, common.contact.as_ref()),
     };
     let pace = pace(c, place, common);
     let faults = faults(c, place, common.faults.as_ref(), context.faults);
@@ -421,8 +438,9 @@ fn member(
             let range = ResolutionRange { eps_m: built.eps_m.unwrap_or(flat.eps_m), n: levels };
             (Spec::Soft(built.spec), Resolution { eps_m: range.eps_m.0, n: levels.1 }, range, flat)
         }
-        ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, names)), unit, flat, flat),
+        ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, known.names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
+            contact::refuse(c, place, common.contact.as_ref());
             let (spec, range) = synthetic::build(c, file, &model_context);
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }

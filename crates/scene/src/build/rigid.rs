@@ -9,7 +9,7 @@ use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_geometry::{Obstacle, Solid, generate_surface};
+use metachron_geometry::{ContactTraits, Obstacle, Solid, generate_surface};
 use metachron_models::rigid::RigidSpec;
 use std::sync::Arc;
 
@@ -51,7 +51,15 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
     let solid = solid(c, place, file, source)?;
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
-    Some(Obstacle { name: String::new(), solid, position, rotation, friction, restitution })
+    Some(Obstacle {
+        name: String::new(),
+        solid,
+        position,
+        rotation,
+        friction,
+        restitution,
+        traits: ContactTraits::default(),
+    })
 }
 
 /// Reads a moving object.
@@ -72,6 +80,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
         mass_kg,
         restitution,
         friction,
+        traits: context.traits,
         gravity: context.gravity,
         sleep: context.sleep,
     })

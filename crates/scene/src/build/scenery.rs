@@ -3,6 +3,7 @@
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
 use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
+use super::contact;
 use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
@@ -54,6 +55,9 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
     let (mut scenery, mut meshes, mut textures) = (Vec::new(), Meshes::new(source), Textures::new(source));
     for entry in entries {
         let before = c.count();
+        if matches!(entry.model, ModelFile::Mesh(_) | ModelFile::Tree(_)) {
+            contact::refuse(c, &entry.place, entry.common.contact.as_ref());
+        }
         let parts = match &entry.model {
             ModelFile::Mesh(file) => {
                 let parts = mesh_parts(c, entry, file, &mut meshes);

@@ -404,6 +404,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         velocity: shared.velocity_m_s.map_or(DVec3::ZERO, |v| c.point(place, "velocity_m_s", v, SPEED_MAX)),
         held: shared.held,
         friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
+        traits: context.traits,
         gravity: context.gravity,
         self_contact: shared.self_contact,
         sleep: context.sleep,

@@ -43,6 +43,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelCon
             .unwrap_or(FORCE_DEFAULT_N),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
+        traits: context.traits,
     }
 }
 

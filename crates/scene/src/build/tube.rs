@@ -73,6 +73,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         pressure_keys: pressure_keys(c, place, file),
         self_contact: file.self_contact.unwrap_or(true),
         friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
+        traits: context.traits,
         gravity: context.gravity,
         sleep: context.sleep,
     };

@@ -1,12 +1,12 @@
 //! The keys that objects of every model share.
 
-use super::{FaultsFile, OneOrEach, OneOrRange, Point};
+use super::{ContactFile, FaultsFile, OneOrEach, OneOrRange, Point};
 use metachron_world::kinds::{Material, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 17] = [
+pub const COMMON_KEYS: [&str; 18] = [
     "name",
     "rate_hz",
     "dt_ms",
@@ -19,6 +19,7 @@ pub const COMMON_KEYS: [&str; 17] = [
     "shading",
     "sleep",
     "faults",
+    "contact",
     "grid",
     "spacing_m",
     "rise_m",
@@ -64,6 +65,8 @@ pub struct CommonFile {
     pub sleep: Option<bool>,
     /// Faults injected into its clock and its messages; keys that are left out take the values of the world.
     pub faults: Option<FaultsFile>,
+    /// What it says about its contacts: whom it meets, how a pair shares its coefficients, whether it only senses.
+    pub contact: Option<ContactFile>,
     /// Repeats an object: number of copies along x, y and z, each 1 … 1000. The first is at the object's own position, the
     /// others are `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….
     #[schemars(length(min = 3, max = 3))]

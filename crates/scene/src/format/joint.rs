@@ -28,6 +28,8 @@ pub struct JointFile {
     /// Range of the angle of a `revolute` joint, degrees from that at the start: `[least, greatest]`, containing 0, each up to 180 in
     /// magnitude. Default: unlimited.
     pub range_deg: Option<[f64; 2]>,
+    /// Motor of a `revolute` or `prismatic` joint.
+    pub motor: Option<MotorFile>,
     /// Stiffness of a `spring`, N/m, 1e-6 … 1e9.
     pub stiffness_n_m: Option<f64>,
     /// Damping of a `spring`, N·s/m, 0 … 1e7. Default 0.
@@ -46,6 +48,67 @@ pub struct JointFile {
     /// lengthens a `rope` or `spring`, for good. What it gives against turns is not bounded. The report has the first time under `events`.
     /// Default: as much as it takes.
     pub yields_above_n: Option<f64>,
+}
+
+/// Motor of a joint: it drives `b` relative to `a` about or along `axis`, the position counted as the joint's range is. A velocity alone is
+/// kept exactly as long as the effort suffices; a position is approached by a spring, with a damper against the velocity (default 0).
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorFile {
+    /// Angle of a `revolute` joint at which its spring rests, degrees, up to 180 in magnitude; it is reached the shorter way around.
+    pub position_deg: Option<f64>,
+    /// Velocity of a `revolute` joint, rad/s, up to 1e4 in magnitude.
+    pub velocity_rad_s: Option<f64>,
+    /// Greatest torque, N·m, 1e-9 … 1e9. Default: as much as it takes.
+    pub max_torque_n_m: Option<f64>,
+    /// Stiffness of the spring to `position_deg`, N·m/rad, 1e-6 … 1e9.
+    pub stiffness_n_m_rad: Option<f64>,
+    /// Damping against `velocity_rad_s`, N·m·s/rad, 0 … 1e7: without a position the motor gives this times what the velocity lacks.
+    pub damping_n_m_s_rad: Option<f64>,
+    /// Position of a `prismatic` joint at which its spring rests, metres, up to 1e4 in magnitude.
+    pub position_m: Option<f64>,
+    /// Velocity of a `prismatic` joint, m/s, up to 1e4 in magnitude.
+    pub velocity_m_s: Option<f64>,
+    /// Greatest force, N, 1e-9 … 1e9. Default: as much as it takes.
+    pub max_force_n: Option<f64>,
+    /// Stiffness of the spring to `position_m`, N/m, 1e-6 … 1e9.
+    pub stiffness_n_m: Option<f64>,
+    /// Damping against `velocity_m_s`, N·s/m, 0 … 1e7: without a position the motor gives this times what the velocity lacks.
+    pub damping_n_s_m: Option<f64>,
+}
+
+impl MotorFile {
+    /// All of its keys.
+    pub const KEYS: [&str; 10] = [
+        "position_deg",
+        "velocity_rad_s",
+        "max_torque_n_m",
+        "stiffness_n_m_rad",
+        "damping_n_m_s_rad",
+        "position_m",
+        "velocity_m_s",
+        "max_force_n",
+        "stiffness_n_m",
+        "damping_n_s_m",
+    ];
+
+    /// The value of a key; `None` where it is not given or does not exist.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<f64> {
+        let values = [
+            self.position_deg,
+            self.velocity_rad_s,
+            self.max_torque_n_m,
+            self.stiffness_n_m_rad,
+            self.damping_n_m_s_rad,
+            self.position_m,
+            self.velocity_m_s,
+            self.max_force_n,
+            self.stiffness_n_m,
+            self.damping_n_s_m,
+        ];
+        Self::KEYS.iter().position(|known| *known == key).and_then(|at| values[at])
+    }
 }
 
 /// Motion that a joint leaves free.

@@ -4,6 +4,7 @@
 //! Never here: defaults that depend on other keys, and rules between keys (see `build`).
 
 mod common;
+mod contact;
 mod coupling;
 mod joint;
 mod rigid;
@@ -16,8 +17,9 @@ mod tube;
 mod value;
 
 pub use common::{COMMON_KEYS, CommonFile, HoldKind};
+pub use contact::{CombineRuleName, ContactFile};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
-pub use joint::{JointFile, JointKind};
+pub use joint::{JointFile, JointKind, MotorFile};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,

@@ -53,6 +53,9 @@ pub struct Report {
     /// What happened once, in the order of time; left out where nothing did.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<EventReport>,
+    /// What touched sensors, and how often; left out where nothing did.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<SensorReport>,
     /// The contact clusters of the last states.
     pub clusters: Vec<ClusterRow>,
     /// Agents that started inside each other or fixed solids.
@@ -209,6 +212,23 @@ pub struct EventReport {
     pub force_n: f64,
 }
 
+/// Two objects of which one, or both, only senses, and that have touched.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct SensorReport {
+    /// The name of the one that moves; of two that do, that of the first in the scene.
+    pub a: String,
+    /// The other one's name.
+    pub b: String,
+    /// Whether they touched at the end.
+    pub touching: bool,
+    /// How often they began to touch.
+    pub begins: u32,
+    /// How often they ceased to.
+    pub ends: u32,
+    /// When they last began or ceased to, seconds of the first one's time.
+    pub changed_s: f64,
+}
+
 /// Two agents that started inside each other.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct OverlapReport {
@@ -333,6 +353,7 @@ impl Report {
             agents: vec![AgentReport::default()],
             couplings: vec![CouplingReport::default()],
             events: vec![EventReport::default()],
+            sensors: vec![SensorReport::default()],
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],
             moved: vec![MovedReport::default()],
@@ -410,6 +431,12 @@ mod tests {
         "/events/0/a",
         "/events/0/b",
         "/events/0/force_n",
+        "/sensors/0/a",
+        "/sensors/0/b",
+        "/sensors/0/touching",
+        "/sensors/0/begins",
+        "/sensors/0/ends",
+        "/sensors/0/changed_s",
         "/overlaps/0/depth_m",
         "/moved/0/by_m",
         "/oracle/dt_ms",

@@ -2,7 +2,7 @@
 
 use super::{
     AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, ScaleSummary,
-    Spread,
+    SensorReport, Spread,
 };
 use std::fmt::Write;
 
@@ -30,6 +30,7 @@ impl Report {
         self.agents.iter().for_each(|agent| out_of_reach(&mut out, agent));
         coupling_table(&mut out, &self.couplings);
         event_lines(&mut out, &self.events);
+        sensor_lines(&mut out, &self.sensors);
         if let Some(oracle) = &self.oracle {
             reference_table(&mut out, oracle);
         }
@@ -145,6 +146,17 @@ fn event_lines(out: &mut String, events: &[EventReport]) {
         let _ = writeln!(out, "note  `{attachment}` of `{a}` and `{b}` {kind} at {at_s:.4} s: {force_n:.3} N");
     }
     omitted_rows(out, events.len());
+}
+
+fn sensor_lines(out: &mut String, sensors: &[SensorReport]) {
+    for SensorReport { a, b, touching, begins, ends, changed_s } in sensors.iter().take(ROWS_SHOWN) {
+        let now = if *touching { "touching since" } else { "apart since" };
+        let _ = writeln!(
+            out,
+            "note  `{a}` and `{b}` began to touch {begins} and ceased {ends} times, {now} {changed_s:.4} s"
+        );
+    }
+    omitted_rows(out, sensors.len());
 }
 
 fn reference_table(out: &mut String, oracle: &ReferenceReport) {

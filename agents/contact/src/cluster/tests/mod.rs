@@ -5,6 +5,7 @@ mod factor;
 mod iterative;
 mod joints;
 mod lent;
+mod pressed;
 mod promises;
 mod random;
 mod rebounds;

@@ -212,7 +212,7 @@ fn a_compound_touches_with_each_of_its_parts() {
     let shape = rapier3d::parry::shape::SharedShape::compound(vec![foot(-0.1), foot(0.1)]);
     let kind =
         ShapeKind::Solid(SolidShape { solid: table, shape, com_local: DVec3::new(0.0, 0.0, 0.01), radius_m: 0.25 });
-    let feet = CollisionShape { kind, friction: 0.0, restitution: 0.0 };
+    let feet = CollisionShape::new(kind, 0.0);
     let floor = cuboid(DVec3::new(0.5, 0.5, 0.05));
     let standing = at(&feet, DVec3::Z * 0.11, DQuat::IDENTITY);
     let found = all(&standing, &at(&floor, DVec3::ZERO, DQuat::IDENTITY), 1e-3);

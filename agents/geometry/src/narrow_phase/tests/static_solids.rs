@@ -2,10 +2,18 @@
 
 use super::surfaces::{block_skin, flat_sheet};
 use super::*;
-use crate::{Obstacle, ShapeError, StaticSolid, StaticSolidError};
+use crate::{ContactTraits, Obstacle, ShapeError, StaticSolid, StaticSolidError};
 
 fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
-    Obstacle { name: "ground".to_owned(), solid, position, rotation, friction: 0.5, restitution: 0.0 }
+    Obstacle {
+        name: "ground".to_owned(),
+        solid,
+        position,
+        rotation,
+        friction: 0.5,
+        restitution: 0.0,
+        traits: ContactTraits::default(),
+    }
 }
 
 /// A square of two triangles about the origin at z = 0, facing up: half as wide as this, metres.

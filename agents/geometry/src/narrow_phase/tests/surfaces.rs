@@ -54,7 +54,7 @@ pub(super) fn skin_of(triangles: &[[u32; 3]], vertices: u32, radius_m: f64, clos
         edge_m: EDGE,
         closed,
     };
-    CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 }
+    CollisionShape::new(ShapeKind::Surface(surface), 0.5)
 }
 
 /// The distance of a point from the nearest triangle.
@@ -173,7 +173,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         edge_m: 1.0,
         closed: true,
     };
-    let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
+    let form = CollisionShape::new(ShapeKind::Surface(surface), 0.5);
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
@@ -207,7 +207,7 @@ fn on_a_ridge(there: &PlacedShape<'_>) -> Vec<Touch> {
         edge_m: 1.0,
         closed: true,
     };
-    let form = CollisionShape { kind: ShapeKind::Surface(surface), friction: 0.5, restitution: 0.0 };
+    let form = CollisionShape::new(ShapeKind::Surface(surface), 0.5);
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
     touches(&here, there, 0.01, &mut scratch, &mut list);

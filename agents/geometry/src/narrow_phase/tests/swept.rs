@@ -2,7 +2,7 @@
 
 use super::surfaces::{block_skin, flat_sheet, skin_of};
 use super::*;
-use crate::{Obstacle, StaticSolid};
+use crate::{ContactTraits, Obstacle, StaticSolid};
 
 /// As the search: a touch may be told this much early, metres.
 const EARLY_M: f64 = 1.1e-6;
@@ -216,8 +216,9 @@ fn static_solids_stop_what_falls_on_them_and_let_through_what_comes_from_behind(
         let is_mesh = matches!(solid, Solid::Mesh { .. });
         let obstacle = |rotation: DQuat| {
             let position = rotation * position;
-            let (name, solid) = ("ground".to_owned(), solid.clone());
-            StaticSolid::new(&Obstacle { name, solid, position, rotation, friction: 0.0, restitution: 0.0 }).unwrap()
+            let (name, solid, traits) = ("ground".to_owned(), solid.clone(), ContactTraits::NONE);
+            let (friction, restitution) = (0.0, 0.0);
+            StaticSolid::new(&Obstacle { name, solid, position, rotation, friction, restitution, traits }).unwrap()
         };
         for turn in [DQuat::IDENTITY, tilt] {
             let ground = obstacle(turn);

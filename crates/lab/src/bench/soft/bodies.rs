@@ -5,7 +5,7 @@
 use super::super::super::chart::GRAVITY;
 use anyhow::Context;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Tube, TubeSpec, WallModel};
 use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
@@ -43,6 +43,7 @@ fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
         velocity: DVec3::ZERO,
         held: Vec::new(),
         friction: 0.5,
+        traits: ContactTraits::default(),
         gravity: DVec3::NEG_Z * GRAVITY,
         self_contact: false,
         sleep: false,
@@ -71,7 +72,7 @@ pub(super) fn plate() -> anyhow::Result<RigidBody> {
 /// The floor: a plane at z = 0.
 pub(super) fn floor() -> Obstacle {
     let (name, solid, position, rotation) = ("floor".into(), Solid::Plane, DVec3::ZERO, DQuat::IDENTITY);
-    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0 }
+    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0, traits: ContactTraits::default() }
 }
 
 /// A sheet of 4 mm of so many cells along each edge that hangs from one of its sides.

@@ -30,7 +30,7 @@ pub(super) struct ShakenFloor {
 impl ShakenFloor {
     pub(super) fn new() -> Result<Self, ShapeError> {
         let solid = SolidShape::new(Solid::Box { half_extents_m: HALF_M }, DVec3::ZERO)?;
-        let form = CollisionShape { kind: ShapeKind::Solid(solid), friction: 0.5, restitution: 0.0 };
+        let form = CollisionShape::new(ShapeKind::Solid(solid), 0.5);
         Ok(Self { form, time_s: 0.0, kept_s: 0.0, led_m_s: 0.0 })
     }
 

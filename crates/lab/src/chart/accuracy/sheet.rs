@@ -4,6 +4,7 @@ use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case};
 use super::play::Play;
 use glam::{DQuat, DVec3};
+use metachron_geometry::ContactTraits;
 use metachron_models::rod::Integrator;
 use metachron_models::soft::Side;
 use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
@@ -60,6 +61,7 @@ pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
         velocity: DVec3::ZERO,
         held: Vec::new(),
         friction: 0.0,
+        traits: ContactTraits::default(),
         gravity: DVec3::NEG_Z * GRAVITY,
         self_contact: false,
         sleep: false,

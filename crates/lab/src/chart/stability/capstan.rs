@@ -10,7 +10,7 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
 use serde::{Deserialize, Serialize};
@@ -157,6 +157,7 @@ fn drum(case: &Case) -> Obstacle {
         rotation: DQuat::from_rotation_x(FRAC_PI_2),
         friction: case.friction,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     }
 }
 

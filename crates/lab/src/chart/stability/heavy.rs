@@ -11,7 +11,7 @@ use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rigid::{Joint, JointKind};
@@ -204,6 +204,7 @@ fn cube_stack(case: &Case) -> Option<MassRatioResult> {
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     };
     let scene = Arc::new(ClusterScene::new(&[ground]).ok()?);
     let mut spawns = Vec::new();

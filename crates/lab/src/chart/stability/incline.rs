@@ -8,7 +8,7 @@ use super::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Tube;
@@ -124,6 +124,7 @@ fn slid(case: &Case, angle: f64) -> Option<f64> {
         rotation,
         friction: FRICTION,
         restitution: 0.0,
+        traits: ContactTraits::default(),
     };
     let (down, up) = (rotation * DVec3::X, rotation * DVec3::Z);
     let gravity = DVec3::NEG_Z * GRAVITY;

@@ -1,0 +1,111 @@
+//! What a fine step starts from of the one before, and leaves to the next: impulses, slip owed, what sensors saw.
+//!
+//! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
+//! are laid out, the solve.
+
+use super::memory::{Partner, Remembered};
+use super::spin_friction::Spin;
+use super::ties::place_key;
+use super::{ClusterStepper, PairTotal, Participant, search};
+use glam::DVec3;
+use metachron_core::SimSpan;
+
+impl ClusterStepper {
+    /// Starts every contact from what the last step gave.
+    pub(super) fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
+        for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
+            let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
+            (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
+            owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
+        }
+    }
+
+    /// Notes what the next step starts from.
+    pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+        self.remember_spins(all, h_s);
+        let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
+        let solution = solver.solution();
+        for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
+            let impulse = solution.contacts_n_s[k];
+            let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
+            // a blow is over
+            let (lasting, spin) =
+                if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m, spin };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+            outside.note(all, owner.member, &contact.sides[1], -impulse);
+            if impulse != DVec3::ZERO {
+                let total = total_of(&mut self.totals, owner.member, owner.partner);
+                total.add(impulse, -contact.gap_m);
+                if impulse.length() > total.most_n_s {
+                    total.most_n_s = impulse.length();
+                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
+                }
+            }
+        }
+        for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
+            outside.note(all, owner.member, &row.sides[1], -*impulse);
+            outside.note_line(owner, *impulse);
+            tearing.note(owner, *impulse);
+            if let Partner::Link(_) = owner.partner {
+                total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
+            }
+            let owed_slip_m = owner.owed_slip_m(row, *impulse, &self.progress, h_s);
+            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+        }
+        yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
+        for &[a, b] in &search.near {
+            let (now, other) = (all[a].context.time + dt, all[b].id);
+            all[a].memory.meet(other, now);
+        }
+        let mut sensed = search.sensed.as_slice();
+        for (member, one) in all.iter_mut().enumerate() {
+            let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
+            sensed = others;
+            let begins = SimSpan::from_secs_f64(outside.after_s).unwrap_or(SimSpan::ZERO);
+            one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
+            one.memory.turn(one.context.time + dt);
+            if last {
+                ties.grips(member, &solution.rows_n_s, h_s, one.grips);
+            }
+        }
+    }
+
+    /// Notes what the spins of contacts were given.
+    fn remember_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
+        let Self { solver, search, ties, spins, outside, progress, .. } = self;
+        let solution = solver.solution();
+        for (contact, row) in spins.rows(ties) {
+            let (impulse, row) = (solution.rows_n_s[row], &ties.rows[row]);
+            let owner = &mut search.owners[contact];
+            let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
+            let most = pressed * solution.contacts_n_s[contact].dot(normal);
+            let [a, b] = row.sides.map(|side| search::velocity(&side, |member| &progress[member].solved[..]));
+            owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
+            owner.spin.torque_n_m = impulse.dot(normal) / h_s;
+            outside.note(all, owner.member, &row.sides[1], -impulse);
+        }
+    }
+}
+
+impl PairTotal {
+    /// Adds the impulse of a contact or of a link's row.
+    pub(super) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
+        self.impulse_n_s += impulse_n_s;
+        self.depth_m = self.depth_m.max(depth_m);
+        self.contacts += 1;
+    }
+}
+
+/// The total of a pair, made where it is new.
+pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
+    let order = |total: &PairTotal| (total.member, total.partner);
+    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
+        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
+        let (most_n_s, inverse_mass_per_kg) = (0.0, [0.0; 2]);
+        totals.insert(at, PairTotal { member, partner, impulse_n_s, contacts, depth_m, most_n_s, inverse_mass_per_kg });
+        at
+    });
+    &mut totals[at]
+}

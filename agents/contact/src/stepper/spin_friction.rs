@@ -1,0 +1,72 @@
+//! Friction about the normals of contacts, of sides that turn as a whole: a row for each, bounded by what presses its contact.
+//!
+//! In: contacts of a fine step with their radii. Out: rows of spins behind those of joints. Never here: where places are, the solve.
+//! Theory: docs/theory/clusters.md, section 2.
+
+use super::Participant;
+use super::search::Search;
+use super::ties::Ties;
+use crate::cluster::{Hold, JointRow, Pressed, Side};
+use glam::DVec3;
+
+/// The rows of spins of a fine step, in the order of those behind the rows of joints.
+#[derive(Debug, Default)]
+pub(super) struct SpinFriction {
+    /// Their contacts.
+    contacts: Vec<usize>,
+}
+
+/// How one side of a contact turns: its spin, and that beyond its blocks, rad/s.
+struct Turns {
+    side: Side,
+    led_rad_s: DVec3,
+}
+
+/// The spin friction of a contact as it is remembered, about its normal.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Spin {
+    /// The radius of the patch that resists, metres.
+    pub radius_m: f64,
+    /// The torque of the last step or solve, N·m, and the angle owed (eq. 13).
+    pub torque_n_m: f64,
+    pub owed_rad: f64,
+}
+
+impl SpinFriction {
+    /// Lays out the rows anew for the contacts as they are.
+    pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], ties: &mut Ties, h_s: f64) {
+        ties.rows.truncate(ties.owners.len());
+        self.contacts.clear();
+        for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
+            let reach_m = at.friction * owner.spin.radius_m;
+            if reach_m <= 0.0 {
+                continue;
+            }
+            let (Some(here), Some(there)) = (turns(all, Some(owner.member)), turns(all, owner.other)) else { continue };
+            if [&here, &there].iter().all(|turns| turns.side.terms().is_empty()) {
+                continue;
+            }
+            let hold = Hold::motor(at.normal, f64::INFINITY);
+            ties.rows.push(JointRow {
+                target_m_s: there.led_rad_s - here.led_rad_s,
+                owed_slip_m: at.normal * owner.spin.owed_rad,
+                pressed: Some(Pressed { contact, reach_m }),
+                warm_n_s: at.normal * (owner.spin.torque_n_m * h_s),
+                ..JointRow::new([here.side, there.side], hold)
+            });
+            self.contacts.push(contact);
+        }
+    }
+
+    /// The contacts of the rows, with the place of each row among all of the problem.
+    pub fn rows(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.contacts.iter().copied().zip(ties.owners.len()..)
+    }
+}
+
+/// How a member turns, or what never moves; `None` of a body that does not turn as a whole.
+fn turns(all: &[Participant<'_>], member: Option<usize>) -> Option<Turns> {
+    let Some(member) = member else { return Some(Turns { side: Side::FIXED, led_rad_s: DVec3::ZERO }) };
+    let pose = all[member].member.pose(&[], 0.0)?;
+    Some(Turns { side: pose.turns.of_member(member), led_rad_s: pose.led_rad_s })
+}

@@ -1,0 +1,117 @@
+//! Reads the motor of a joint: which keys belong to its kind, what it drives the joint to.
+//!
+//! In: [`MotorFile`]s. Out: [`Motor`]s, in radians; problems to the [`Checker`]. Never here: the joint's other keys.
+
+use super::{DAMPING, SPEED_MAX, STIFFNESS};
+use crate::check::{Allowed, Checker, Place, allowed};
+use crate::format::MotorFile;
+use metachron_models::rigid::{Motor, MotorGoal};
+
+/// The motors of hinges and slides: their keys, and how far either goes.
+pub(super) struct MotorKeys {
+    /// What the kind is called, with its article.
+    pub(super) joint: &'static str,
+    position: &'static str,
+    velocity: &'static str,
+    effort: &'static str,
+    stiffness: &'static str,
+    damping: &'static str,
+    /// The largest position either way, as the file writes it, and what it is in the units of the joint.
+    position_max: f64,
+    position_unit: f64,
+}
+
+/// Of a hinge.
+pub(super) const HINGE: MotorKeys = MotorKeys {
+    joint: "a revolute joint",
+    position: "position_deg",
+    velocity: "velocity_rad_s",
+    effort: "max_torque_n_m",
+    stiffness: "stiffness_n_m_rad",
+    damping: "damping_n_m_s_rad",
+    position_max: 180.0,
+    position_unit: std::f64::consts::PI / 180.0,
+};
+
+/// Of a slide.
+pub(super) const SLIDE: MotorKeys = MotorKeys {
+    joint: "a prismatic joint",
+    position: "position_m",
+    velocity: "velocity_m_s",
+    effort: "max_force_n",
+    stiffness: "stiffness_n_m",
+    damping: "damping_n_s_m",
+    position_max: 1e4,
+    position_unit: 1.0,
+};
+
+/// Most torque or force of a motor.
+const EFFORT: Allowed = allowed(1e-9..=1e9, "N·m or N");
+
+impl MotorKeys {
+    /// The motor of a joint whose range is `range`, in the units of the joint.
+    pub(super) fn read(
+        &self,
+        c: &mut Checker<'_, '_>,
+        place: &Place,
+        file: Option<&MotorFile>,
+        range: Option<[f64; 2]>,
+    ) -> Option<Motor> {
+        let place = &place.table("motor");
+        let file = file?;
+        let before = c.count();
+        self.check_keys(c, place, file);
+        if c.count() > before {
+            return None;
+        }
+        let position = allowed(-self.position_max..=self.position_max, "");
+        let speed = allowed(-SPEED_MAX..=SPEED_MAX, "");
+        let mut read = |key: &str, allowed: &Allowed| c.optional(place, key, file.get(key), allowed);
+        let (position, velocity) = (read(self.position, &position), read(self.velocity, &speed));
+        let (stiffness, damping) = (read(self.stiffness, &STIFFNESS), read(self.damping, &DAMPING));
+        let max_effort = read(self.effort, &EFFORT).unwrap_or(f64::INFINITY);
+        let position = position.map(|at| at * self.position_unit);
+        if let (Some(at), Some([least, greatest])) = (position, range)
+            && !(least..=greatest).contains(&at)
+        {
+            c.wrong(place, self.position, "is outside of the joint's range", "expected a position within it");
+        }
+        let goal = match (stiffness, damping, velocity) {
+            (None, None, Some(velocity)) => MotorGoal::Velocity(velocity),
+            _ => MotorGoal::Spring {
+                position: position.unwrap_or(0.0),
+                velocity: velocity.unwrap_or(0.0),
+                stiffness: stiffness.unwrap_or(0.0),
+                damping: damping.unwrap_or(0.0),
+            },
+        };
+        Some(Motor { goal, max_effort })
+    }
+
+    /// Reports keys that belong to another kind of joint, and those that another needs.
+    fn check_keys(&self, c: &mut Checker<'_, '_>, place: &Place, file: &MotorFile) {
+        let own = [self.position, self.velocity, self.effort, self.stiffness, self.damping];
+        let list = own.map(|key| format!("`{key}`")).join(", ");
+        for key in MotorFile::KEYS {
+            if file.get(key).is_some() && !own.contains(&key) {
+                let expected = format!("the motor of {} has {list}", self.joint);
+                c.wrong(place, key, format_args!("does not belong to the motor of {}", self.joint), expected);
+            }
+        }
+        let has = |key: &str| file.get(key).is_some();
+        let mut missing = |key: &str, why: String| c.wrong(place, key, "is missing", why);
+        if !(has(self.position) || has(self.velocity)) {
+            missing(self.velocity, format!("expected `{}` or `{}`", self.position, self.velocity));
+        }
+        if has(self.position) && !has(self.stiffness) {
+            missing(self.stiffness, format!("expected it beside `{}`, which a spring drives to", self.position));
+        }
+        if has(self.stiffness) && !has(self.position) {
+            missing(self.position, format!("expected it beside `{}`: where the spring rests", self.stiffness));
+        }
+        if has(self.position) && has(self.velocity) && !has(self.damping) {
+            let why = format!("expected it beside both goals: `{}` is that of the damper", self.velocity);
+            missing(self.damping, why);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! `contact` of an object: whom it meets, how a pair shares its coefficients, whether it only senses.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// What an object says about its contacts.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactFile {
+    /// Names of the collision groups that it is in; at most 32 in a scene. Default: all of them.
+    pub groups: Option<Vec<String>>,
+    /// Names of the collision groups that it collides with. Two objects collide where each collides with a group that the other is in.
+    /// Default: all of them; an empty list is none.
+    pub collides_with: Option<Vec<String>>,
+    /// Whether it only senses: what touches it is reported under `sensors`, and no force acts. Default false.
+    pub sensor: Option<bool>,
+    /// How a pair with it shares both frictions. Of two different rules the later one counts: `average`, `min`, `multiply`, `max`,
+    /// `geometric-mean`. Default: the other object's rule; where neither has one `geometric-mean`.
+    pub friction_rule: Option<CombineRuleName>,
+    /// How a pair with it shares both restitutions, as `friction_rule`. Default: the other object's rule; where neither has one `max`.
+    pub restitution_rule: Option<CombineRuleName>,
+    /// Radius r of the patch by which each of its contacts resists spin about its normal, metres, 0 … 10: with a torque up to friction · r ·
+    /// push. A pair takes the larger one. It acts between objects that turn as a whole, and static solids. Default 0.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub spin_radius_m: Option<f64>,
+}
+
+/// How two coefficients become that of a pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CombineRuleName {
+    /// Half of their sum.
+    Average,
+    /// The smaller one.
+    Min,
+    /// Their product.
+    Multiply,
+    /// The larger one.
+    Max,
+    /// The square root of their product.
+    GeometricMean,
+}

@@ -1,0 +1,138 @@
+//! What scenes say about contact and motors: what comes of it in a running world, and what a wrong key is told.
+
+use metachron_core::{Body, RigidState, SensorPartner, SimSpan};
+use metachron_scene::{SceneError, Source, load};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Scene, World};
+
+/// Half of a metre over a plane; the tests add keys to the ball, to the plane, and to the scene.
+fn read(ball: &str, plane: &str, more: &str) -> Result<Scene, SceneError> {
+    let text = format!(
+        "format = 1\n[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1\nposition_m = [0, 0, 0.5]\n{ball}\n[[object]]\nname = \"ground\"\nmodel = \"rigid\"\nshape = \"plane\"\n{plane}\n{more}\n"
+    );
+    load(&Source::memory("contact", text.as_bytes())?, &[])
+}
+
+fn after(scene: &Scene, seconds: f64) -> World {
+    let world = World::start(scene, ExecutorKind::Lockstep).unwrap();
+    world.advance(SimSpan::from_secs_f64(seconds).unwrap());
+    world
+}
+
+fn ball(world: &World) -> RigidState {
+    let Body::Rigid(state) = world.latest(world.object("ball").unwrap()).body else { panic!("a rigid body") };
+    state
+}
+
+fn refused(ball: &str, plane: &str, more: &str, words: &[&str]) {
+    let error = read(ball, plane, more).expect_err(more);
+    let said: Vec<_> = error.problems.iter().map(|p| format!("{} {} {:?}", p.message, p.expected, p.help)).collect();
+    let said = said.join("; ");
+    for word in words {
+        assert!(said.contains(word), "{word:?} is not said: {said}");
+    }
+}
+
+#[test]
+fn objects_of_groups_that_do_not_collide_pass_through_each_other() {
+    let ground = "contact = { groups = [\"ground\"] }";
+    let lands = read("contact = { groups = [\"balls\"], collides_with = [\"ground\"] }", ground, "").unwrap();
+    assert!((ball(&after(&lands, 1.0)).position.z - 0.1).abs() < 1e-3);
+    let passes = read("contact = { groups = [\"balls\"], collides_with = [\"balls\"] }", ground, "").unwrap();
+    assert!(ball(&after(&passes, 1.0)).position.z < -4.0);
+}
+
+#[test]
+fn a_sensor_is_told_of_in_the_state_of_what_touched_it() {
+    let gate = "[[object]]\nname = \"gate\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [1, 1, 0.05]\nposition_m = [0, 0, 0.2]\nfixed = true\ncontact = { sensor = true }";
+    let scene = read("", "", gate).unwrap();
+    assert!(scene.overlaps.is_empty(), "nothing is inside of a sensor");
+    let world = after(&scene, 1.0);
+    // the lower side of the gate is 0.15 m up, the upper side of the ball at rest 0.2 m
+    assert!((ball(&world).position.z - 0.1).abs() < 1e-3);
+    let state = world.latest(world.object("ball").unwrap());
+    let [touch] = state.sensed.as_slice() else { panic!("{:?}", state.sensed) };
+    assert_eq!((touch.with, touch.touching, touch.ends + 1), (SensorPartner::Static(1), true, touch.begins));
+}
+
+#[test]
+fn a_motor_turns_what_its_hinge_holds() {
+    let hinge = |motor: &str| {
+        format!(
+            "[[joint]]\nkind = \"revolute\"\na = \"ground\"\nb = \"ball\"\nat_a_m = [0, 0, 0.5]\naxis = [0, 0, 1]\nmotor = {{ {motor} }}"
+        )
+    };
+    let turning = read("", "", &hinge("velocity_rad_s = 2, max_torque_n_m = 0.01")).unwrap();
+    // 0.4 · 1 kg · 0.01 m² is spun up by 2.5 rad/s²
+    let spin = ball(&after(&turning, 0.4)).spin.z;
+    assert!((spin - 1.0).abs() < 0.02, "{spin} rad/s on its way");
+    assert!((ball(&after(&turning, 2.0)).spin.z - 2.0).abs() < 1e-3);
+    let turned = read("", "", &hinge("position_deg = 90, stiffness_n_m_rad = 4, damping_n_m_s_rad = 0.3")).unwrap();
+    let angle = ball(&after(&turned, 3.0)).rotation.to_scaled_axis().z;
+    assert!((angle - std::f64::consts::FRAC_PI_2).abs() < 1e-3, "{angle} rad");
+}
+
+#[test]
+fn a_slow_motor_does_not_fall_asleep() {
+    let slide = "[[joint]]\nkind = \"prismatic\"\na = \"ground\"\nb = \"ball\"\nat_a_m = [0, 0, 0.5]\naxis = [1, 0, 0]\nmotor = { velocity_m_s = 1e-3 }";
+    let world = after(&read("", "", slide).unwrap(), 4.0);
+    let way = ball(&world).position.x;
+    assert!((way / 4e-3 - 1.0).abs() < 0.01, "{way} m");
+}
+
+#[test]
+fn rules_of_pairs_and_a_radius_of_spin_reach_the_ground() {
+    let text = |ball: &str, plane: &str| {
+        format!(
+            "format = 1\n[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1\nfriction = 0.2\nposition_m = [0, 0, 0.1]\nspin_rad_s = [0, 0, 10]\n{ball}\n[[object]]\nname = \"ground\"\nmodel = \"rigid\"\nshape = \"plane\"\nfriction = 0.8\n{plane}"
+        )
+    };
+    for (rule, friction) in [("", 0.4), (", friction_rule = \"max\"", 0.8), (", friction_rule = \"min\"", 0.2)] {
+        let text =
+            text("contact = { friction_rule = \"average\" }", &format!("contact = {{ spin_radius_m = 0.02{rule} }}"));
+        let text = if rule.is_empty() { text.replace("contact = { friction_rule = \"average\" }", "") } else { text };
+        let scene = Source::memory("spin", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
+        let spin = ball(&after(&scene, 0.2)).spin.z;
+        let wanted = 10.0 - friction * 0.02 * 9.81 / (0.4 * 0.01) * 0.2;
+        assert!((spin - wanted).abs() < 0.15, "{rule}: {spin} rad/s, {wanted} wanted");
+    }
+}
+
+#[test]
+fn a_wrong_key_of_contact_or_of_a_motor_is_told_with_what_was_expected() {
+    refused(
+        "contact = { collides_with = [\"grond\"] }",
+        "contact = { groups = [\"ground\"] }",
+        "",
+        &["`collides_with` of `ball` names `grond`", "ground"],
+    );
+    refused("contact = { groups = [] }", "", "", &["`groups` of `ball` is empty"]);
+    refused("contact = { friction_rule = \"sum\" }", "", "", &["sum", "geometric-mean"]);
+    refused("contact = { spin_radius_m = -1 }", "", "", &["`spin_radius_m` of `ball` is -1", "0 to 10"]);
+    let mesh = "[[object]]\nname = \"sky\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\ncontact = { sensor = true }";
+    refused("", "", mesh, &["`contact` of `sky` has no effect"]);
+    let hinge = |motor: &str| {
+        format!(
+            "[[joint]]\nkind = \"revolute\"\na = \"ball\"\nb = \"world\"\naxis = [0, 0, 1]\nrange_deg = [-10, 10]\nmotor = {{ {motor} }}"
+        )
+    };
+    refused(
+        "",
+        "",
+        &hinge("velocity_m_s = 1"),
+        &["`velocity_m_s`", "does not belong to the motor of a revolute joint"],
+    );
+    refused("", "", &hinge("max_torque_n_m = 1"), &["`velocity_rad_s`", "is missing"]);
+    refused("", "", &hinge("position_deg = 5"), &["`stiffness_n_m_rad`", "is missing"]);
+    refused(
+        "",
+        "",
+        &hinge("position_deg = 20, stiffness_n_m_rad = 1"),
+        &["`position_deg`", "outside of the joint's range"],
+    );
+    let fixed = "[[joint]]\nkind = \"fixed\"\na = \"ball\"\nb = \"world\"\nmotor = { velocity_rad_s = 1 }";
+    refused("", "", fixed, &["`motor`", "does not belong to a fixed joint"]);
+    let other = "[[object]]\nname = \"bob\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [2, 0, 1]\ncontact = { groups = [\"bobs\"] }\n[[coupling]]\na = \"ball\"\nb = \"bob\"\nlaw = \"ledger\"";
+    refused("contact = { groups = [\"balls\"], collides_with = [\"balls\"] }", "", other, &["by their groups"]);
+    refused("contact = { sensor = true }", "", other, &["only senses"]);
+}
