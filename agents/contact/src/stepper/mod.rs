@@ -26,6 +26,7 @@ mod matter;
 mod member;
 mod memory;
 mod outside;
+mod own_springs;
 mod plan;
 mod progress;
 mod remote;
@@ -48,7 +49,7 @@ use heap::Heap;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, Pose, Role};
+pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
@@ -62,8 +63,8 @@ use search::Search;
 use tearing::Tearing;
 pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
-pub use yielding::Yielded;
 use yielding::Yielding;
+pub use yielding::{Slid, Yielded};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
@@ -492,6 +493,7 @@ impl ClusterStepper {
         ties.clear();
         let step = FineStep { all, progress, h_s, after_s, joint_miss_m: solve::joint_miss_m(*depth_m) };
         ties.gather_springs(&step);
+        ties.gather_own_springs(&step);
         ties.gather_links(&step);
         ties.gather_lines(&step, &self.outside.lines);
         joints.gather(scene, &step, ties);
