@@ -10,6 +10,7 @@ mod hung;
 mod joints;
 mod large;
 mod links;
+mod organ;
 mod own_model;
 mod own_skin;
 mod passing;
