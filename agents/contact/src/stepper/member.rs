@@ -2,7 +2,6 @@
 //!
 //! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
 
-use super::yielding::Slid;
 use crate::StepContext;
 use crate::cluster::{Block, Response, Side};
 use glam::{DQuat, DVec3};
@@ -272,6 +271,22 @@ pub struct OwnSpring {
     pub yields_above_n: f64,
     /// The force of the whole attachment above which it tears, N; infinite where it never does.
     pub tears_above_n: f64,
+}
+
+/// How far an attachment has slipped.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slid {
+    /// How far the point that it holds at its far end has moved, in that end's axes, metres.
+    pub moved_m: DVec3,
+    /// How much longer its length at rest, or its greatest length, is, metres.
+    pub longer_m: f64,
+}
+
+impl std::ops::AddAssign for Slid {
+    fn add_assign(&mut self, by: Self) {
+        self.moved_m += by.moved_m;
+        self.longer_m += by.longer_m;
+    }
 }
 
 /// A spring between a point of a body and a place that is led, which gives no more than it can.

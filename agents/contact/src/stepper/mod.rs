@@ -49,7 +49,7 @@ use heap::Heap;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role};
+pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 use memory::Remembered;
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
@@ -63,8 +63,8 @@ use search::Search;
 use tearing::Tearing;
 pub use tearing::Torn;
 use ties::{FineStep, Ties, place_key};
+pub use yielding::Yielded;
 use yielding::Yielding;
-pub use yielding::{Slid, Yielded};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;

@@ -3,7 +3,7 @@
 //! In: rows with their bounds, what the solve gave. Out: where attachments hold, in the memory of the member that remembers them.
 //! Never here: the bound itself, which is the row's ([`Hold::limited`]). Theory: docs/theory/clusters.md, eq. 29.
 
-use super::member::Pose;
+use super::member::{Pose, Slid};
 use super::memory::Partner;
 use super::springs::{Name, Pull};
 use super::ties::{FineStep, Ties};
@@ -19,21 +19,12 @@ const ALL_SHARE: f64 = 1.0 - 1e-6;
 /// A spring slips by what it would give this share of the most for, or more: less is the accuracy of a solve.
 pub(super) const SLIP_SHARE: f64 = 1e-6;
 
-/// How far something has slipped.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Slid {
-    /// How far the point that it holds at its far end has moved, in that end's axes; of an end without axes see [`Frame`]. Metres.
-    pub moved_m: DVec3,
-    /// How much longer its length at rest, or its greatest length, is, metres.
-    pub longer_m: f64,
-}
-
 /// How an attachment holds that has slipped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slip {
     /// Which one.
     pub(super) partner: Partner,
-    /// How far; of a body's own attachment nothing, for each of its springs slips by itself.
+    /// How far, at an end without axes as [`Frame`] says; of a body's own attachment nothing, for each of its springs slips by itself.
     slid: Slid,
 }
 
@@ -142,13 +133,6 @@ impl Slip {
             (Anchor::Local(_), _) | (_, Anchor::Local(_)) => DVec3::ZERO,
             _ => self.slid.moved_m,
         }
-    }
-}
-
-impl std::ops::AddAssign for Slid {
-    fn add_assign(&mut self, by: Self) {
-        self.moved_m += by.moved_m;
-        self.longer_m += by.longer_m;
     }
 }
 

@@ -57,7 +57,7 @@ impl SoftBody {
         let before = self.kept();
         let mesh = carrier.mesh(&self.spec);
         let (positions, velocities) = self.at_nodes(&carrier, &mesh);
-        let borne = self.borne_at(&carrier);
+        let elastic_m_s2 = self.elastic_m_s2_at(&carrier);
         let Some(skin) = &mut self.skin else { return };
         let turns: Vec<DQuat> = self.mesh.turns().collect();
         let turns = skin.carrier.turns_at(&turns, &carrier);
@@ -67,7 +67,7 @@ impl SoftBody {
         (self.positions, self.velocities) = (positions, velocities);
         self.system = self.mesh.system(&self.positions);
         self.free.clone_from(&self.velocities);
-        self.balance(&borne, before.energy_j);
+        self.balance(&elastic_m_s2, before.energy_j);
         self.keep_momentum(&before);
         self.relax(before.energy_j);
         // nodes that have moved have other arms
@@ -102,7 +102,7 @@ impl SoftBody {
     }
 
     /// By how much elastic forces accelerate the present nodes, at the nodes of another carrier, m/s²: where it rests, what bears its weight.
-    fn borne_at(&mut self, carrier: &Carrier) -> Vec<DVec3> {
+    fn elastic_m_s2_at(&mut self, carrier: &Carrier) -> Vec<DVec3> {
         let weight = std::mem::take(&mut self.spec.gravity);
         self.ties.clear();
         self.assemble(BALANCE_S);
@@ -110,22 +110,22 @@ impl SoftBody {
         let nodes = self.system.forces.iter().zip(&self.mesh.mass_kg).zip(&self.mesh.held);
         // what holds a node bears it as well
         let of = |((force, mass), held): ((&DVec3, &f64), &bool)| if *held { -weight } else { *force / *mass };
-        let borne: Vec<DVec3> = nodes.map(of).collect();
+        let elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
         let Some(skin) = &self.skin else { return vec![] };
-        carrier.nodes_m().iter().map(|node_m| skin.carrier.spread(*node_m, &borne)).collect()
+        carrier.nodes_m().iter().map(|node_m| skin.carrier.spread(*node_m, &elastic_m_s2)).collect()
     }
 
     /// Moves new nodes to where elastic forces accelerate them as they did the old ones, by steps from rest: a body that was at rest is again,
     /// and one that swings goes on. They stay where that would take more energy than they have and than `most_j`.
-    fn balance(&mut self, borne_m_s2: &[DVec3], most_j: f64) {
+    fn balance(&mut self, wanted_m_s2: &[DVec3], most_j: f64) {
         let before = self.positions.clone();
         let most_j = self.energy_j().max(most_j);
         let velocities = std::mem::replace(&mut self.velocities, vec![DVec3::ZERO; before.len()]);
         let weight = std::mem::take(&mut self.spec.gravity);
         for _ in 0..BALANCE_STEPS {
             self.assemble(BALANCE_S);
-            for (node, borne) in borne_m_s2.iter().enumerate() {
-                self.system.push(node as u32, -*borne * self.mesh.mass_kg[node]);
+            for (node, wanted) in wanted_m_s2.iter().enumerate() {
+                self.system.push(node as u32, -*wanted * self.mesh.mass_kg[node]);
             }
             if self.solve_for_velocities(BALANCE_S, Purpose::Own).is_err() {
                 self.positions.clone_from(&before);
