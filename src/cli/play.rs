@@ -224,6 +224,7 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
         wanted_hz: stats.wanted_hz,
         dt_ms: stats.dt.as_secs_f64() * 1e3,
         eps_m: stats.resolution.map(|held| held.eps_m),
+        nodes: stats.nodes,
         n: agent.picture.map(|drawn| drawn.n),
         picture_eps_m: agent.picture.filter(|_| stats.resolution.is_some()).map(|drawn| drawn.eps_m),
         cpu_s: stats.cpu_s,

@@ -18,6 +18,8 @@ pub struct Snapshot {
     pub steps: u64,
     /// The resolution that the simulation runs at; `None` for a model that has none.
     pub resolution: Option<Resolution>,
+    /// Number of nodes whose motion is solved for, held ones included; `None` for a model without nodes.
+    pub nodes: Option<u32>,
     /// Position and motion of the agent's matter.
     pub body: Body,
     /// Mechanical energy in joules: kinetic + elastic + gravity, zero at the origin.

@@ -152,6 +152,7 @@ impl AgentHandle {
             wanted_hz: self.shared.wanted_hz,
             dt: span(&gauges.dt),
             resolution: newest.resolution,
+            nodes: newest.nodes,
             work_s: gauges.work_s.get(),
             work: gauges.work.get(),
             cpu_s: self.cpu_s(),

@@ -53,6 +53,8 @@ pub struct AgentStats {
     pub dt: SimSpan,
     /// The resolution of the newest state; `None` for a model that has none.
     pub resolution: Option<Resolution>,
+    /// Number of nodes that its newest state was solved at; `None` for a model without nodes.
+    pub nodes: Option<u32>,
     /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
     pub work_s: f64,
     /// Work of its steps so far, in its model's unit.

@@ -174,6 +174,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.rate_hz = stats.rate_hz;
     row.dt_s = stats.dt.as_secs_f64();
     row.simulation = stats.resolution;
+    row.nodes = stats.nodes;
     row.step_s = stats.work_s;
     row.dropped_s = stats.dropped.as_secs_f64();
     row.residual_m = stats.residual_m;

@@ -240,7 +240,8 @@ impl Joints {
             (JointKind::Rope { .. }, Hold::Along { axis, .. }) => Slides::Length { axis: -axis },
             _ => Slides::Point(frame),
         };
-        ties.slides(SlidingRow { row, slides, per_m_s: step.h_s, free_m: step.joint_miss_m, yields_above_n: above_n });
+        let (per_m_s, free_m) = (step.h_s, step.joint_miss_m);
+        ties.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
     }
 
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.

@@ -170,10 +170,21 @@ pub trait ClusterMember: Send {
     /// [`StepError::Diverged`] where the state would not be finite; it is then what it was before.
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError>;
 
-    /// Its own attachments to the world that may tear, with what they gave over the step that ended last. Springs to other members are
-    /// rows of the problem.
+    /// Its own attachments to the world that may tear, with what they gave over the step that ended last. Springs to other members, and
+    /// those that yield, are rows of the problem.
     fn attachments(&self) -> &[OwnAttachment] {
         &[]
+    }
+
+    /// The spring of that place among those of its own attachments that yield: a row of the cluster's problem; `None` past the last one.
+    fn own_spring(&self, place: usize) -> Option<OwnSpring> {
+        let _ = place;
+        None
+    }
+
+    /// Lets that spring slip.
+    fn slip(&mut self, place: usize, by: Slid) {
+        let _ = (place, by);
     }
 
     /// Lets go of its own attachment `number`, for good; nothing where it has done so before.
@@ -239,6 +250,43 @@ pub struct OwnAttachment {
     pub force_n: DVec3,
     /// The force above which it tears, N, > 0.
     pub tears_above_n: f64,
+}
+
+/// A spring between a point of a body and a place of the world, of an attachment that is the body's own and yields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnSpring {
+    /// The number of the attachment among those of the body; it may have other springs.
+    pub attachment: u32,
+    /// The point that is held.
+    pub point: MaterialPoint,
+    /// Where it is held, slips included, metres.
+    pub place_m: DVec3,
+    /// The distance within which it gives nothing, slips included, metres, ≥ 0.
+    pub slack_m: f64,
+    /// Stiffness, N/m, ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+    /// The most that this spring gives, N, > 0.
+    pub yields_above_n: f64,
+    /// The force of the whole attachment above which it tears, N; infinite where it never does.
+    pub tears_above_n: f64,
+}
+
+/// How far an attachment has slipped.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Slid {
+    /// How far the point that it holds at its far end has moved, in that end's axes, metres.
+    pub moved_m: DVec3,
+    /// How much longer its length at rest, or its greatest length, is, metres.
+    pub longer_m: f64,
+}
+
+impl std::ops::AddAssign for Slid {
+    fn add_assign(&mut self, by: Self) {
+        self.moved_m += by.moved_m;
+        self.longer_m += by.longer_m;
+    }
 }
 
 /// A spring between a point of a body and a place that is led, which gives no more than it can.

@@ -3,7 +3,7 @@
 //! In: rows with their bounds, what the solve gave. Out: where attachments hold, in the memory of the member that remembers them.
 //! Never here: the bound itself, which is the row's ([`Hold::limited`]). Theory: docs/theory/clusters.md, eq. 29.
 
-use super::member::Pose;
+use super::member::{Pose, Slid};
 use super::memory::Partner;
 use super::springs::{Name, Pull};
 use super::ties::{FineStep, Ties};
@@ -17,17 +17,15 @@ use metachron_core::Anchor;
 /// A row whose force is this share of the most that it gives has yielded, but for the accuracy of a solve.
 const ALL_SHARE: f64 = 1.0 - 1e-6;
 /// A spring slips by what it would give this share of the most for, or more: less is the accuracy of a solve.
-const SLIP_SHARE: f64 = 1e-6;
+pub(super) const SLIP_SHARE: f64 = 1e-6;
 
 /// How an attachment holds that has slipped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slip {
     /// Which one.
     pub(super) partner: Partner,
-    /// How far the point that it holds at its far end has moved, in that end's axes; of an end without axes see [`Frame`]. Metres.
-    pub(super) moved_m: DVec3,
-    /// How much longer its length at rest, or its greatest length, is, metres.
-    pub(super) longer_m: f64,
+    /// How far, at an end without axes as [`Frame`] says; of a body's own attachment nothing, for each of its springs slips by itself.
+    slid: Slid,
 }
 
 /// An attachment that began to yield in a macro step.
@@ -88,8 +86,10 @@ pub(super) struct SlidingRow {
     pub per_m_s: f64,
     /// What it may be off without having slipped, metres.
     pub free_m: f64,
-    /// The most that it gives, N.
+    /// The force of its attachment at which it yields, N.
     pub yields_above_n: f64,
+    /// Its place among the springs of its member that yield, where it is one of them.
+    pub own: Option<usize>,
 }
 
 /// What yields, in one macro step.
@@ -101,37 +101,47 @@ pub(super) struct Yielding {
 impl Slip {
     /// One that has not slipped.
     pub(super) const fn none(partner: Partner) -> Self {
-        Self { partner, moved_m: DVec3::ZERO, longer_m: 0.0 }
+        Self { partner, slid: Slid { moved_m: DVec3::ZERO, longer_m: 0.0 } }
     }
 
     /// The joint as it holds now.
     pub(super) fn joint(&self, joint: &Joint) -> Joint {
         let kind = match joint.kind {
             JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
-                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: (rest_m + self.longer_m).max(0.0) }
+                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: (rest_m + self.slid.longer_m).max(0.0) }
             }
-            JointKind::Rope { length_m } => JointKind::Rope { length_m: length_m + self.longer_m },
+            JointKind::Rope { length_m } => JointKind::Rope { length_m: length_m + self.slid.longer_m },
             kind => kind,
         };
-        Joint { anchor_b_m: joint.anchor_b_m + self.moved_m, kind, ..*joint }
+        Joint { anchor_b_m: joint.anchor_b_m + self.slid.moved_m, kind, ..*joint }
     }
 
     /// The link as it holds now. Between two points without axes of their own nothing of it moves: [`Self::beside`] says how far apart
     /// they rest.
     pub(super) fn link(&self, link: &Link) -> Link {
         let (here, there) = match (link.here, link.there) {
-            (here, Anchor::Local(there)) => (here, Anchor::Local(there + self.moved_m)),
-            (Anchor::Local(here), there) => (Anchor::Local(here + self.moved_m), there),
+            (here, Anchor::Local(there)) => (here, Anchor::Local(there + self.slid.moved_m)),
+            (Anchor::Local(here), there) => (Anchor::Local(here + self.slid.moved_m), there),
             ends => ends,
         };
-        Link { here, there, rest_m: (link.rest_m + self.longer_m).max(0.0), ..*link }
+        Link { here, there, rest_m: (link.rest_m + self.slid.longer_m).max(0.0), ..*link }
     }
 
     /// How far from its place the far end of a link holds, world axes, metres: between two points without axes of their own.
     pub(super) fn beside(&self, link: &Link) -> DVec3 {
         match (link.here, link.there) {
             (Anchor::Local(_), _) | (_, Anchor::Local(_)) => DVec3::ZERO,
-            _ => self.moved_m,
+            _ => self.slid.moved_m,
+        }
+    }
+}
+
+impl Slides {
+    /// What has slipped where its row has moved by so much, world axes, metres.
+    fn slid(self, by_m: DVec3) -> Slid {
+        match self {
+            Self::Point(Frame { to_own, sign }) => Slid { moved_m: to_own * by_m * sign, longer_m: 0.0 },
+            Self::Length { axis } => Slid { moved_m: DVec3::ZERO, longer_m: by_m.dot(axis) },
         }
     }
 }
@@ -178,7 +188,7 @@ impl Ties {
     pub(super) fn spring_slides(&mut self, step: &FineStep<'_, '_>, pull: &Pull, name: Name, slides: Slides) {
         let (Some(row), Some(per_m_s)) = (self.rows.len().checked_sub(1), pull.slips_per_m_s(step.h_s)) else { return };
         let free_m = SLIP_SHARE * name.yields.above_n / pull.stiffness_n_m;
-        self.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: name.yields.above_n });
+        self.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: name.yields.above_n, own: None });
     }
 }
 
@@ -204,11 +214,12 @@ impl Yielding {
             if slid_m <= sliding.free_m {
                 continue;
             }
-            let by_m = against * (slid_m - sliding.free_m);
-            let (slip, first) = all[owner.member].memory.slip(owner.partner);
-            match sliding.slides {
-                Slides::Point(Frame { to_own, sign }) => slip.moved_m += to_own * by_m * sign,
-                Slides::Length { axis } => slip.longer_m += by_m.dot(axis),
+            let slid = sliding.slides.slid(against * (slid_m - sliding.free_m));
+            let one = &mut all[owner.member];
+            let (slip, first) = one.memory.slip(owner.partner);
+            match sliding.own {
+                Some(place) => one.member.slip(place, slid),
+                None => slip.slid += slid,
             }
             if first {
                 let force_n = sliding.yields_above_n;

@@ -8,6 +8,7 @@ use super::spec::Attachment;
 use super::sym3::Sym3;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
+use metachron_contact::stepper::Slid;
 use metachron_core::{AgentId, Anchor};
 
 /// The spring of an attachment at one node.
@@ -17,14 +18,20 @@ pub struct NodeSpring {
     pub attachment: u32,
     /// Index of the node.
     pub node: usize,
+    /// Rest arc length of the node, metres.
+    arc_m: f64,
     /// Rest position of the node, metres.
     anchor: DVec3,
     /// N/m.
-    stiffness: f64,
+    pub stiffness: f64,
     /// N·s/m, while the spring is taut.
-    damping: f64,
+    pub damping: f64,
     /// Metres.
     slack: f64,
+    /// The most that it gives in a cluster, N; infinite where it never yields.
+    pub yields_above_n: f64,
+    /// How far it has slipped.
+    pub slid: Slid,
 }
 
 /// A spring linearised about a point: f(x) ≈ force − stiffness (x − point).
@@ -39,18 +46,33 @@ pub struct Linear {
 }
 
 impl NodeSpring {
+    /// Whether it yields, and so is a row of its cluster's problem.
+    pub fn yields(&self) -> bool {
+        self.yields_above_n < f64::INFINITY
+    }
+
+    /// Where it holds its node, metres.
+    pub fn place(&self) -> DVec3 {
+        self.anchor + self.slid.moved_m
+    }
+
+    /// The distance within which it gives nothing, metres.
+    pub fn slack(&self) -> f64 {
+        self.slack + self.slid.longer_m
+    }
+
     /// The spring linearised about `point` (eq. 21, 22); zero while it is slack.
     pub fn linear(&self, point: DVec3) -> Linear {
-        let d = point - self.anchor;
+        let (d, slack) = (point - self.place(), self.slack());
         let distance = d.length();
-        if distance < self.slack || (distance == 0.0 && self.slack > 0.0) {
+        if distance < slack || (distance == 0.0 && slack > 0.0) {
             return Linear::default();
         }
-        if self.slack == 0.0 {
+        if slack == 0.0 {
             let stiffness = Sym3::identity(self.stiffness);
             return Linear { force: d * -self.stiffness, stiffness, damping: self.damping };
         }
-        let share = 1.0 - self.slack / distance;
+        let share = 1.0 - slack / distance;
         let across = Sym3::identity(self.stiffness * share);
         let along = Sym3::outer(d / distance, self.stiffness * (1.0 - share));
         Linear { force: d * (-self.stiffness * share), stiffness: across + along, damping: self.damping }
@@ -64,12 +86,13 @@ impl NodeSpring {
 
     /// Energy in the spring, J.
     pub fn energy_j(&self, x: DVec3) -> f64 {
-        let beyond = ((x - self.anchor).length() - self.slack).max(0.0);
+        let beyond = ((x - self.place()).length() - self.slack()).max(0.0);
         0.5 * self.stiffness * beyond * beyond
     }
 }
 
-/// Lists the springs of `attachments`, by their numbers, at the nodes of `division`: each node takes the share of its dual length (eq. 23).
+/// Lists the springs of `attachments`, by their numbers, at the nodes of `division`: each node takes the share of its dual length (eq. 23) of
+/// stiffness, damping and the force that it yields at. Those that yield come last.
 pub fn springs<'a>(
     attachments: impl Iterator<Item = (u32, &'a Attachment)>,
     division: &Discretization,
@@ -78,6 +101,7 @@ pub fn springs<'a>(
     into.clear();
     let (total, count) = (division.total_m(), division.segments());
     for (number, attachment) in attachments {
+        let held = attachment.to - attachment.from;
         for node in 0..=count {
             let from = if node == 0 { 0.0 } else { division.middle_m(node - 1) };
             let to = if node == count { total } else { division.middle_m(node) };
@@ -86,13 +110,36 @@ pub fn springs<'a>(
                 into.push(NodeSpring {
                     attachment: number,
                     node,
+                    arc_m: division.arc_m[node],
                     anchor: division.place[node],
                     stiffness: attachment.stiffness_n_m2 * overlap,
                     damping: attachment.damping_n_s_m2 * overlap,
                     slack: attachment.slack_m,
+                    yields_above_n: attachment.yields_above_n * overlap / (held * total),
+                    slid: Slid::default(),
                 });
             }
         }
+    }
+    into.sort_by_key(NodeSpring::yields);
+}
+
+/// Gives springs the slips of those that held the same stretches before, linear along each between its nodes.
+pub fn carry_slips(before: &[NodeSpring], into: &mut [NodeSpring]) {
+    for spring in into.iter_mut().filter(|spring| spring.yields()) {
+        let same = || before.iter().filter(|other| other.attachment == spring.attachment);
+        let left = same().filter(|other| other.arc_m <= spring.arc_m).next_back();
+        let right = same().find(|other| other.arc_m > spring.arc_m);
+        spring.slid = match (left, right) {
+            (Some(left), Some(right)) => {
+                let share = (spring.arc_m - left.arc_m) / (right.arc_m - left.arc_m);
+                let [a, b] = [left.slid, right.slid];
+                let longer_m = a.longer_m * (1.0 - share) + b.longer_m * share;
+                Slid { moved_m: a.moved_m.lerp(b.moved_m, share), longer_m }
+            }
+            (Some(one), None) | (None, Some(one)) => one.slid,
+            (None, None) => Slid::default(),
+        };
     }
 }
 
@@ -167,6 +214,7 @@ mod tests {
             slack_m: 0.0,
             damping_n_s_m2: 0.0,
             tears_above_n: f64::INFINITY,
+            yields_above_n: f64::INFINITY,
         };
         let mut list = vec![];
         springs(std::iter::once((0, &stretch)), &line(), &mut list);
@@ -183,6 +231,7 @@ mod tests {
             slack_m: 0.1,
             damping_n_s_m2: 0.0,
             tears_above_n: f64::INFINITY,
+            yields_above_n: f64::INFINITY,
         };
         let mut list = vec![];
         springs(std::iter::once((0, &stretch)), &line(), &mut list);

@@ -182,6 +182,10 @@ fn check_attachments(spec: &TubeSpec) -> Result<(), TubeError> {
         if a.tears_above_n != f64::INFINITY {
             positive("attachment.tears_above_n", a.tears_above_n)?;
         }
+        if a.yields_above_n != f64::INFINITY {
+            let fair = a.yields_above_n > 0.0 && a.yields_above_n < a.tears_above_n;
+            number("attachment.yields_above_n", a.yields_above_n, fair, "above zero and below the tearing force")?;
+        }
     }
     Ok(())
 }

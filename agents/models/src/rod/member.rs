@@ -3,6 +3,7 @@
 //! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
 //! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 9.
 
+use super::anchor_springs::NodeSpring;
 use super::banded_ldl::Row;
 use super::energy_limiter;
 use super::history::History;
@@ -15,7 +16,7 @@ use super::tube::Tube;
 use super::wall::{Sections, Wall};
 use glam::{DMat3, DVec2, DVec3};
 use metachron_contact::cluster::{Block, Response, SIDE_TERMS_MAX, Side, SideTerm};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, Role};
+use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, OwnSpring, Role, Slid};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, SimSpan, SimTime, StepError};
 use metachron_geometry::narrow_phase::RestShape;
@@ -45,6 +46,8 @@ struct Kept {
     now: RodState,
     wall: Sections,
     past: History,
+    /// Slips of its springs.
+    slid: Vec<Slid>,
     rest: RestDetector,
     time: SimTime,
     quiet_before: bool,
@@ -217,8 +220,10 @@ impl ClusterMember for Tube {
     }
 
     fn keep(&mut self) {
-        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, stepper, .. } = self;
+        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, stepper, springs, .. } = self;
         let kept = &mut unknowns.kept;
+        kept.slid.clear();
+        kept.slid.extend(springs.iter().map(|spring| spring.slid));
         kept.now.copy_from(now);
         wall.iter().for_each(|wall| kept.wall.copy_from(&wall.now));
         kept.past.copy_from(&stepper.past);
@@ -231,6 +236,7 @@ impl ClusterMember for Tube {
         let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } =
             self;
         let kept = &unknowns.kept;
+        self.springs.iter_mut().zip(&kept.slid).for_each(|(spring, slid)| spring.slid = *slid);
         now.copy_from(&kept.now);
         wall.iter_mut().for_each(|wall| wall.now.copy_from(&kept.wall));
         stepper.past.copy_from(&kept.past);
@@ -277,6 +283,27 @@ impl ClusterMember for Tube {
 
     fn attachments(&self) -> &[OwnAttachment] {
         &self.unknowns.attached
+    }
+
+    fn own_spring(&self, place: usize) -> Option<OwnSpring> {
+        let spring = self.springs.get(lasting(&self.springs).len() + place)?;
+        let position = *self.unknowns.places.get(spring.node)?;
+        let side = if self.is_held(2 * spring.node) { Side::FIXED } else { Side::node(0, 2 * spring.node) };
+        Some(OwnSpring {
+            attachment: spring.attachment,
+            point: MaterialPoint::new(position, side),
+            place_m: spring.place(),
+            slack_m: spring.slack(),
+            stiffness_n_m: spring.stiffness,
+            damping_n_s_m: spring.damping,
+            yields_above_n: spring.yields_above_n,
+            tears_above_n: self.spec.attachments[spring.attachment as usize].tears_above_n,
+        })
+    }
+
+    fn slip(&mut self, place: usize, by: Slid) {
+        let first = lasting(&self.springs).len();
+        self.springs.iter_mut().skip(first).nth(place).into_iter().for_each(|spring| spring.slid += by);
     }
 
     fn let_go(&mut self, number: u32) {
@@ -343,12 +370,12 @@ impl Tube {
         self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
     }
 
-    /// Notes what the attachments that may tear give at the end of a step: implicit Euler has given that all along it.
+    /// Notes what the attachments that may tear and never yield give at the end of a step: implicit Euler has given that all along it.
     fn note_attachments(&mut self) {
         let Self { spec, springs, now, unknowns, .. } = self;
         let attached = &mut unknowns.attached;
         attached.clear();
-        for spring in springs {
+        for spring in lasting(springs) {
             let (number, force_n) = (spring.attachment, spring.force(now.x[spring.node], now.u[2 * spring.node]));
             let tears_above_n = spec.attachments[number as usize].tears_above_n;
             if tears_above_n == f64::INFINITY {
@@ -392,9 +419,15 @@ impl Tube {
     }
 }
 
-/// A step of `h_s` seconds in one piece. Springs on the tube are rows of the cluster's problem.
+/// Those of its springs that never yield.
+fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
+    &springs[..springs.partition_point(|spring| !spring.yields())]
+}
+
+/// A step of `h_s` seconds in one piece. Springs on the tube, and those of its own that yield, are rows of the cluster's problem.
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
-    let Setting { matter, division, springs, integrator, .. } = *setting;
+    let Setting { matter, division, integrator, .. } = *setting;
+    let springs = lasting(setting.springs);
     SubstepProblem { matter, division, springs, ties: &[], h: h_s, until: h_s, integrator }
 }
 

@@ -24,6 +24,7 @@ impl Tube {
         into.clear();
         into.steps = self.steps;
         into.resolution = Some(self.resolution);
+        into.nodes = Some(self.now.x.len() as u32);
         into.energy_j = self.energy_j();
         into.drift_m = self.doubling.error_m();
         into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division) + into.drift_m;

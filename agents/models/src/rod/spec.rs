@@ -111,6 +111,9 @@ pub struct Attachment {
     /// The force of the whole interval above which all of it tears off, N, > 0: the mean over a macro step of the tube's cluster. Infinite
     /// where it never does.
     pub tears_above_n: f64,
+    /// The most force that it gives in a cluster, N, > 0, spread evenly along the interval: each part of it slips by what would take more.
+    /// Below the tearing force; infinite where it never yields.
+    pub yields_above_n: f64,
 }
 
 /// A wave of contraction: r(s, t) = r₀ (1 − a·(1 + cos(2π (s − c t)/λ))/2).

@@ -4,7 +4,7 @@
 //! step is solved ([`super::step`]), contact, the transfer of a state to another division
 //! ([`super::remesh`]). Theory: docs/theory/rod.md.
 
-use super::anchor_springs::{NodeSpring, Tie, springs};
+use super::anchor_springs::{NodeSpring, Tie, carry_slips, springs};
 use super::check::{TubeError, check};
 use super::discretization;
 use super::discretization::Discretization;
@@ -127,7 +127,9 @@ impl Tube {
     pub(super) fn lay_out_springs(&mut self) {
         let Self { spec, let_go, division, springs: list, .. } = self;
         let holding = (0..).zip(&spec.attachments).filter(|(number, _)| !let_go.contains(number));
+        let before = list.clone();
         springs(holding, division, list);
+        carry_slips(&before, list);
     }
 
     /// Passes all that the stepper works on to `act`, for a step of `dt` seconds.

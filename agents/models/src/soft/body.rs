@@ -14,7 +14,7 @@ use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -110,9 +110,26 @@ impl SoftBody {
         }
     }
 
+    /// Moves its skin on towards where its vertices carry it, by what goes in `h` seconds, and with them.
+    pub(super) fn ease(&mut self, h: f64) {
+        self.skin.iter_mut().for_each(|skin| skin.ease(h));
+        self.follow();
+    }
+
+    /// Whether its skin is where its vertices carry it.
+    pub(super) fn is_eased(&self) -> bool {
+        self.skin.as_ref().is_none_or(Skin::is_eased)
+    }
+
     /// Positions of its skin's vertices, metres: what others see of it.
     pub(super) fn seen(&self) -> &[DVec3] {
         self.skin.as_ref().map_or(&self.positions, |skin| &skin.positions)
+    }
+
+    /// How many nodes it is solved at now: those of its cage or lattice, or its vertices; none that lost all its cells.
+    #[must_use]
+    pub fn nodes(&self) -> u32 {
+        self.mesh.mass_kg.iter().filter(|mass| **mass > 0.0).count() as u32
     }
 
     /// What carries a vertex of its skin.
@@ -167,18 +184,23 @@ impl SoftBody {
         ties.clear();
         ties.extend(context.anchor_springs().filter_map(|pull| {
             let vertex = VertexSpring::vertex_of(&pull, self.seen().len())?;
-            VertexSpring::new(&pull, self.carried(vertex))
+            // its point is apart from where its nodes carry it, as the skin is there
+            let skin = self.skin.as_ref();
+            let apart = skin.map_or(DVec3::ZERO, |skin| skin.apart_of(vertex as usize));
+            let easing_m_s = skin.map_or(DVec3::ZERO, |skin| skin.easing_m_s(vertex));
+            let (target, target_velocity) = (pull.target - apart, pull.target_velocity - easing_m_s);
+            VertexSpring::new(&AnchorSpring { target, target_velocity, ..pull }, self.carried(vertex))
         }));
         self.ties = ties;
     }
 
     /// Counts quiet time; returns whether it has been quiet for long enough.
     fn update_rest(&mut self, dt: f64) -> bool {
+        let calm = self.spec.sleep && self.ties.is_empty() && self.is_eased();
         let Self { velocities, before, .. } = self;
         let pairs = velocities.iter().zip(before.iter());
         let limit = (QUIET_SPEED_M_S, QUIET_ACCELERATION_M_S2 * dt);
         let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
-        let calm = self.spec.sleep && self.ties.is_empty();
         let quiet = calm && still.all(|still| still);
         self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
         let at_rest = self.quiet_s >= QUIET_S;
@@ -215,6 +237,7 @@ impl Agent for SoftBody {
         let dt_s = check_span(dt)?;
         let before = self.linear_momentum();
         let (substeps, doubled) = self.advance(context, dt_s)?;
+        self.ease(dt_s);
         self.finish_step(before, dt_s);
         self.follow();
         Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })

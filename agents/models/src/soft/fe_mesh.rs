@@ -4,7 +4,7 @@
 
 use super::bar::Bar;
 use super::bending::BendingElement;
-use super::grid::Grid;
+use super::grid::{Grid, Side};
 use super::hexahedron::{Hexahedron, HexahedronKind};
 use super::material::Law;
 use super::membrane::Membrane;
@@ -14,7 +14,10 @@ use super::system::System;
 use super::tetrahedron::Tetrahedron;
 use glam::{DQuat, DVec2, DVec3};
 use metachron_geometry::narrow_phase::VoronoiRegions;
-use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles};
+use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles, near_triangle};
+
+/// How near the surface comes to nodes that hold it, as a share of the finest ε.
+const HELD_SHARE: f64 = 0.5;
 
 /// A divided soft body.
 #[derive(Debug, Clone, Default)]
@@ -54,10 +57,7 @@ impl FeMesh {
             held: vec![false; count],
             ..Self::default()
         };
-        for side in &spec.held {
-            let (axis, last) = side.place();
-            cage.on_side(axis, last).for_each(|node| mesh.held[node as usize] = true);
-        }
+        spec.held.iter().for_each(|side| mesh.hold_cage(cage, *side, &spec.shape));
         let place = |bits: usize| DVec3::from_array([0, 1, 2].map(|axis| (bits >> axis & 1) as f64));
         mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.matter));
         for CageCell { corners, fill, volumes_m3 } in cage.cells() {
@@ -80,6 +80,25 @@ impl FeMesh {
         // a cage is straight at rest
         mesh.rows = cage.rows().into_iter().map(|row| (row, 0.0)).collect();
         mesh
+    }
+
+    /// Holds the nodes on a side of a cage that the surface comes as near to as half the finest ε, whatever the present one is: a coarse cage
+    /// would else be held where what it encloses is not. Where there is none, all on that side.
+    fn hold_cage(&mut self, cage: &Cage, side: Side, shape: &SoftShape) {
+        let SoftShape::Embedded { surface, range_m, .. } = shape else { return };
+        let ((axis, last), near_m) = (side.place(), HELD_SHARE * range_m.0);
+        let nodes: Vec<u32> = cage.on_side(axis, last).collect();
+        let Some(plane_m) = nodes.first().map(|node| self.rest[*node as usize][axis]) else { return };
+        let corners = surface.triangles.iter().map(|corners| corners.map(|corner| surface.points[corner as usize]));
+        let is_near = |triangle: &[DVec3; 3]| triangle.iter().any(|at| (at[axis] - plane_m).abs() <= near_m);
+        let triangles: Vec<[DVec3; 3]> = corners.filter(is_near).collect();
+        let meets = |node: &&u32| {
+            let at = self.rest[**node as usize];
+            triangles.iter().any(|triangle| near_triangle(at, *triangle).distance(at) <= near_m)
+        };
+        let met: Vec<u32> = nodes.iter().filter(meets).copied().collect();
+        let held = if met.is_empty() { nodes } else { met };
+        held.into_iter().for_each(|node| self.held[node as usize] = true);
     }
 
     /// Divides the body of `spec` into the lattice of `shape`: its own, or the same with other segments.

@@ -4,6 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 1–3; docs/theory/clusters.md, section 9.
 
 use super::body::SoftBody;
+use super::skin::Apart;
 use super::system::Purpose;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
@@ -35,6 +36,8 @@ struct Kept {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
     turns: Vec<DQuat>,
+    /// How far its skin is from where its vertices carry it.
+    apart: Apart,
     acceleration: DVec3,
     quiet_s: f64,
     at_rest: bool,
@@ -136,9 +139,14 @@ impl ClusterMember for SoftBody {
         let rows = self.system.rows();
         nodes.clear();
         match &self.skin {
-            Some(skin) => nodes.extend(skin.carried().iter().map(|carried| {
-                carried.terms().map(|(node, w)| (self.positions[node] + moved(rows[node])) * w).sum::<DVec3>()
-            })),
+            Some(skin) => {
+                nodes.extend(skin.carried().iter().map(|carried| {
+                    carried.terms().map(|(node, w)| (self.positions[node] + moved(rows[node])) * w).sum::<DVec3>()
+                }));
+                if !skin.is_eased() {
+                    nodes.iter_mut().enumerate().for_each(|(point, at)| *at += skin.apart_of(point));
+                }
+            }
             None => nodes.extend(self.positions.iter().zip(rows).map(|(at, row)| *at + moved(*row))),
         }
         Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
@@ -161,10 +169,16 @@ impl ClusterMember for SoftBody {
         }
     }
 
+    fn led_m_s(&self, place: &Place) -> DVec3 {
+        let (Place::Surface { vertices, shares }, Some(skin)) = (place, &self.skin) else { return DVec3::ZERO };
+        vertices.iter().zip(shares).map(|(vertex, share)| skin.easing_m_s(*vertex) * *share).sum()
+    }
+
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let Anchor::Vertex(vertex) = anchor else { return None };
         let position = *self.seen().get(vertex as usize)?;
-        Some(MaterialPoint::new(position, self.carried_side(&self.carried(vertex))))
+        let led_m_s = self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.easing_m_s(vertex));
+        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(position, self.carried_side(&self.carried(vertex))) })
     }
 
     fn slot_of(&self, block: usize) -> u32 {
@@ -185,6 +199,7 @@ impl ClusterMember for SoftBody {
         kept.velocities.clone_from(&self.velocities);
         kept.turns.clear();
         kept.turns.extend(self.mesh.turns());
+        self.skin.iter_mut().for_each(|skin| kept.apart.clone_from(skin.apart()));
         kept.acceleration = self.acceleration;
         (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
     }
@@ -194,6 +209,7 @@ impl ClusterMember for SoftBody {
         self.positions.clone_from(&kept.positions);
         self.velocities.clone_from(&kept.velocities);
         self.mesh.set_turns(&kept.turns);
+        self.skin.iter_mut().for_each(|skin| skin.apart().clone_from(&kept.apart));
         self.acceleration = kept.acceleration;
         (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
         self.follow();
@@ -224,7 +240,7 @@ impl ClusterMember for SoftBody {
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
         unknowns.now.copy_from_slice(v);
         self.pay_owed(h_s);
-        self.follow();
+        self.ease(h_s);
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;
@@ -233,7 +249,7 @@ impl ClusterMember for SoftBody {
     }
 
     fn is_calm(&self) -> bool {
-        self.spec.sleep && self.quiet_s >= QUIET_S
+        self.spec.sleep && self.quiet_s >= QUIET_S && self.is_eased()
     }
 
     fn rest(&mut self) {

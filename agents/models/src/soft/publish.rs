@@ -11,6 +11,7 @@ impl SoftBody {
         into.clear();
         into.steps = self.steps;
         into.resolution = self.present_resolution();
+        into.nodes = Some(self.nodes());
         into.energy_j = self.energy_j();
         into.drift_m = self.doubling.watch.error_m();
         into.residual_m = self.mesh.residual_m(&self.positions) + into.drift_m;

@@ -1,11 +1,12 @@
 //! Transfers the state of a soft body with a skin from one cage or lattice to another.
 //!
 //! In: a body and another ε. Out: the same body on other nodes: the same mass and linear momentum to rounding, angular momentum and shape
-//! to O(ε²), no more energy. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21, 24.
+//! to O(ε²), no more energy; its skin where it was. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21, 24, 24a.
 
 use super::body::SoftBody;
 use super::carrier::Carrier;
 use super::fe_mesh::FeMesh;
+use super::step::EDGE_CHANGE_MAX;
 use super::system::Purpose;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::Agent;
@@ -14,6 +15,11 @@ use metachron_core::Resolution;
 /// Spans of the steps from rest that give up elastic energy, seconds: the first, and how many, each twice as long as the one before.
 const RELAX_S: f64 = 1e-3;
 const RELAX_STEPS: u32 = 10;
+
+/// Span of a step from rest towards balance, seconds, and how many there are at most; moves below the last number end it, metres.
+const BALANCE_S: f64 = 0.1;
+const BALANCE_STEPS: u32 = 8;
+const BALANCED_M: f64 = 1e-7;
 
 /// What a change of nodes keeps.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +57,7 @@ impl SoftBody {
         let before = self.kept();
         let mesh = carrier.mesh(&self.spec);
         let (positions, velocities) = self.at_nodes(&carrier, &mesh);
+        let elastic_m_s2 = self.elastic_m_s2_at(&carrier);
         let Some(skin) = &mut self.skin else { return };
         let turns: Vec<DQuat> = self.mesh.turns().collect();
         let turns = skin.carrier.turns_at(&turns, &carrier);
@@ -60,11 +67,14 @@ impl SoftBody {
         (self.positions, self.velocities) = (positions, velocities);
         self.system = self.mesh.system(&self.positions);
         self.free.clone_from(&self.velocities);
+        self.balance(&elastic_m_s2, before.energy_j);
         self.keep_momentum(&before);
         self.relax(before.energy_j);
         // nodes that have moved have other arms
         self.keep_momentum(&before);
         self.slow(before.energy_j);
+        let Self { skin, positions, .. } = self;
+        skin.iter_mut().for_each(|skin| skin.stay(positions));
         self.woken();
     }
 
@@ -89,6 +99,51 @@ impl SoftBody {
             (spread(*material_m, &self.positions), spread(*material_m, &self.velocities))
         };
         nodes.map(of).unzip()
+    }
+
+    /// By how much elastic forces accelerate the present nodes, at the nodes of another carrier, m/s²: where it rests, what bears its weight.
+    fn elastic_m_s2_at(&mut self, carrier: &Carrier) -> Vec<DVec3> {
+        let weight = std::mem::take(&mut self.spec.gravity);
+        self.ties.clear();
+        self.assemble(BALANCE_S);
+        self.spec.gravity = weight;
+        let nodes = self.system.forces.iter().zip(&self.mesh.mass_kg).zip(&self.mesh.held);
+        // what holds a node bears it as well
+        let of = |((force, mass), held): ((&DVec3, &f64), &bool)| if *held { -weight } else { *force / *mass };
+        let elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
+        let Some(skin) = &self.skin else { return vec![] };
+        carrier.nodes_m().iter().map(|node_m| skin.carrier.spread(*node_m, &elastic_m_s2)).collect()
+    }
+
+    /// Moves new nodes to where elastic forces accelerate them as they did the old ones, by steps from rest: a body that was at rest is again,
+    /// and one that swings goes on. They stay where that would take more energy than they have and than `most_j`.
+    fn balance(&mut self, wanted_m_s2: &[DVec3], most_j: f64) {
+        let before = self.positions.clone();
+        let most_j = self.energy_j().max(most_j);
+        let velocities = std::mem::replace(&mut self.velocities, vec![DVec3::ZERO; before.len()]);
+        let weight = std::mem::take(&mut self.spec.gravity);
+        for _ in 0..BALANCE_STEPS {
+            self.assemble(BALANCE_S);
+            for (node, wanted) in wanted_m_s2.iter().enumerate() {
+                self.system.push(node as u32, -*wanted * self.mesh.mass_kg[node]);
+            }
+            if self.solve_for_velocities(BALANCE_S, Purpose::Own).is_err() {
+                self.positions.clone_from(&before);
+                break;
+            }
+            // no edge further than its linear forces hold
+            let change = self.mesh.edge_change(|node| self.free[node as usize], BALANCE_S);
+            let by_s = BALANCE_S * (EDGE_CHANGE_MAX / change).min(1.0);
+            self.positions.iter_mut().zip(&self.free).for_each(|(x, v)| *x += *v * by_s);
+            if self.free.iter().all(|v| v.length() * by_s < BALANCED_M) {
+                break;
+            }
+        }
+        (self.velocities, self.spec.gravity) = (velocities, weight);
+        let energy_j = self.energy_j();
+        if !(energy_j <= most_j) {
+            self.positions = before;
+        }
     }
 
     /// Moves the nodes that are not held so that linear momentum is what it was, and the centre of mass and angular momentum too where none is

@@ -1,11 +1,17 @@
 //! The skin of a soft body: a surface or a line that moves with the nodes that carry it, and stays the same when they change.
 //!
 //! In: points, what carries them, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
-//! steps. Theory: docs/theory/soft.md, eq. 18, 24.
+//! steps. Theory: docs/theory/soft.md, eq. 18, 24, 24a.
 
 use super::carrier::{Carrier, SkinPoints, into_body};
-use glam::DVec3;
+use super::deformation::{follow_turn, outer};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::Carried;
+
+/// In how long what other nodes would have moved it by is down to 1/e, seconds: at 60 pictures a second a ninetieth of it goes with each.
+const EASE_S: f64 = 1.5;
+/// What is less than this is gone, metres.
+const EASED_M: f64 = 1e-6;
 
 /// A skin on what carries it.
 pub(super) struct Skin {
@@ -21,6 +27,17 @@ pub(super) struct Skin {
     pub positions: Vec<DVec3>,
     /// Velocities of the points, m/s.
     pub velocities: Vec<DVec3>,
+    apart: Apart,
+}
+
+/// How far the points are from where their nodes carry them: what is left of what they would have jumped by.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Apart {
+    /// Of each point, turned back to how the body lay when it began, metres; empty where nothing is left.
+    by: Vec<DVec3>,
+    /// The nodes then, and how far the body has turned since.
+    then: Vec<DVec3>,
+    turn: DQuat,
 }
 
 impl Skin {
@@ -28,8 +45,8 @@ impl Skin {
     pub fn new(points: SkinPoints, carrier: Carrier) -> Self {
         let SkinPoints { rest, material, inward, .. } = points;
         let (positions, velocities) = (rest.clone(), vec![DVec3::ZERO; rest.len()]);
-        let mut skin =
-            Self { rest, material, inward, carrier, carried: vec![], nearest: vec![], positions, velocities };
+        let (carried, nearest, apart) = (vec![], vec![], Apart::default());
+        let mut skin = Self { rest, material, inward, carrier, carried, nearest, positions, velocities, apart };
         skin.bind();
         skin
     }
@@ -71,12 +88,52 @@ impl Skin {
         kept
     }
 
-    /// Moves the skin to where these nodes carry it.
+    /// Moves the skin to where these nodes carry it, but for what it is apart from that.
     pub fn follow(&mut self, positions: &[DVec3], velocities: &[DVec3]) {
         for (at, carried) in self.carried.iter().enumerate() {
             self.positions[at] = carried.mean(positions);
             self.velocities[at] = carried.mean(velocities);
         }
+        self.apart.follow(positions);
+        for at in 0..self.apart.by.len() {
+            let apart = self.apart.of(at);
+            self.positions[at] += apart;
+            self.velocities[at] -= apart / EASE_S;
+        }
+    }
+
+    /// Leaves the skin where it is though these nodes carry it elsewhere: it goes there by [`Self::ease`].
+    pub fn stay(&mut self, positions: &[DVec3]) {
+        let by = self.carried.iter().zip(&self.positions).map(|(carried, at)| *at - carried.mean(positions)).collect();
+        self.apart = Apart { by, then: positions.to_vec(), turn: DQuat::IDENTITY };
+        self.apart.forget_rounding();
+    }
+
+    /// Moves it on to where its nodes carry it, by what goes in `h` seconds (eq. 24a).
+    pub fn ease(&mut self, h: f64) {
+        let left = libm::exp(-h / EASE_S);
+        self.apart.by.iter_mut().for_each(|apart| *apart *= left);
+        self.apart.forget_rounding();
+    }
+
+    /// Whether it is where its nodes carry it.
+    pub fn is_eased(&self) -> bool {
+        self.apart.by.is_empty()
+    }
+
+    /// How far a point is from where its nodes carry it, metres.
+    pub fn apart_of(&self, point: usize) -> DVec3 {
+        self.apart.of(point)
+    }
+
+    /// How a point of it moves beside the nodes that carry it, m/s.
+    pub fn easing_m_s(&self, point: u32) -> DVec3 {
+        -self.apart.of(point as usize) / EASE_S
+    }
+
+    /// How far it is from where its nodes carry it, to be kept and set back.
+    pub fn apart(&mut self) -> &mut Apart {
+        &mut self.apart
     }
 
     /// The points of the skin at rest, in the body's own axes.
@@ -100,5 +157,34 @@ impl Skin {
     /// The point of the skin that stands for a node.
     pub fn point_of(&self, node: usize) -> u32 {
         self.nearest[node]
+    }
+}
+
+impl Apart {
+    /// World axes, metres.
+    fn of(&self, point: usize) -> DVec3 {
+        self.by.get(point).map_or(DVec3::ZERO, |apart| self.turn * *apart)
+    }
+
+    /// Turns with the nodes: by the rotation that brings them nearest to where they are.
+    fn follow(&mut self, positions: &[DVec3]) {
+        if self.by.is_empty() {
+            return;
+        }
+        let middle = |of: &[DVec3]| of.iter().sum::<DVec3>() / of.len() as f64;
+        let [now, then] = [middle(positions), middle(&self.then)];
+        let (mut gradient, mut size) = (DMat3::ZERO, 0.0);
+        for (x, before) in positions.iter().zip(&self.then) {
+            let arm = *before - then;
+            gradient += outer(*x - now, arm);
+            size += arm.length_squared();
+        }
+        follow_turn(&mut self.turn, gradient * (1.0 / size));
+    }
+
+    fn forget_rounding(&mut self) {
+        if self.by.iter().all(|apart| apart.length_squared() < EASED_M * EASED_M) {
+            *self = Self::default();
+        }
     }
 }

@@ -44,6 +44,11 @@ impl SoftBody {
     /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–3).
     pub(super) fn predict(&mut self, h: f64, purpose: Purpose) -> Result<(), &'static str> {
         self.assemble(h);
+        self.solve_for_velocities(h, purpose)
+    }
+
+    /// The same of a system that is assembled.
+    pub(super) fn solve_for_velocities(&mut self, h: f64, purpose: Purpose) -> Result<(), &'static str> {
         let Self { system, mesh, velocities, free, impulses, .. } = self;
         impulses.clear();
         let momenta = velocities.iter().zip(&mesh.mass_kg).map(|(v, mass)| *v * *mass);

@@ -1,17 +1,20 @@
 //! What a soft body must do, against closed forms.
 
+mod beam;
 mod embedded;
 mod error;
 mod large;
 mod materials;
+mod patch;
 mod promises;
 mod removal;
+mod seen;
 mod skins;
 mod spaced;
 mod statics;
 
 use super::{MaterialLaw, RegionMatter, RemovedCells, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
 use metachron_geometry::{ContactTraits, ShapeKind, Tetrahedra, Triangles};

@@ -5,9 +5,10 @@ use crate::table::{GRAVITY, Table, placed, spring};
 use glam::DVec3;
 use metachron_contact::Link;
 use metachron_contact::joint::{Joint, JointKind};
-use metachron_core::{AgentId, Anchor};
+use metachron_core::{AgentId, Anchor, ResolutionRange};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::rod::{Attachment, Material, Section, Tube, TubeSpec};
 
 pub const G: f64 = -GRAVITY.z;
 pub const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
@@ -81,4 +82,22 @@ pub fn hung(held: Held, limits: Limits) -> Table {
             table
         }
     }
+}
+
+/// A tube of 0.2 m that hangs along all of its length, begins at rest with its attachment slack by this much, and sags by 1 mm below that; what
+/// its attachment bears follows from its weight.
+pub fn mesentery(slack_m: f64, limits: impl Fn(f64) -> Limits) -> Table {
+    let material = Material { young_pa: 1e6, poisson: 0.3, density_kg_m3: 1000.0, shear_factor: 0.9 };
+    let section = Section::hollow(0.01, 0.01, material);
+    let per_m_n = section.mass_per_length_kg_m * G;
+    let stiffness_n_m2 = per_m_n / 1e-3;
+    // it comes there without passing it
+    let damping_n_s_m2 = 3.0 * (stiffness_n_m2 * section.mass_per_length_kg_m).sqrt();
+    let Limits { tears_above_n, yields_above_n } = limits(per_m_n * 0.2);
+    let (from, to) = (0.0, 1.0);
+    let attachment = Attachment { from, to, stiffness_n_m2, slack_m, damping_n_s_m2, tears_above_n, yields_above_n };
+    let spec = TubeSpec::free(vec![DVec3::ZERO, DVec3::X * 0.2], section, 10);
+    let range = ResolutionRange { eps_m: (0.01, 0.05), n: (0, 0) };
+    let spec = TubeSpec { gravity: GRAVITY, attachments: vec![attachment], range, ..spec };
+    Table::among(vec![placed(Tube::new(spec).unwrap(), false)], &[])
 }

@@ -11,6 +11,7 @@ mod joints;
 mod large;
 mod links;
 mod motors;
+mod organ;
 mod own_model;
 mod own_skin;
 mod passing;

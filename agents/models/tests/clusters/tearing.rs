@@ -2,14 +2,13 @@
 
 use crate::bodies::tube;
 use crate::hung::{self, ALL, CENTRE, G, Held, Limits, WEIGHT_N, ball, balls};
-use crate::table::{GRAVITY, Table, placed, spring};
+use crate::table::{GRAVITY, Table, spring};
 use glam::DVec3;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::stepper::{Partner, StepDoubling, Torn};
 use metachron_contact::{AnchorSpring, Link};
-use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange};
+use metachron_core::{AgentId, Anchor, Resolution};
 use metachron_models::rigid::RigidSpec;
-use metachron_models::rod::{Attachment, Material, Section, Tube, TubeSpec};
 
 /// The ball held by what tears above some force.
 fn hung(held: Held, tears_above_n: f64) -> Table {
@@ -164,20 +163,9 @@ fn a_tube_hung_by_two_links_tears_the_one_that_is_weaker_then_the_other() {
     assert!(table.middle(2).1.z < -5.0, "it falls");
 }
 
-/// A tube of 0.2 m that hangs along all of its length and begins at rest where that is slack; the share of its weight at which it tears off.
+/// A tube that hangs along all of its length, and tears off at this share of its weight.
 fn mesentery(share: f64) -> Table {
-    let material = Material { young_pa: 1e6, poisson: 0.3, density_kg_m3: 1000.0, shear_factor: 0.9 };
-    let section = Section::hollow(0.01, 0.01, material);
-    let per_m_n = section.mass_per_length_kg_m * G;
-    // it sags by 1 mm, and comes there without passing it
-    let stiffness_n_m2 = per_m_n / 1e-3;
-    let damping_n_s_m2 = 3.0 * (stiffness_n_m2 * section.mass_per_length_kg_m).sqrt();
-    let tears_above_n = share * per_m_n * 0.2;
-    let attachment = Attachment { from: 0.0, to: 1.0, stiffness_n_m2, slack_m: 0.0, damping_n_s_m2, tears_above_n };
-    let spec = TubeSpec::free(vec![DVec3::ZERO, DVec3::X * 0.2], section, 10);
-    let range = ResolutionRange { eps_m: (0.01, 0.05), n: (0, 0) };
-    let spec = TubeSpec { gravity: GRAVITY, attachments: vec![attachment], range, ..spec };
-    Table::among(vec![placed(Tube::new(spec).unwrap(), false)], &[])
+    hung::mesentery(0.0, |weight_n| Limits { tears_above_n: share * weight_n, yields_above_n: f64::INFINITY })
 }
 
 #[test]

@@ -15,7 +15,7 @@ use metachron_models::soft::{self, SoftBody, SoftSpec};
 use metachron_models::tool::{Keyframe, Tool, ToolSpec};
 
 /// A tool that points down, by the heights of its tip and the openings of its jaws.
-fn tool(keys: &[(f64, DVec3, f64)], max_force_n: f64, graspable: Vec<AgentId>) -> Tool {
+pub fn tool(keys: &[(f64, DVec3, f64)], max_force_n: f64, graspable: Vec<AgentId>) -> Tool {
     let rotation = DQuat::from_rotation_x(std::f64::consts::PI);
     let key = |&(at_s, tip_m, jaw): &(f64, DVec3, f64)| Keyframe { at_s, tip_m, rotation, jaw };
     Tool::new(ToolSpec {

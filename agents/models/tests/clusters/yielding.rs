@@ -4,10 +4,10 @@ use crate::bodies::tube;
 use crate::hung::{self, ALL, CENTRE, G, Held, Limits, MASS_KG, WEIGHT_N, ball, balls};
 use crate::table::{Table, spring};
 use glam::DVec3;
-use metachron_contact::Link;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::stepper::{Partner, StepDoubling};
-use metachron_core::{AgentId, Anchor};
+use metachron_contact::{AnchorSpring, Link};
+use metachron_core::{AgentId, Anchor, Resolution, Snapshot};
 use metachron_models::rigid::RigidSpec;
 
 /// The ball held by what yields above some force.
@@ -166,4 +166,75 @@ fn steps_that_are_cut_short_make_nothing_yield_that_holds() {
             }
         }
     }
+}
+
+/// A tube that hangs along all of its length, and yields at this share of its weight.
+fn mesentery(share: f64, slack_m: f64) -> Table {
+    hung::mesentery(slack_m, |weight_n| Limits { yields_above_n: share * weight_n, tears_above_n: f64::INFINITY })
+}
+
+#[test]
+fn a_tube_hangs_by_its_attachment_below_the_yield_force_and_slides_down_above_it() {
+    for slack_m in [0.0, 0.01] {
+        let mut table = mesentery(1.1, slack_m);
+        while table.time.as_secs_f64() < 2.0 {
+            table.step();
+            // what falls on it slips a little before it hangs
+            assert!(slack_m > 0.0 || table.yielded().is_empty());
+        }
+        let z = table.middle(0).0.z;
+        let most_m = slack_m * 12.0;
+        assert!(z < -1e-3 - slack_m + 1e-6 && z > -1e-3 - slack_m - most_m - 1e-6, "slack {slack_m}: {z}");
+        assert!(table.middle(0).1.length() < 1e-4, "slack {slack_m}: it hangs");
+
+        let mut table = mesentery(0.9, slack_m);
+        let weight_n = table.bodies[0].agent.mass_kg() * G;
+        let mut begun = vec![];
+        let mut since = None;
+        while table.time.as_secs_f64() < 0.6 {
+            if table.time.as_secs_f64() > 0.3 && since.is_none() {
+                // it slides on from where it is once it is divided anew
+                table.bodies[0].agent.set_resolution(Resolution { eps_m: 0.04, n: 0 });
+                since = Some((table.time.as_secs_f64(), table.bodies[0].agent.momentum().0));
+            }
+            table.step();
+            begun.extend_from_slice(table.yielded());
+        }
+        let [yielded] = begun[..] else { panic!("slack {slack_m}: {begun:?}") };
+        assert_eq!((yielded.member, yielded.other, yielded.partner), (0, None, Partner::Attachment(0)));
+        let (from_s, momentum) = since.unwrap();
+        let wanted = momentum - DVec3::Z * (0.1 * weight_n * (table.time.as_secs_f64() - from_s));
+        let found = table.bodies[0].agent.momentum().0;
+        assert!(found.distance(wanted) < 1e-6 * weight_n, "slack {slack_m}: {found} is not {wanted}");
+    }
+}
+
+#[test]
+fn an_attachment_that_yields_where_it_is_pulled_holds_beside_that() {
+    let mut table = mesentery(1.5, 0.0);
+    let weight_n = table.bodies[0].agent.mass_kg() * G;
+    let start = table.middle(0).0;
+    // a hand takes one end down, with less than what would take all of it, and lets it go
+    let (anchor, target) = (Anchor::Arc(0.2), DVec3::new(0.2, 0.0, -0.04));
+    let hand = AnchorSpring {
+        by: None,
+        anchor,
+        target,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: 0.4 * weight_n / 0.04,
+        damping_n_s_m: 0.0,
+    };
+    table.bodies[0].hands = vec![hand];
+    while table.time.as_secs_f64() < 0.5 {
+        table.step();
+    }
+    table.bodies[0].hands.clear();
+    while table.time.as_secs_f64() < 3.0 {
+        table.step();
+    }
+    let mut snapshot = Snapshot::default();
+    table.bodies[0].agent.write_snapshot(&mut snapshot);
+    let [left, right] = [0.0, 1.0].map(|share| snapshot.body.probe(share).unwrap().0.z);
+
+    assert!(start.z.abs() < 1e-12 && right < -0.003 && left > -0.003, "the ends are at {left} and {right} m");
 }

@@ -1,7 +1,8 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
+use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::object::ModelContext;
-use super::{FRICTION, POSITION_MAX_M, TEARING, TIME};
+use super::{FRICTION, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, PressureFile, TubeFile, Wall};
 use glam::DVec3;
@@ -305,6 +306,9 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
     if from >= to {
         c.wrong(place, "to", format_args!("is {to}"), format!("expected a number above `from`, {from}"));
     }
+    let limits =
+        ForceLimits::read(c, place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
+    let ForceLimits { tears_above_n, yields_above_n } = limits;
     Attachment {
         from,
         to,
@@ -313,7 +317,8 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
         damping_n_s_m2: c
             .optional(place, "damping_n_s_m2", file.damping_n_s_m2, &allowed(0.0..=1e6, "N·s/m²"))
             .unwrap_or(0.0),
-        tears_above_n: c.optional(place, "tears_above_n", file.tears_above_n, &TEARING).unwrap_or(f64::INFINITY),
+        tears_above_n,
+        yields_above_n,
     }
 }
 

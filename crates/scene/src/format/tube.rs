@@ -141,6 +141,9 @@ pub struct AttachFile {
     /// Force of the whole part above which all of it tears off, N, 1e-6 … 1e9: the mean over a common step of what the tube touches. It is
     /// gone then for good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
+    /// Greatest force that the whole part gives, N, 1e-6 … 1e9 and below `tears_above_n`, spread evenly along it: where more would be taken it
+    /// slips, and holds from then on where it has come to. Default: as much as it takes.
+    pub yields_above_n: Option<f64>,
 }
 
 /// A travelling wave of contraction: r = r₀ (1 − a (1 + cos(2π (s − c t)/λ))/2).

@@ -90,6 +90,8 @@ pub struct AgentReport {
     pub dt_ms: f64,
     /// Last spacing of its simulation, metres; `None` for a model without one.
     pub eps_m: Option<f64>,
+    /// Number of nodes that its last state was solved at; `None` for a model without nodes.
+    pub nodes: Option<u32>,
     /// Level of the primitive that its picture was last drawn with; `None` where it was never drawn.
     pub n: Option<u8>,
     /// Spacing that its picture was last drawn with, metres; `None` for a model without one.
@@ -400,6 +402,7 @@ mod tests {
         "/agents/0/wanted_hz",
         "/agents/0/dt_ms",
         "/agents/0/eps_m",
+        "/agents/0/nodes",
         "/agents/0/n",
         "/agents/0/cpu_s",
         "/agents/0/age_ms/p50",

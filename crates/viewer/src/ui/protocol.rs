@@ -317,6 +317,8 @@ pub struct AgentRow {
     pub dt_s: f64,
     /// Resolution of the simulation.
     pub simulation: Option<Resolution>,
+    /// Number of nodes of the simulation; `None` for a model without nodes.
+    pub nodes: Option<u32>,
     /// Resolution of the picture.
     pub picture: Option<Resolution>,
     /// Age of the displayed state, seconds, ≥ 0.
@@ -360,6 +362,7 @@ impl AgentRow {
             rate_hz: 0.0,
             dt_s: 0.0,
             simulation: None,
+            nodes: None,
             picture: None,
             age_s: 0.0,
             step_s: 0.0,

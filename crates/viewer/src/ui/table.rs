@@ -10,14 +10,15 @@ use metachron_core::{AgentId, Resolution};
 
 const ROW: f32 = 22.0;
 /// The least width of the table, points.
-const WIDTH_MIN: f32 = 940.0;
+const WIDTH_MIN: f32 = 1000.0;
 /// Names of the columns, their relative widths, and whether they hold numbers.
-const COLUMNS: [(&str, f32, bool); 10] = [
+const COLUMNS: [(&str, f32, bool); 11] = [
     ("Agent", 1.5, false),
     ("Model", 0.9, false),
     ("Rate / requested", 1.3, true),
     ("dt", 0.85, true),
     ("Simulation ε", 1.0, true),
+    ("Nodes", 0.7, true),
     ("Picture ε, n", 1.2, true),
     ("Age", 0.85, true),
     ("Step cost", 0.9, true),
@@ -137,6 +138,7 @@ fn cells(row: &AgentRow) -> [String; COLUMNS.len()] {
         format!("{:.0} / {:.0} Hz", row.rate_hz, row.wanted_hz),
         text::seconds(row.dt_s),
         row.simulation.as_ref().map_or_else(dash, eps),
+        row.nodes.map_or_else(dash, |nodes| text::count(nodes.into())),
         row.picture
             .as_ref()
             .map_or_else(dash, |r| format!("{}, {}", row.simulation.as_ref().map_or_else(dash, |_| eps(r)), r.n)),
@@ -160,7 +162,7 @@ fn state_text(row: &AgentRow) -> String {
 }
 
 fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
-    format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[9])
+    format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[10])
 }
 
 fn state_color(state: &AgentState, palette: &Palette) -> Color32 {
@@ -179,9 +181,9 @@ fn cell_color(row: &AgentRow, index: usize, palette: &Palette) -> Color32 {
         0 => palette.text,
         1 => palette.weak,
         2 if behind => palette.warn,
-        6 if stale => palette.warn,
-        9 if matches!(row.state, AgentState::Parked(_)) => palette.bad,
-        9 => palette.weak,
+        7 if stale => palette.warn,
+        10 if matches!(row.state, AgentState::Parked(_)) => palette.bad,
+        10 => palette.weak,
         _ => palette.text.gamma_multiply(0.9),
     }
 }

@@ -207,6 +207,7 @@ fn attachments_hold_a_tube_at_its_weight_over_their_stiffness_beyond_their_slack
         spec.gravity = DVec3::NEG_Z * 9.81;
         spec.damping_per_s = 8.0;
         spec.attachments = vec![Attachment {
+            yields_above_n: f64::INFINITY,
             from: 0.0,
             to: 1.0,
             stiffness_n_m2: 90.0,
