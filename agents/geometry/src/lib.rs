@@ -52,7 +52,7 @@ pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
-pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
+pub use foliage::{Foliage, FoliageCut, PieceKind, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate, generate_surface};
 pub use geodesic::geodesic_edges;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
