@@ -85,6 +85,11 @@ impl FrameQuery<'_> {
         (0..self.views.len()).filter(|at| self.views[*at].view.visible).filter(itself)
     }
 
+    /// Number that breaks ties between objects.
+    pub fn id(&self, at: usize) -> u64 {
+        u64::from(self.views[at].view.id.0)
+    }
+
     /// Benefit of an object in view at an accuracy of 1.
     pub fn weight(&self, at: usize) -> f64 {
         benefit::weight(&self.views[at].view, self.sliders, self.ladders.of(at).polygon_px())

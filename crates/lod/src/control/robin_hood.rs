@@ -10,7 +10,6 @@
 use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
 use super::query::{FrameQuery, Promise, demand, left_out};
-use super::select::id;
 use super::view::Kind;
 use crate::select::robin_hood::{Instance, TooLittle, distribute};
 
@@ -104,7 +103,7 @@ fn spend_rest(
 fn instance(query: &FrameQuery<'_>, at: usize, forms: Vec<f64>) -> Instance {
     let view = &query.views[at].view;
     Instance {
-        id: id(query, at),
+        id: query.id(at),
         complexity: query.ladders.of(at).complexity_s,
         value: query.value.of(view.surface_m2(), view.distance_m, view.from_focus_m, view.importance),
         forms,

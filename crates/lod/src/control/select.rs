@@ -52,7 +52,7 @@ impl Select {
         for &at in &objects {
             let weight = query.weight(at);
             let entries: Vec<_> = query.ladders.of(at).rungs.iter().map(|rung| query.entry(weight, rung)).collect();
-            problem.push(id(query, at), &entries);
+            problem.push(query.id(at), &entries);
         }
         let selection = self.solve(policy, query, &problem, &objects);
         self.last.clear();
@@ -82,10 +82,6 @@ impl Select {
             _ => funkhouser::greedy(problem, Scan::Skip),
         }
     }
-}
-
-pub(super) fn id(query: &FrameQuery<'_>, at: usize) -> u64 {
-    u64::from(query.views[at].view.id.0)
 }
 
 /// Draws an object at a rung, or leaves it out.
