@@ -54,7 +54,7 @@ pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
 pub use contact_traits::{CollisionGroups, CombineRule, ContactTraits};
-pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
+pub use foliage::{Foliage, FoliageCut, PieceKind, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate, generate_surface};
 pub use geodesic::geodesic_edges;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};

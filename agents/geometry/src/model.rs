@@ -3,7 +3,7 @@
 //! In: meshes and foliage with their placements. Out: counts, a bounding ball of each, a coarse mesh of all. Never here: appearance, the
 //! GPU.
 
-use super::{Foliage, PrimitiveMesh, PrimitiveVertex, ProgressiveMesh, ProgressiveMeshError, Rung, hull_mesh};
+use super::{Foliage, PrimitiveMesh, PrimitiveVertex, ProgressiveMesh, ProgressiveMeshError, hull_mesh};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub enum Model {
     /// A mesh of any number of triangles.
     Mesh(Arc<ProgressiveMesh>),
-    /// Foliage: pieces in rungs.
+    /// Foliage: pieces as strokes and in full.
     Foliage(Arc<Foliage>),
 }
 
@@ -92,7 +92,7 @@ impl Model {
                 PrimitiveMesh { vertices: tom.vertices()[..cut.vertices as usize].to_vec(), triangles: corners }
             }
             Self::Foliage(foliage) => {
-                let Some(Rung::Mesh(mesh)) = foliage.rungs().last() else { return PrimitiveMesh::default() };
+                let mesh = foliage.mesh();
                 let count = mesh.triangles.len().min(triangles as usize);
                 PrimitiveMesh { vertices: mesh.vertices.clone(), triangles: mesh.triangles[..count].to_vec() }
             }

@@ -86,7 +86,7 @@ fn draw(control: &mut PictureControl, stage: &[ObjectView], machine: Machine, ti
     let work_s = machine.frame_s + machine.triangle_s * plan.polygons;
     let (tube, polygons) = (plan.levels[0].resolution, plan.polygons);
     let work = Duration::from_secs_f64(work_s);
-    control.observe(FrameWork { work, draw: work, skip: false });
+    control.observe(FrameWork { work, draw: work, ..FrameWork::default() });
     Frame { time_s, work_s, eps_mm: 1e3 * tube.eps_m, n: tube.n, polygons }
 }
 

@@ -92,8 +92,8 @@ proptest! {
         instances in prop::collection::vec((0.1..5.0_f64, any_number(), prop::collection::vec(any_number(), 0..5)), 0..20),
         time in any_number(), rule in prop_oneof![Just(TooLittle::Nothing), Just(TooLittle::Part)],
     ) {
-        let instances: Vec<_> = (0..).zip(instances).map(|(id, (complexity, value, forms))| Instance { id, complexity, value, forms }).collect();
-        let d = distribute(time, &instances, rule);
+        let instances: Vec<_> = (0..).zip(instances).map(|(id, (complexity, value, forms))| Instance { id, complexity, value, forms, too_little: rule }).collect();
+        let d = distribute(time, &instances);
         let mut taken = 0.0;
         for (i, instance) in instances.iter().enumerate() {
             let Some(form) = d.form[i] else { continue };
@@ -144,10 +144,10 @@ fn invalid_numbers_become_meshes_that_can_be_solved() {
 
 #[test]
 fn partial_form_spends_what_was_offered() {
-    let instance = |id, value| Instance { id, complexity: 1.0, value, forms: vec![8.0, 4.0] };
-    let both = [instance(0, 1.0), instance(1, 3.0)];
-    let nothing = distribute(8.0, &both, TooLittle::Nothing);
+    let instance = |id, value, too_little| Instance { id, complexity: 1.0, value, forms: vec![8.0, 4.0], too_little };
+    let both = |rule| [instance(0, 1.0, rule), instance(1, 3.0, rule)];
+    let nothing = distribute(8.0, &both(TooLittle::Nothing));
     assert_eq!((nothing.form, nothing.leftover), (vec![None, Some(0)], 0.0)); // the second is offered all 8
-    let part = distribute(8.0, &both, TooLittle::Part);
+    let part = distribute(8.0, &both(TooLittle::Part));
     assert_eq!((part.form, part.part, part.leftover), (vec![Some(1), Some(1)], vec![0.5, 1.0], 2.0));
 }

@@ -1,5 +1,6 @@
 //! What the choices in a tree promise, for any tree: against all cuts there are.
 
+use metachron_lod::select::half::at_least_half;
 use metachron_lod::select::incremental::Keep;
 use metachron_lod::select::tree::{Cut, Node, Tree, TreeError};
 use metachron_lod::select::{Entry, Level, maciel, mason, mason_flat, tree_exact};
@@ -56,6 +57,18 @@ fn any_tree() -> impl Strategy<Value = Tree> {
 }
 
 proptest! {
+    #[test]
+    fn an_answer_of_at_least_half_is_worth_half_of_the_best_of_all_cuts(tree in any_tree(), start in any_tree()) {
+        let warm = mason::incremental(&tree, &tree_exact::lagrange(&start).levels, Keep::Last).cut;
+        for answer in [warm, mason_flat::flat(&tree)] {
+            let got = at_least_half(&tree, answer.clone());
+            prop_assert!(tree.is_cut(&got.levels) && (got.value >= answer.value || !answer.feasible));
+            if let Some(best) = brute(&tree) {
+                prop_assert!(got.feasible && 2 * got.value >= best, "{} of {}", got.value, best);
+            }
+        }
+    }
+
     #[test]
     fn no_cut_is_over_the_budget_or_incomplete_or_above_its_certificate(
         tree in any_tree(), importance in prop::collection::vec(0.0..1.0_f64, 0..10),

@@ -3,7 +3,7 @@
 //! In: a posed and surveyed [`SceneView`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
 //! An object outside the view is in the picture where it may shade a visible one: for its shadow only.
 
-use super::instances::{Solids, add_solid, add_static, kind, sort_solids};
+use super::instances::{Framed, Solids, add_solid, add_static, kind, sort_solids};
 use super::level::{Level, Shading};
 use super::light_volume::LightColumn;
 use super::picture::{
@@ -74,7 +74,8 @@ impl SceneView {
         for &number in &scratch.shown {
             let (track, at) = (&mut self.tracks[number], level(levels, number));
             if at.triangles > 0 {
-                add_solid(track, at, &picture, &mut scratch.solids, &mut allowance);
+                let framed = Framed { picture: &picture, eye: self.eye };
+                add_solid(track, at, framed, &mut scratch.solids, &mut allowance);
             } else {
                 track.geomorph = None;
             }

@@ -7,9 +7,10 @@ use super::level::{Level, Shading};
 use super::lod_transition::{Allowance, Geomorph};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
 use super::scene_view::{Actor, Appearance, Form, Material, SceneView, StaticShape, Track};
+use super::view::{Camera, Size};
 use glam::{DVec3, Vec3};
 use metachron_core::{Body, ToolState};
-use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
+use metachron_geometry::{Cut, Foliage, Model, Primitive, Rounding, Solid, ToolShape};
 
 /// Level at which fixed solids are drawn.
 const STATIC_LEVEL: u8 = 4;
@@ -19,6 +20,21 @@ const CELL_SHARE: f64 = 0.125;
 const CELLS_MAX: f64 = 24.0;
 /// Triangles by which coarsening meshes may exceed their request in total, as a fraction of all triangles requested.
 const GEOMORPH_SHARE: f64 = 0.05;
+
+/// A picture in the making, and the camera that it was surveyed for.
+#[derive(Clone, Copy)]
+pub(super) struct Framed<'a> {
+    pub picture: &'a Picture,
+    pub eye: Option<(Camera, Size)>,
+}
+
+impl Framed<'_> {
+    /// Pixels that a metre at a point is large.
+    fn pixels_per_m(&self, point: DVec3) -> f64 {
+        self.eye
+            .map_or(0.0, |(camera, size)| camera.pixels_per_metre((point - camera.eye()).dot(camera.forward()), size))
+    }
+}
 
 /// Solids by kind, before sorting.
 pub(super) type Solids = Vec<(SolidKind, SolidInstance)>;
@@ -65,12 +81,13 @@ fn mesh_of(solid: &Solid, mesh_index: Option<u32>, n: u8) -> Option<(MeshKey, Ro
 pub(super) fn add_solid(
     track: &mut Track,
     at: Level,
-    picture: &Picture,
+    framed: Framed<'_>,
     solids: &mut Solids,
     allowance: &mut Allowance,
 ) {
+    let picture = framed.picture;
     if matches!(track.actor.form, Form::Scenery(..)) {
-        return add_scenery(track, at, picture, solids, allowance);
+        return add_scenery(track, at, framed, solids, allowance);
     }
     let paint = Paint::of(track.actor.appearance, tint(picture.style, at, track.age_s));
     match (&track.actor.form, &track.pose) {
@@ -88,33 +105,50 @@ pub(super) fn add_solid(
 }
 
 /// Adds visible scenery with the triangles that its level gives.
-fn add_scenery(track: &mut Track, level: Level, picture: &Picture, solids: &mut Solids, allowance: &mut Allowance) {
-    let mut paint = Paint::of(track.actor.appearance, tint(picture.style, level, track.age_s));
+fn add_scenery(track: &mut Track, level: Level, framed: Framed<'_>, solids: &mut Solids, allowance: &mut Allowance) {
+    let mut paint = Paint::of(track.actor.appearance, tint(framed.picture.style, level, track.age_s));
     let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.mesh_index, track.seen) else {
         return;
     };
-    let (mesh, growth, share) = match model {
+    match model {
         Model::Mesh(progressive) => {
-            let geomorph = track.geomorph.get_or_insert_with(|| Geomorph::at(progressive, level.triangles));
-            geomorph.advance(progressive, level.triangles, allowance);
-            let (mesh, share) = geomorph.drawn(number);
-            (mesh, 0.0, share)
+            let (mesh, share) = if level.triangles < progressive.range().0 {
+                // a part of the coarsest cut, with gaps (RH05, §7.2)
+                track.geomorph = None;
+                (MeshKey::Cut(number, Cut { triangles: level.triangles, ..progressive.cut(0) }), 0.0)
+            } else {
+                let geomorph = track.geomorph.get_or_insert_with(|| Geomorph::at(progressive, level.triangles));
+                geomorph.advance(progressive, level.triangles, allowance);
+                geomorph.drawn(number)
+            };
+            let painted = track.painting.as_ref().map(|painting| painting.apply(&mut paint, level.shading));
+            let (kind, wrap) = match painted.flatten() {
+                Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, tissue: false, mesh }, wrap),
+                None => (kind(level.shading, mesh), 0.0),
+            };
+            let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: 0.0 };
+            let still = instance(at.position - framed.picture.origin, at.rotation, size, paint);
+            solids.push((kind, SolidInstance { geomorph: share, wrap: [wrap, 0.0], ..still }));
         }
         Model::Foliage(foliage) => {
-            let prefix = foliage.cut(level.triangles);
-            // growth applies to strokes only: a mesh is not swept
-            let is_mesh = matches!(foliage.rungs().get(usize::from(prefix.rung)), Some(Rung::Mesh(_)));
-            (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth }, 0.0)
+            let pixels = framed.pixels_per_m(track.bounds.centre) * at.scale;
+            for (mesh, growth) in foliage_runs(foliage, number, level.triangles, pixels) {
+                let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
+                let still = instance(at.position - framed.picture.origin, at.rotation, size, paint);
+                solids.push((kind(level.shading, mesh), still));
+            }
         }
-    };
-    let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
-    let painted = track.painting.as_ref().map(|painting| painting.apply(&mut paint, level.shading));
-    let (kind, wrap) = match painted.flatten() {
-        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, tissue: false, mesh }, wrap),
-        None => (kind(level.shading, mesh), 0.0),
-    };
-    let still = instance(at.position - picture.origin, at.rotation, size, paint);
-    solids.push((kind, SolidInstance { geomorph: share, wrap: [wrap, 0.0], ..still }));
+    }
+}
+
+/// The meshes of foliage for a number of triangles where one of its units is `pixels` large, and the growth of its points: a mesh is not
+/// swept.
+fn foliage_runs(foliage: &Foliage, number: u32, triangles: u32, pixels: f64) -> impl Iterator<Item = (MeshKey, f32)> {
+    let cut = foliage.cut(triangles, pixels);
+    let stroke = foliage.kind().stroke_triangles();
+    let strokes = MeshKey::Strokes(number, stroke * cut.strokes.start, stroke * cut.strokes.len() as u32);
+    let full = (cut.triangles > 0).then_some((MeshKey::Pieces(number, cut.triangles), 0.0));
+    full.into_iter().chain((!cut.strokes.is_empty()).then_some((strokes, cut.growth)))
 }
 
 /// The parts of a tool at a level, relative to `origin`.

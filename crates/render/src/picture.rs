@@ -119,8 +119,10 @@ pub enum MeshKey {
     Cut(u32, Cut),
     /// The same, morphing to a coarser cut: model, cut, vertex count of the coarser cut.
     Geomorph(u32, Cut, u32),
-    /// The first triangles of a foliage level in [`Picture::models`]: model, rung, triangles.
-    Part(u32, u8, u32),
+    /// The first pieces of the foliage with this index in [`Picture::models`], in full: their triangles.
+    Pieces(u32, u32),
+    /// Pieces of foliage as strokes: model, the first of their triangles, and how many.
+    Strokes(u32, u32, u32),
     /// A sharp box whose sides are divided into this many cells along x, y and z, each at least 1.
     Slab([u8; 3]),
 }
@@ -269,7 +271,7 @@ impl Picture {
                 4 * (x * y + y * z + z * x)
             }
             MeshKey::Cut(_, cut) | MeshKey::Geomorph(_, cut, _) => u64::from(cut.triangles),
-            MeshKey::Part(_, _, triangles) => u64::from(triangles),
+            MeshKey::Pieces(_, triangles) | MeshKey::Strokes(_, _, triangles) => u64::from(triangles),
             MeshKey::Custom(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
         }
     }

@@ -240,9 +240,10 @@ fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
         return still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most });
     }
     let group = &scene.groups[at - agents - members];
+    let groups = (agents + members + group.groups.start, group.groups.len());
     let members = (agents + group.members.start, group.members.len());
     let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
-    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, impostors })
+    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, groups, impostors })
 }
 
 fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {

@@ -48,6 +48,8 @@ pub struct FrameRecord {
     pub reversals: u32,
     /// Objects in view that were left out for lack of time.
     pub holes: u32,
+    /// Passes of a search that goes on from the frame before; 0 for other policies.
+    pub passes: u32,
     /// The loop's ε̂ = 40·ε/L of the printed law, or the corrected law's scene-wide ε in metres.
     pub eps: f64,
     /// Mean level n of the tubes in view, else of everything in view.

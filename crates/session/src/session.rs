@@ -58,6 +58,8 @@ pub struct Session {
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
+    /// When agents' processor time was last read, and what it was, seconds.
+    agents_cpu: (Duration, f64),
     /// Time and position of the camera at its last reading.
     last_camera: Option<(Duration, Camera)>,
     /// Predicted camera of the next frame at the time when its picture is finished.
@@ -156,6 +158,7 @@ impl Session {
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
+            agents_cpu: (Duration::ZERO, 0.0),
             last_camera: None,
             next_camera: None,
             lag_s: 0.0,
@@ -369,7 +372,8 @@ impl Session {
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
         self.warm_up += usize::from(cold);
         self.store(record);
-        self.control.observe(FrameWork { work, draw, skip: skip || cold });
+        let beside = self.logic_beside(draw);
+        self.control.observe(FrameWork { work, draw, beside, skip: skip || cold });
         record
     }
 

@@ -53,7 +53,7 @@ pub struct Scene {
     pub obstacle_appearances: Vec<Appearance>,
     /// Objects that are only drawn and never move; the members of a group are adjacent.
     pub scenery: Vec<Scenery>,
-    /// Scenery that may be drawn as one mesh.
+    /// Scenery that may be drawn as one mesh; a group comes after the groups in it.
     pub groups: Vec<Group>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
@@ -250,8 +250,10 @@ pub struct Group {
     pub proxy: Scenery,
     /// Triangles of its impostors: 1 … [`GROUP_LEVELS_MAX`] rising numbers, each a cut of the mesh.
     pub levels: Vec<u32>,
-    /// Its range in [`Scene::scenery`].
+    /// All scenery in it and in its groups, a range of [`Scene::scenery`].
     pub members: Range<usize>,
+    /// All groups in it and in those, a range of [`Scene::groups`] that ends before it.
+    pub groups: Range<usize>,
 }
 
 /// Rate and steps that an agent requests.

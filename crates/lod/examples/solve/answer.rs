@@ -149,10 +149,16 @@ fn cut(c: &Cut) -> Value {
 fn robin_hood(case: &Value) -> Result<Value, String> {
     let instance = |(id, i): (u64, &Value)| {
         let forms: Result<Vec<_>, _> = list(i, "lods")?.iter().map(real).collect();
-        Ok(Instance { id, complexity: number(i, "complexity")?, value: number(i, "value")?, forms: forms? })
+        Ok(Instance {
+            id,
+            complexity: number(i, "complexity")?,
+            value: number(i, "value")?,
+            forms: forms?,
+            too_little: TooLittle::Nothing,
+        })
     };
     let instances: Result<Vec<_>, String> = (0..).zip(list(case, "instances")?).map(instance).collect();
-    let d = robin_hood::distribute(number(case, "t_r")?, &instances?, TooLittle::Nothing);
+    let d = robin_hood::distribute(number(case, "t_r")?, &instances?);
     let forms: Vec<_> = d.form.iter().map(|f| index(*f)).collect();
     Ok(json!({"feasible": true, "order": d.order, "alloc": d.offered, "lod": forms, "leftover": d.leftover}))
 }

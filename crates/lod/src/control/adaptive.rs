@@ -223,6 +223,13 @@ impl AdaptiveChoice {
     fn promise(&self) -> Promise {
         let Plan { feasible, budget, predicted, value, upper, .. } = self.plan;
         let seconds = |ticks: f64| ticks / TICKS;
-        Promise { budget_s: seconds(budget), predicted_s: seconds(predicted), value, upper, feasible, holes: 0 }
+        Promise {
+            budget_s: seconds(budget),
+            predicted_s: seconds(predicted),
+            value,
+            upper,
+            feasible,
+            ..Promise::default()
+        }
     }
 }

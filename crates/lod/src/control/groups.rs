@@ -28,11 +28,13 @@ impl Groups {
         self.parent.resize(views.len(), None);
         self.groups.clear();
         for (at, SizedView { view, .. }) in views.iter().enumerate() {
-            let Kind::Group { members: (first, count), .. } = view.kind else { continue };
+            let Kind::Group { members, groups, .. } = view.kind else { continue };
             self.groups.push(at);
-            let end = first.saturating_add(count).min(at);
-            let free = self.parent[first.min(end)..end].iter_mut().filter(|parent| parent.is_none());
-            free.for_each(|parent| *parent = Some(at));
+            for (first, count) in [members, groups] {
+                let end = first.saturating_add(count).min(at);
+                let free = self.parent[first.min(end)..end].iter_mut().filter(|parent| parent.is_none());
+                free.for_each(|parent| *parent = Some(at));
+            }
         }
     }
 
@@ -131,7 +133,7 @@ mod tests {
     fn groups_contain_objects_before_them_and_none_twice() {
         let leaf = Kind::Counted { radius_m: 0.1, least: 4, most: 100 };
         let impostors = [12, 0, 0, 0, 0, 0, 0, 0];
-        let group = |members| Kind::Group { radius_m: 1.0, members, impostors };
+        let group = |members| Kind::Group { radius_m: 1.0, members, groups: (0, 0), impostors };
         let kinds = [leaf, leaf, group((0, 2)), leaf, group((1, 9)), group((usize::MAX, usize::MAX)), group((6, 3))];
         let views: Vec<_> = kinds.into_iter().enumerate().map(|(id, kind)| object(id, kind)).collect();
         let mut groups = Groups::default();

@@ -4,15 +4,21 @@
 //! Theory: `docs/theory/budget.md`, section 4.
 
 use super::groups::{Groups, Impostors};
+use super::ladder::Rung;
 use super::plan::LevelDemand;
 use super::policy::Policy;
 use super::query::{FrameQuery, Promise, TICKS, left_out};
 use super::select;
+use crate::select::half::at_least_half;
 use crate::select::incremental::Keep;
 use crate::select::tree::{Cut, Node, Tree};
 use crate::select::{Entry, Level, maciel, mason, mason_flat};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
+
+/// The part of the benefit that an impostor loses where it was not drawn in the frame before: hysteresis (FS93, §5; MB97, §7). It counts
+/// where rises and falls are compared by benefit per cost; where benefits are, it would keep a level for ever.
+const CHANGED: f64 = 0.05;
 
 /// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -39,13 +45,16 @@ impl Hierarchy {
         levels: &mut [LevelDemand],
     ) -> Promise {
         self.impostors.update(query, groups);
-        let forest = Forest::of(query, groups, &self.impostors);
+        if policy != Policy::Hierarchical {
+            self.last.clear();
+        }
+        let forest = Forest::of(query, groups, &self.impostors, &self.last);
         if forest.nodes.len() < 2 {
             let predicted_s = query.fixed_s;
             return Promise { budget_s: query.budget_s(), predicted_s, feasible: true, ..Promise::default() };
         }
         let Ok(tree) = Tree::new(query.budget(), &forest.nodes) else { return Promise::default() };
-        let cut = self.cut(policy, query, &tree, &forest);
+        let (cut, passes) = self.cut(policy, query, &tree, &forest);
         self.last.clear();
         for (object, level) in forest.objects.iter().zip(&cut.levels) {
             let Some(at) = *object else { continue };
@@ -53,40 +62,49 @@ impl Hierarchy {
             select::set(query, at, *level, levels);
         }
         leave_out_members(query, groups, levels);
-        promise(query, &cut)
+        Promise { passes, ..promise(query, &cut) }
     }
 
-    fn cut(&self, policy: Policy, query: &FrameQuery<'_>, tree: &Tree, forest: &Forest) -> Cut {
+    /// A cut by `policy`, and the passes that it took; those of (MB97) are worth half of the best.
+    fn cut(&self, policy: Policy, query: &FrameQuery<'_>, tree: &Tree, forest: &Forest) -> (Cut, u32) {
         match policy {
-            Policy::HierarchicalFlat => mason_flat::flat(tree),
+            Policy::HierarchicalFlat => (at_least_half(tree, mason_flat::flat(tree)), 0),
             Policy::MacielShirley => {
                 let importance = |at: &Option<usize>| at.map_or(0.0, |at| query.weight(at));
-                maciel::choose(tree, &forest.objects.iter().map(importance).collect::<Vec<_>>())
+                (maciel::choose(tree, &forest.objects.iter().map(importance).collect::<Vec<_>>()), 0)
             }
             _ => {
                 let last = |at: &Option<usize>| self.last.get(&query.views[(*at)?].view.id).copied().flatten();
                 let known =
                     |(node, level): (usize, Level)| level.filter(|l| (*l as usize) < tree.impostors(node).len());
                 let last: Vec<_> = forest.objects.iter().map(last).enumerate().map(known).collect();
-                mason::incremental(tree, &last, Keep::Last).cut
+                let found = mason::incremental(tree, &last, Keep::Last);
+                (at_least_half(tree, found.cut), found.passes)
             }
         }
     }
 }
 
 impl Forest {
-    fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors) -> Self {
+    /// Benefits include hysteresis by the cut of the frame before.
+    fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors, last: &BTreeMap<AgentId, Level>) -> Self {
+        let entries = |at: usize, rungs: &[Rung], weight: f64| {
+            let before = last.get(&query.views[at].view.id).copied().flatten();
+            let stays = |level| before.is_none_or(|before| before == level);
+            let entry = |(level, rung): (u32, &Rung)| {
+                query.entry(if stays(level) { weight } else { (1.0 - CHANGED) * weight }, rung)
+            };
+            (0..).zip(rungs).map(entry).collect()
+        };
         let mut forest = Self { nodes: vec![Node { parent: None, impostors: Vec::new() }], objects: vec![None] };
         let mut place = vec![0; query.views.len()];
         // groups are given after their members, so in reverse order each group comes before its members
         for &group in groups.all().iter().rev().filter(|group| impostors.is_in_view(**group)) {
-            let worth = impostors.worth(group);
-            let entries = impostors.rungs(query, group).iter().map(|rung| query.entry(worth, rung)).collect();
+            let entries = entries(group, impostors.rungs(query, group), impostors.worth(group));
             place[group] = forest.push(groups.parent(group).map_or(0, |parent| place[parent]), group, entries);
         }
         for at in query.drawable() {
-            let weight = query.weight(at);
-            let entries = query.ladders.of(at).rungs.iter().map(|rung| query.entry(weight, rung)).collect();
+            let entries = entries(at, &query.ladders.of(at).rungs, query.weight(at));
             forest.push(groups.parent(at).map_or(0, |parent| place[parent]), at, entries);
         }
         forest
@@ -116,7 +134,7 @@ fn promise(query: &FrameQuery<'_>, cut: &Cut) -> Promise {
         value: cut.value as f64,
         upper: cut.upper,
         feasible: cut.feasible,
-        holes: 0,
+        ..Promise::default()
     }
 }
 
@@ -136,14 +154,23 @@ mod tests {
 
     /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a separate mesh.
     fn rows() -> Vec<SizedView> {
-        let row =
-            |first: usize| Kind::Group { radius_m: 1.0, members: (first, 4), impostors: [12, 48, 0, 0, 0, 0, 0, 0] };
+        let row = |first: usize| Kind::Group {
+            radius_m: 1.0,
+            members: (first, 4),
+            groups: (0, 0),
+            impostors: [12, 48, 0, 0, 0, 0, 0, 0],
+        };
         let mesh = |most| Kind::Counted { radius_m: 0.2, least: 16, most };
         let mut kinds = vec![mesh(900); 4];
         kinds.push(row(0));
         kinds.extend([mesh(300); 4]);
         kinds.push(row(5));
-        kinds.push(Kind::Group { radius_m: 3.0, members: (0, 10), impostors: [8, 16, 0, 0, 0, 0, 0, 0] });
+        kinds.push(Kind::Group {
+            radius_m: 3.0,
+            members: (0, 9),
+            groups: (9, 1),
+            impostors: [8, 16, 0, 0, 0, 0, 0, 0],
+        });
         kinds.push(mesh(900));
         let pixels = |at: usize| if at < 5 { 3000.0 } else { 700.0 };
         let view = |(at, kind)| ObjectView {
@@ -158,7 +185,17 @@ mod tests {
     /// The input of a frame with `budget_s` seconds, all available for the choice, with everything in view.
     fn query<'a>(views: &'a [SizedView], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> FrameQuery<'a> {
         let value = Value::Plain;
-        FrameQuery { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
+        FrameQuery {
+            views,
+            ladders,
+            sliders,
+            value,
+            target_s: budget_s,
+            choose_s: None,
+            margin: 0.0,
+            fixed_s: 0.0,
+            spend_rest: false,
+        }
     }
 
     #[test]
@@ -175,7 +212,8 @@ mod tests {
             let query = query(&views, &ladders, &sliders, budget_s);
             let mut impostors = Impostors::default();
             impostors.update(&query, &groups);
-            let tree = Tree::new(query.budget(), &Forest::of(&query, &groups, &impostors).nodes).unwrap();
+            let tree =
+                Tree::new(query.budget(), &Forest::of(&query, &groups, &impostors, &BTreeMap::new()).nodes).unwrap();
             let best = exact(&tree, 2_000_000).unwrap();
             for (policy, least) in policies.into_iter().zip(&mut least) {
                 let mut levels: Vec<_> = views.iter().map(|seen| unseen(&seen.view)).collect();
@@ -224,6 +262,7 @@ mod tests {
     fn covered(views: &[SizedView], levels: &[LevelDemand]) -> Vec<usize> {
         let of = |at: usize| {
             let holds = |group: &usize| match views[*group].view.kind {
+                // of both rows the second row's own picture is not a mesh
                 Kind::Group { members: (first, count), .. } => (first..first + count).contains(&at),
                 _ => *group == at,
             };

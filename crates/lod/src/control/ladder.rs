@@ -24,6 +24,9 @@ const RAISED: f64 = 1e-12;
 /// Lengths and radii that differ by less than this factor give the same ladder: a tube that stretches slightly keeps its own.
 const SAME: f64 = 1.1;
 
+/// Pixels that an object of every type is assumed to cover where types are ordered by complexity: the constant area A of (RH05, §5.1).
+const COMPLEXITY_PX: f64 = 4096.0;
+
 /// One level of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rung {
@@ -50,6 +53,33 @@ struct Key {
     raise: bool,
 }
 
+/// Seconds of an object in its best shading as a line over its triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct CostLine {
+    /// Of the object without a triangle or a pixel.
+    pub setup_s: f64,
+    /// Triangles below which fewer save no time: at least the object's fewest (GB99).
+    pub from: f64,
+    /// At that number.
+    pub from_s: f64,
+    /// Of a triangle more.
+    pub polygon_s: f64,
+}
+
+impl CostLine {
+    fn of(prices: &Prices, shading: Shading, span: Span, pixels: f64) -> Self {
+        let from = prices.free_polygons(shading, pixels).clamp(span.least, span.full);
+        let to = span.full.min(pixels).max(from + 1.0);
+        let [from_s, to_s] = [from, to].map(|polygons| prices.object_s(shading, polygons, pixels));
+        Self { setup_s: prices.object_s(shading, 0.0, 0.0), from, from_s, polygon_s: (to_s - from_s) / (to - from) }
+    }
+
+    /// Seconds at a number of triangles.
+    pub fn at(&self, polygons: f64) -> f64 {
+        self.from_s + self.polygon_s * (polygons - self.from).max(0.0)
+    }
+}
+
 /// The levels of one object, cheapest first; for a group its impostors.
 #[derive(Debug, Clone)]
 pub(super) struct Ladder {
@@ -59,6 +89,10 @@ pub(super) struct Ladder {
     pub rungs: Vec<Rung>,
     /// Number of rungs inside the object's requested range; the rungs after them raise its quality further.
     pub asked: usize,
+    /// Complexity of the object's type: seconds of its finest form in its best shading where it covers an area that is the same for all
+    /// types, whatever the camera sees of it (RH05, §5.1).
+    pub complexity_s: f64,
+    pub line: CostLine,
 }
 
 /// The ladders of all objects, in the order in which they are given.
@@ -171,7 +205,7 @@ impl Ladder {
         let rung = |cut, shading| key.rung(cut, shading, prices, sliders);
         if view.is_group() {
             let rungs = key.impostors(view, rung);
-            return Self { key, version, asked: rungs.len(), rungs };
+            return Self { key, version, asked: rungs.len(), rungs, complexity_s: 0.0, line: CostLine::default() };
         }
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
@@ -183,7 +217,9 @@ impl Ladder {
         if key.raise {
             key.raise(view, &mut rungs, rung);
         }
-        Self { key, version, rungs, asked }
+        let complexity_s = prices.object_s(view.shading.1, span.full, COMPLEXITY_PX);
+        let line = CostLine::of(prices, view.shading.1, *span, key.pixels());
+        Self { key, version, rungs, asked, complexity_s, line }
     }
 
     /// Size of a triangle on the screen, pixels across, at the geometric middle of the ladder: used for motion blur.
@@ -260,7 +296,7 @@ mod tests {
 
     fn ladder(impostors: [u32; 8]) -> Ladder {
         let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-        let kind = Kind::Group { radius_m: 1.0, members: (0, 0), impostors };
+        let kind = Kind::Group { radius_m: 1.0, members: (0, 0), groups: (0, 0), impostors };
         let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
         let mut ladders = Ladders::default();
         ladders.update(&[SizedView::of(view)], true, &Prices::default(), &Sliders::default());
@@ -289,5 +325,25 @@ mod tests {
         assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
         assert!(ladder([0; 8]).rungs.is_empty());
         assert_eq!(ladder([1, 2, 3, 4, 5, 6, 7, 8]).rungs.len(), 8);
+    }
+
+    #[test]
+    fn the_complexity_of_a_type_is_the_same_wherever_its_objects_are() {
+        let complexity = |pixels: f64, most: u32| {
+            let kind = Kind::Counted { radius_m: 1.0, least: 4, most };
+            let mut ladders = Ladders::default();
+            ladders.update(
+                &[SizedView::of(ObjectView { pixels, ..ObjectView::plain(0, kind) })],
+                false,
+                &Prices::default(),
+                &Sliders::default(),
+            );
+            ladders.of(0).complexity_s
+        };
+        // 5 µs and 0.22 µs a triangle at any area, by the default prices
+        for pixels in [1.0, 300.0, 1e6] {
+            assert!((complexity(pixels, 500) - (5e-6 + 500.0 * 0.22e-6)).abs() < 1e-12);
+            assert!(complexity(pixels, 500) < complexity(1e6 / pixels, 800));
+        }
     }
 }

@@ -15,6 +15,7 @@ use super::groups::Groups;
 use super::hierarchy::Hierarchy;
 use super::ladder::Ladders;
 use super::level;
+use super::logic::Logic;
 use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
@@ -74,6 +75,7 @@ pub struct PictureControl {
     hierarchy: Hierarchy,
     adaptive: AdaptiveChoice,
     scale: RenderScale,
+    logic: Logic,
     ladders: Ladders,
     groups: Groups,
     changes: Changes,
@@ -112,6 +114,7 @@ impl PictureControl {
             hierarchy: Hierarchy::default(),
             adaptive: AdaptiveChoice::default(),
             scale: RenderScale::default(),
+            logic: Logic::default(),
             ladders: Ladders::default(),
             groups: Groups::default(),
             changes: Changes::default(),
@@ -137,6 +140,10 @@ impl PictureControl {
         self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
         let target_s = self.target_s();
         self.observe_scale(work_s, drawn_s);
+        if self.policy.predicts() {
+            let priced_s = self.prices.backdrop_s(self.backdrop) + self.drawn_s(&self.plan.levels);
+            self.logic.observe(frame.beside.as_secs_f64(), priced_s, drawn_s);
+        }
         if !steers(&self.views) {
             return;
         }
@@ -202,19 +209,26 @@ impl PictureControl {
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
         let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
         self.others_s = self.reserve_s + kept_s;
-        let fixed_s = prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
+        // the default policy is corrected by frames in which that time is already gone
+        let beside_s = match self.policy {
+            Policy::Adaptive => 0.0,
+            _ => self.logic.lost_s(target_s * (1.0 - self.margin_now()) - overhead_s - self.others_s),
+        };
+        let fixed_s = prices.backdrop_s(self.backdrop) + overhead_s + self.others_s + beside_s;
         if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }
+        let sliders = self.policy.sliders(self.sliders);
         let query = FrameQuery {
             views: &self.views,
             ladders: &self.ladders,
-            sliders: &self.sliders,
+            sliders: &sliders,
             value: self.value,
             target_s,
             choose_s: split.map(|split| split.choose),
             margin: self.margin_now(),
             fixed_s: self.fixed_s,
+            spend_rest: self.raise.is_some(),
         };
         let mut promise = match self.policy {
             Policy::Adaptive => self.adaptive.choose(&query, &self.groups, levels),
@@ -224,7 +238,7 @@ impl PictureControl {
             policy => self.select.choose(policy, &query, levels),
         };
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
-            raise.observe(&query, levels, &promise);
+            raise.observe(&query, levels, &promise, self.policy);
         }
         // time reserved for others is not spent by the frame
         promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);

@@ -10,12 +10,14 @@ use metachron_core::{AgentId, Resolution};
 use std::time::Duration;
 
 /// Measured times of the last frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameWork {
     /// The work of the frame: gather, choose, draw. Without any wait for a display or for the frame's time to come.
     pub work: Duration,
     /// The part of it spent drawing the picture, which levels affect; `work` at most.
     pub draw: Duration,
+    /// Logic done elsewhere while it was drawn: the next choice, and the share of each core that agents' steps took.
+    pub beside: Duration,
     /// Whether the frame must not be used for learning: one of the first three, one with a new size or a new pipeline, a hidden window, the
     /// first after a gap of more than five frames.
     pub skip: bool,

@@ -3,6 +3,7 @@
 //! In: a name, gains. Out: settings for [`crate::control::PictureControl`]. Never here: a choice.
 
 use super::price::Prices;
+use crate::cost::benefit::Sliders;
 use crate::{grisoni, log_law};
 
 /// The policy that chooses the level of every visible object. Theory and papers: `docs/theory/budget.md`.
@@ -97,6 +98,14 @@ impl Policy {
     #[must_use]
     pub const fn scales_pictures(self) -> bool {
         self.predicts() || matches!(self, Self::Feedback)
+    }
+
+    /// The factors of the benefit that the policy uses: the distance from the middle of the picture always counts for (GB99).
+    pub(super) fn sliders(self, asked: Sliders) -> Sliders {
+        match self {
+            Self::Convex | Self::ConvexBarrier => Sliders { focus: 1.0, ..asked },
+            _ => asked,
+        }
     }
 
     /// The prices that the policy uses: by area for Robin Hood (RH05), else two stages (FS93). The default uses the stages too: areas that

@@ -182,6 +182,15 @@ impl Prices {
         }
     }
 
+    /// Triangles below which fewer save no time of an object that covers `pixels`, by the stages: its pixels take as long (GB99). 0 where a
+    /// machine does one stage after the other, so that every triangle takes time.
+    #[must_use]
+    pub fn free_polygons(&self, shading: Shading, pixels: f64) -> f64 {
+        let Stages { polygon, vertex, pixel, serial, .. } = self.of(shading);
+        let each = polygon + VERTICES_A_TRIANGLE * vertex;
+        if serial > 0.0 || each <= 0.0 { 0.0 } else { ((pixel * pixels - 2.0 * vertex) / each).max(0.0) }
+    }
+
     /// Seconds of the objects in view at these levels; both in the same order.
     #[must_use]
     pub fn objects_s<'a>(&self, views: impl Iterator<Item = &'a ObjectView>, levels: &[LevelDemand]) -> f64 {

@@ -4,6 +4,7 @@
 //! Theory: `docs/theory/control.md`, section 6; (RH05, §7.2) proposes it for time that would stay unspent.
 
 use super::plan::LevelDemand;
+use super::policy::Policy;
 use super::query::{FrameQuery, Promise};
 
 /// Frames in which all objects must have had their best before more is offered: half a second at 60 Hz …
@@ -35,9 +36,17 @@ impl QualityBoost {
     }
 
     /// Updates the rule with a choice.
-    pub fn observe(&mut self, query: &FrameQuery<'_>, levels: &[LevelDemand], promise: &Promise) {
-        let has_all = promise.feasible && query.drawable().all(|at| has_all(query, at, &levels[at]));
-        let spare = promise.predicted_s < (1.0 - SPARE) * query.target_s;
+    ///
+    /// Robin Hood gives no object more than its share, so that time can be left while others want it: there, time left is enough, without
+    /// that of better rungs.
+    pub fn observe(&mut self, query: &FrameQuery<'_>, levels: &[LevelDemand], promise: &Promise, policy: Policy) {
+        let raised_s: f64 = query.drawable().map(|at| raised_s(query, at, &levels[at])).sum();
+        let spare = promise.predicted_s - raised_s < (1.0 - SPARE) * query.target_s;
+        let has_all = promise.feasible
+            && match policy {
+                Policy::RobinHood => spare,
+                _ => query.drawable().all(|at| has_all(query, at, &levels[at])),
+            };
         self.frames = if has_all && (self.open || spare) { self.frames.saturating_add(1) } else { 0 };
         if self.open && !has_all {
             // an offer that did not last ten times its waiting time was too early
@@ -48,6 +57,14 @@ impl QualityBoost {
             (self.open, self.frames) = (true, 0);
         }
     }
+}
+
+/// Seconds that an object takes beyond its best requested rung.
+fn raised_s(query: &FrameQuery<'_>, at: usize, level: &LevelDemand) -> f64 {
+    let (asked, better) = query.ladders.of(at).rungs.split_at(query.ladders.of(at).asked);
+    let drawn = better.iter().find(|rung| (rung.polygons, rung.shading) == (level.polygons, level.shading));
+    let most_s = asked.iter().map(|rung| rung.cost_s).fold(0.0, f64::max);
+    drawn.map_or(0.0, |drawn| (drawn.cost_s - most_s).max(0.0))
 }
 
 /// Whether an object is drawn as well as requested; an object left out for its group requests nothing.

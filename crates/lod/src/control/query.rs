@@ -36,6 +36,8 @@ pub(super) struct FrameQuery<'a> {
     pub margin: f64,
     /// Time that is spent whatever is chosen, seconds, ≥ 0.
     pub fixed_s: f64,
+    /// Whether Robin Hood shares once more what nobody took.
+    pub spend_rest: bool,
 }
 
 /// The prediction of a choice.
@@ -53,6 +55,8 @@ pub struct Promise {
     pub feasible: bool,
     /// Objects in view that are left out for lack of time.
     pub holes: u32,
+    /// Passes of a search that goes on from the frame before (MB97); 0 for other policies.
+    pub passes: u32,
 }
 
 impl Promise {
@@ -79,6 +83,11 @@ impl FrameQuery<'_> {
     pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
         let itself = |at: &usize| !self.views[*at].view.is_group() && !self.ladders.of(*at).rungs.is_empty();
         (0..self.views.len()).filter(|at| self.views[*at].view.visible).filter(itself)
+    }
+
+    /// Number that breaks ties between objects.
+    pub fn id(&self, at: usize) -> u64 {
+        u64::from(self.views[at].view.id.0)
     }
 
     /// Benefit of an object in view at an accuracy of 1.

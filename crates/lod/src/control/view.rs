@@ -56,8 +56,10 @@ pub enum Kind {
     Group {
         /// Radius of a bounding ball, metres, > 0.
         radius_m: f64,
-        /// Its members among the objects given with it: the number of the first, and how many.
+        /// Its members among the objects given with it, those of its groups included: the number of the first, and how many.
         members: (usize, usize),
+        /// The groups in it, those within them included; given before it.
+        groups: (usize, usize),
         /// Triangles of its impostors, rising; 0 past the last.
         impostors: [u32; IMPOSTORS_MAX],
     },

@@ -46,14 +46,37 @@ impl Overlap {
     /// κ from measured frames (logic, drawing, frame), by least squares over those where both matter; 1 where none does.
     #[must_use]
     pub fn fit(frames: &[(f64, f64, f64)]) -> Self {
-        let (mut above, mut below) = (0.0, 0.0);
-        for &(logic, drawing, frame) in frames {
-            let (less, more) = (logic.min(drawing), logic.max(drawing));
-            if less > 0.0 && more.is_finite() && frame.is_finite() {
-                above += less * (frame - more);
-                below += less * less;
-            }
+        let mut fit = OverlapFit::default();
+        frames.iter().for_each(|&(logic, drawing, frame)| fit.add(logic, drawing, frame));
+        fit.overlap()
+    }
+}
+
+/// The least-squares fit of κ while frames are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OverlapFit {
+    above: f64,
+    below: f64,
+}
+
+impl OverlapFit {
+    /// Adds a frame in which logic and drawing alone would have taken these times; one where neither is hidden by the other does not count.
+    pub fn add(&mut self, logic: f64, drawing: f64, frame: f64) {
+        let (less, more) = (logic.min(drawing), logic.max(drawing));
+        if less > 0.0 && more.is_finite() && frame.is_finite() {
+            self.above += less * (frame - more);
+            self.below += less * less;
         }
-        Self::Fitted(if below > 0.0 { crate::within(above / below, 0.0, 1.0) } else { 1.0 })
+    }
+
+    /// Lets earlier frames count this part of what they did, 0 … 1.
+    pub fn fade(&mut self, part: f64) {
+        (self.above, self.below) = (part * self.above, part * self.below);
+    }
+
+    /// The overlap that fits best.
+    #[must_use]
+    pub fn overlap(&self) -> Overlap {
+        Overlap::Fitted(if self.below > 0.0 { crate::within(self.above / self.below, 0.0, 1.0) } else { 1.0 })
     }
 }

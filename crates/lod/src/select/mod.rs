@@ -11,6 +11,7 @@ pub mod barrier;
 mod exact;
 pub mod funkhouser;
 pub mod gobbetti;
+pub mod half;
 mod hull;
 pub mod incremental;
 mod linear;

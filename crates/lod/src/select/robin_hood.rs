@@ -17,9 +17,11 @@ pub struct Instance {
     pub value: f64,
     /// Times of the forms, best first; one that is not finite or below 0 is never chosen.
     pub forms: Vec<f64>,
+    /// What happens where its time does not pay for its cheapest form.
+    pub too_little: TooLittle,
 }
 
-/// The rule for an instance whose time does not pay for its cheapest form.
+/// The rule for an instance whose share of the time does not pay for its cheapest form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TooLittle {
     /// The instance is not drawn (RH05, §1).
@@ -46,7 +48,7 @@ pub struct Distribution {
 /// Distributes `time`: visited in rising complexity, each instance is offered t = v · (time left)/(value left) and takes its most expensive
 /// form that costs no more (RH05, eq. 1 … 4).
 #[must_use]
-pub fn distribute(time: f64, instances: &[Instance], rule: TooLittle) -> Distribution {
+pub fn distribute(time: f64, instances: &[Instance]) -> Distribution {
     let mut order: Vec<_> = (0..instances.len()).collect();
     order.sort_by(|&a, &b| {
         let key = |i: usize| &instances[i];
@@ -66,7 +68,7 @@ pub fn distribute(time: f64, instances: &[Instance], rule: TooLittle) -> Distrib
         };
         value_left -= value;
         offered[i] = offer;
-        let (taken, chosen, drawn) = take(&instances[i], offer, rule);
+        let (taken, chosen, drawn) = take(&instances[i], offer);
         (form[i], part[i]) = (chosen, drawn);
         left = (left - taken).max(0.0);
     }
@@ -78,7 +80,7 @@ fn sound(value: f64) -> f64 {
 }
 
 /// Time taken, form, and how much of it is drawn.
-fn take(instance: &Instance, offer: f64, rule: TooLittle) -> (f64, Option<u32>, f64) {
+fn take(instance: &Instance, offer: f64) -> (f64, Option<u32>, f64) {
     let usable = || (0_u32..).zip(&instance.forms).filter(|(_, t)| t.is_finite() && **t >= 0.0);
     if offer <= 0.0 {
         return (0.0, None, 0.0);
@@ -88,7 +90,7 @@ fn take(instance: &Instance, offer: f64, rule: TooLittle) -> (f64, Option<u32>, 
         return (time, Some(form), 1.0);
     }
     let cheapest = usable().min_by(|a, b| a.1.total_cmp(b.1).then(a.0.cmp(&b.0)));
-    match (rule, cheapest) {
+    match (instance.too_little, cheapest) {
         (TooLittle::Part, Some((form, &time))) => (offer, Some(form), offer / time),
         _ => (0.0, None, 0.0),
     }

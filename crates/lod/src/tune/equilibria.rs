@@ -79,7 +79,7 @@ fn along_the_line(plant: &Plant, candidate: Candidate, target_hz: f64, beta: f64
 fn step_printed_law(control: &mut PictureControl, target_hz: f64, by: f64) {
     let rate_hz = (target_hz - by / SWEEP_ALPHA).clamp(1e-3 * target_hz, 1e8);
     let work = Duration::from_secs_f64(1.0 / rate_hz);
-    control.observe(FrameWork { work, draw: work, skip: false });
+    control.observe(FrameWork { work, draw: work, ..FrameWork::default() });
 }
 
 /// The points at which the time falls through `set_s` as ε̂ rises, and ends of the range that a law would pass.

@@ -113,7 +113,7 @@ pub fn play(plant: &Plant, trial: &Trial) -> Vec<TrialFrame> {
         let load = trial.disturbance.load(passed, random.uniform()) * (1.0 + trial.noise * random.normal()).max(0.1);
         let work_s = load * plant.seconds(shown, trial.speed);
         let work = Duration::from_secs_f64(work_s);
-        control.observe(FrameWork { work, draw: work, skip: false });
+        control.observe(FrameWork { work, draw: work, ..FrameWork::default() });
         time_s += work_s.max(1.0 / trial.target_hz);
         let status = control.status();
         let at_end = is_at_end(trial.candidate, status, polygons, &views);
@@ -173,6 +173,7 @@ fn set_start(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: 
         work: Duration::from_secs_f64(set_s),
         draw: Duration::from_secs_f64(set_s),
         skip: false,
+        ..FrameWork::default()
     });
     let wanted = plant.line.x_of(set_s / rate * trial.speed).max(1.0);
     for _ in 0..START_CORRECTIONS {
@@ -186,7 +187,7 @@ fn settle(control: &mut PictureControl, plant: &Plant, speed: f64) {
     for _ in 0..WARM_UP {
         let polygons = control.plan(plant.views(0)).polygons;
         let work = Duration::from_secs_f64(plant.seconds(polygons, speed));
-        control.observe(FrameWork { work, draw: work, skip: false });
+        control.observe(FrameWork { work, draw: work, ..FrameWork::default() });
     }
 }
 

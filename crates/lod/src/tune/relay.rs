@@ -5,7 +5,6 @@
 use super::plant::Plant;
 use crate::control::{FrameWork, Law, PictureControl, Policy};
 use metachron_core::gains;
-use std::time::Duration;
 
 /// The relay moves ln ε by this much to either side.
 const HEIGHT: f64 = 0.2;
@@ -45,7 +44,7 @@ fn relay(plant: &Plant, target_hz: f64, margin: f64) -> Vec<f64> {
         let before = control.plan(plant.views(0)).polygons;
         control.coarsen(before / wanted);
         drawn.push(control.plan(plant.views(0)).polygons);
-        control.observe(FrameWork { work: Duration::ZERO, draw: Duration::ZERO, skip: true });
+        control.observe(FrameWork { skip: true, ..FrameWork::default() });
         let error = libm::log(plant.seconds(drawn[k.saturating_sub(plant.dead_time)], 1.0) / set_s);
         side = if error >= 0.0 { 1.0 } else { -1.0 };
         errors.push(error);

@@ -79,7 +79,7 @@ impl Globals {
         let floor = picture.floor.as_ref();
         let colour = floor.map_or([0; 3], |f| f.colour).map(|c| (f64::from(c) / 255.0).powf(2.2));
         let patch = floor.map_or_else(Patch::default, |floor| frame.patch(floor, picture.origin));
-        let reach = patch.reach(floor.map_or(focus, |f| f.below(focus)), radius);
+        let reach = patch.reach(floor.map_or(focus, |f| f.below(focus)), floor_reach(picture) * radius);
         // half the picture's width and height one metre away
         let half =
             DVec2::new(f64::from(shown.width), f64::from(shown.height)) * (0.5 / camera.pixels_per_metre(1.0, shown));
@@ -111,8 +111,15 @@ impl FloorDraw {
     }
 }
 
-/// Beyond this many radii of the focus the floor is as dark as the room behind it; the shaders use the same number.
+/// Beyond this many radii of the focus the floor is as dark as the room behind it, or has faded into the horizon of the open sky; the shaders
+/// use the same numbers.
 const FLOOR_REACH: f64 = 2.8;
+const FLOOR_REACH_OPEN: f64 = 300.0;
+
+/// How far the floor of a picture reaches, radii of the focus.
+fn floor_reach(picture: &Picture) -> f64 {
+    if picture.environment.light().fades { FLOOR_REACH } else { FLOOR_REACH_OPEN }
+}
 
 /// Whether every pixel that nothing else covers shows the floor before it has faded into the room.
 ///
@@ -125,7 +132,7 @@ pub fn floor_fills(picture: &Picture, camera: &Camera, size: Size) -> bool {
         let ray = camera.ray(DVec2::new(x, y), size);
         let eye = ray.origin - picture.origin;
         let along = (floor.point - eye).dot(floor.normal) / ray.direction.dot(floor.normal);
-        along > 0.0 && (eye + ray.direction * along).distance(centre) < FLOOR_REACH * picture.focus_radius_m
+        along > 0.0 && (eye + ray.direction * along).distance(centre) < floor_reach(picture) * picture.focus_radius_m
     })
 }
 
@@ -191,9 +198,9 @@ struct Patch {
 
 impl Patch {
     /// The factor by which it must grow to hold all of the floor that has not faded, at least 1.
-    fn reach(&self, floor_centre: DVec3, radius_m: f64) -> f64 {
+    fn reach(&self, floor_centre: DVec3, floor_m: f64) -> f64 {
         let inscribed = 0.5 * self.x.cross(self.y).length() / self.x.length().max(self.y.length());
-        let wanted = FLOOR_REACH * radius_m + self.centre.distance(floor_centre);
+        let wanted = floor_m + self.centre.distance(floor_centre);
         let reach = wanted / inscribed;
         if reach > 1.01 && reach.is_finite() { reach } else { 1.01 }
     }

@@ -5,8 +5,9 @@
 use super::super::picture::{MeshCorner, MeshKey, Picture};
 use glam::Vec3;
 use metachron_core::N_MAX;
-use metachron_geometry::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
+use metachron_geometry::{Foliage, Model, PieceKind, PrimitiveMesh, PrimitiveVertex, Stroke, patch};
 use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
@@ -42,19 +43,20 @@ impl Mesh {
 
     /// Draws `count` instances, as triangles or as edges; returns the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, count: u32) -> u32 {
-        self.draw_first(pass, edges, u32::MAX, count)
+        self.draw_part(pass, edges, 0..u32::MAX, count)
     }
 
-    /// Draws its first `triangles` (all edges, if edges are requested) for `count` instances; returns the number of draws.
-    pub fn draw_first(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, triangles: u32, count: u32) -> u32 {
-        let first = self.corners.min(triangles.saturating_mul(3));
-        let (indices, corners) = if edges { (&self.edges, self.ends) } else { (&self.triangles, first) };
-        if corners == 0 || count == 0 {
+    /// Draws some of its triangles (all edges, if edges are requested) for `count` instances; returns the number of draws.
+    pub fn draw_part(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, triangles: Range<u32>, count: u32) -> u32 {
+        let corner = |triangle: u32| self.corners.min(triangle.saturating_mul(3));
+        let part = corner(triangles.start)..corner(triangles.end);
+        let (indices, corners) = if edges { (&self.edges, 0..self.ends) } else { (&self.triangles, part) };
+        if corners.is_empty() || count == 0 {
             return 0;
         }
         pass.set_vertex_buffer(0, self.vertices.slice(..));
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..corners, 0, 0..count);
+        pass.draw_indexed(corners, 0, 0..count);
         1
     }
 }
@@ -66,14 +68,23 @@ fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     once.into_iter().collect()
 }
 
+/// Foliage on the GPU.
+#[derive(Debug)]
+struct FoliageMeshes {
+    kind: PieceKind,
+    /// All pieces in full; leaves turn to the camera too.
+    full: Mesh,
+    strokes: Mesh,
+}
+
 /// All meshes a renderer has made.
 #[derive(Debug, Default)]
 pub struct Meshes {
     patches: [Option<Mesh>; N_MAX as usize + 1],
     solids: HashMap<MeshKey, Mesh>,
     custom: Option<Arc<[PrimitiveMesh]>>,
-    /// Foliage levels by model and level index, and whether they are strokes.
-    parts: HashMap<(u32, u8), (Mesh, bool)>,
+    /// Foliage by model.
+    foliage: HashMap<u32, FoliageMeshes>,
     models: Option<Arc<[Model]>>,
 }
 
@@ -92,13 +103,13 @@ impl Meshes {
             }
         }
         if self.models.as_ref().is_none_or(|models| !Arc::ptr_eq(models, &picture.models)) {
-            self.parts.clear();
+            self.foliage.clear();
             self.models = Some(Arc::clone(&picture.models));
         }
         for run in &picture.solids {
             match run.kind.mesh {
                 MeshKey::Cut(..) | MeshKey::Geomorph(..) => {}
-                MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
+                MeshKey::Pieces(model, _) | MeshKey::Strokes(model, ..) => self.make_foliage(device, picture, model),
                 key => {
                     self.solids.entry(key).or_insert_with(|| solid_mesh(device, key, &picture.meshes));
                 }
@@ -106,24 +117,28 @@ impl Meshes {
         }
     }
 
-    fn make_part(&mut self, device: &wgpu::Device, picture: &Picture, key: (u32, u8)) {
-        let Some(Model::Foliage(foliage)) = picture.models.get(key.0 as usize) else { return };
-        let Some(rung) = foliage.rungs().get(usize::from(key.1)) else { return };
-        self.parts.entry(key).or_insert_with(|| match rung {
-            Rung::Mesh(mesh) => (primitive_mesh(device, mesh), false),
-            Rung::Points(strokes) => (strokes_mesh(device, strokes, &POINT), true),
-            Rung::Lines(strokes) => (strokes_mesh(device, strokes, &LINE), true),
-        });
+    fn make_foliage(&mut self, device: &wgpu::Device, picture: &Picture, model: u32) {
+        let Some(Model::Foliage(foliage)) = picture.models.get(model as usize) else { return };
+        self.foliage.entry(model).or_insert_with(|| FoliageMeshes::new(device, foliage));
     }
 
-    /// The mesh of a foliage level.
-    pub fn part(&self, model: u32, rung: u8) -> Option<&Mesh> {
-        self.parts.get(&(model, rung)).map(|(mesh, _)| mesh)
+    /// The pieces of foliage in full.
+    pub fn pieces(&self, model: u32) -> Option<&Mesh> {
+        self.foliage.get(&model).map(|foliage| &foliage.full)
     }
 
-    /// Whether a mesh consists of points or lines that turn to the camera.
-    pub fn is_strokes(&self, key: MeshKey) -> bool {
-        matches!(key, MeshKey::Part(model, rung, _) if self.parts.get(&(model, rung)).is_some_and(|(_, strokes)| *strokes))
+    /// The strokes of foliage.
+    pub fn strokes(&self, model: u32) -> Option<&Mesh> {
+        self.foliage.get(&model).map(|foliage| &foliage.strokes)
+    }
+
+    /// Whether a mesh consists of pieces that turn to the camera: points, lines, leaves.
+    pub fn turns(&self, key: MeshKey) -> bool {
+        match key {
+            MeshKey::Strokes(..) => true,
+            MeshKey::Pieces(model, _) => self.foliage.get(&model).is_some_and(|f| f.kind == PieceKind::Leaf),
+            _ => false,
+        }
     }
 
     /// The patch of level `n`.
@@ -158,7 +173,9 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, custom: &[PrimitiveMesh]) -> 
             Some(mesh) => mesh,
             None => &PrimitiveMesh::default(),
         },
-        MeshKey::Cut(..) | MeshKey::Geomorph(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
+        MeshKey::Cut(..) | MeshKey::Geomorph(..) | MeshKey::Pieces(..) | MeshKey::Strokes(..) => {
+            &PrimitiveMesh::default()
+        }
     };
     primitive_mesh(device, mesh)
 }
@@ -171,6 +188,18 @@ struct StrokeShape {
 
 const POINT: StrokeShape = StrokeShape { corners: &[0, 1, 2], triangles: &[[0, 1, 2]] };
 const LINE: StrokeShape = StrokeShape { corners: &[4, 5, 6, 7], triangles: &[[0, 1, 2], [0, 2, 3]] };
+const LEAF: StrokeShape = StrokeShape { corners: &[8, 9, 10, 11], triangles: &[[0, 1, 2], [0, 2, 3]] };
+
+impl FoliageMeshes {
+    fn new(device: &wgpu::Device, foliage: &Foliage) -> Self {
+        let kind = foliage.kind();
+        let (full, point_or_line) = match kind {
+            PieceKind::Bough => (primitive_mesh(device, foliage.mesh()), &LINE),
+            PieceKind::Leaf => (strokes_mesh(device, foliage.strokes(), &LEAF), &POINT),
+        };
+        Self { kind, full, strokes: strokes_mesh(device, foliage.strokes(), point_or_line) }
+    }
+}
 
 fn strokes_mesh(device: &wgpu::Device, strokes: &[Stroke], shape: &StrokeShape) -> Mesh {
     let corner = |s: &Stroke, c: u8| [s.from.extend(s.radius_m).to_array(), s.way.extend(f32::from(c)).to_array()];

@@ -8,6 +8,7 @@ use super::cuts::MorphedCut;
 use super::meshes::Mesh;
 use super::timing::Timing;
 use super::{Renderer, Target};
+use std::ops::Range;
 
 /// Finest patch level in the shadow map: its texels are coarser than finer patches.
 pub(super) const SHADOW_LEVEL: u8 = 2;
@@ -36,7 +37,7 @@ impl Renderer {
         }
         for strokes in [false, true] {
             pass.set_pipeline(if strokes { &self.pipelines.stroke_shadow } else { &self.pipelines.solid_shadow });
-            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.kind.mesh) == strokes) {
+            for run in picture.solids.iter().filter(|run| self.meshes.turns(run.kind.mesh) == strokes) {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
@@ -101,7 +102,7 @@ impl Renderer {
             draws += self.draw_tube(pass, tube, self.meshes.patch(tube.n), true);
         }
         pass.set_pipeline(&self.pipelines.solid_edges);
-        for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.kind.mesh)) {
+        for run in picture.solids.iter().filter(|run| !self.meshes.turns(run.kind.mesh)) {
             draws += self.draw_solids(pass, run, true);
         }
         draws + self.draw_skins(pass, picture, |_| &self.pipelines.solid_edges, true)
@@ -130,7 +131,7 @@ impl Renderer {
     fn pipeline_of(&self, run: &SolidRun) -> &wgpu::RenderPipeline {
         match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
-            _ if self.meshes.is_strokes(run.kind.mesh) => &self.pipelines.stroke,
+            _ if self.meshes.turns(run.kind.mesh) => &self.pipelines.stroke,
             (_, shading) if run.kind.tissue => self.pipelines.hide_of(true, shading),
             (_, shading) => self.pipelines.solid_of(shading, run.kind.texture > 0),
         }
@@ -158,18 +159,32 @@ impl Renderer {
             MeshKey::Geomorph(model, cut, to) => {
                 self.cuts.draw(pass, MorphedCut { model, cut, coarser: Some(to) }, edges, run.count)
             }
-            MeshKey::Part(model, rung, triangles) => {
-                self.meshes.part(model, rung).map_or(0, |mesh| draw_still(pass, mesh, edges, triangles, run.count))
+            MeshKey::Pieces(model, triangles) => {
+                let part = StillPart { triangles: 0..triangles, edges };
+                self.meshes.pieces(model).map_or(0, |mesh| draw_still(pass, mesh, part, run.count))
             }
-            key => self.meshes.solid(key).map_or(0, |mesh| draw_still(pass, mesh, edges, u32::MAX, run.count)),
+            MeshKey::Strokes(model, first, triangles) => {
+                let part = StillPart { triangles: first..first + triangles, edges };
+                self.meshes.strokes(model).map_or(0, |mesh| draw_still(pass, mesh, part, run.count))
+            }
+            key => {
+                let part = StillPart { triangles: 0..u32::MAX, edges };
+                self.meshes.solid(key).map_or(0, |mesh| draw_still(pass, mesh, part, run.count))
+            }
         }
     }
 }
 
+/// What is drawn of a mesh that is not morphing.
+struct StillPart {
+    triangles: Range<u32>,
+    edges: bool,
+}
+
 /// Draws a mesh that is not morphing: both ends of its geomorph are the mesh itself.
-fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, edges: bool, triangles: u32, count: u32) -> u32 {
+fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, part: StillPart, count: u32) -> u32 {
     pass.set_vertex_buffer(2, mesh.vertices());
-    mesh.draw_first(pass, edges, triangles, count)
+    mesh.draw_part(pass, part.edges, part.triangles, count)
 }
 
 fn depth(view: &wgpu::TextureView, clear: f32, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {

@@ -54,9 +54,9 @@ pub struct Pipelines {
     pub solids_shadowed: [RenderPipeline; 2],
     /// Skins of soft bodies that are tissue, plain and in soft shadow.
     pub hides: [RenderPipeline; 2],
-    /// Points and lines that turn to the camera.
+    /// Points, lines and leaves, which turn to the camera.
     pub stroke: RenderPipeline,
-    /// Points and lines in the shadow map.
+    /// The same in the shadow map.
     pub stroke_shadow: RenderPipeline,
     /// Boxes in cells.
     pub slab: RenderPipeline,
@@ -269,7 +269,7 @@ impl<'a> PipelineBuilder<'a> {
         self.create(&PipelineDesc { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
     }
 
-    /// Pipelines for points and lines, in the picture and in the shadow map.
+    /// Pipelines for points, lines and leaves, in the picture and in the shadow map.
     fn strokes(&self, module: &ShaderModule) -> [RenderPipeline; 2] {
         let tip = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
         let buffers = [
@@ -277,7 +277,7 @@ impl<'a> PipelineBuilder<'a> {
             layout(BODY_STRIDE, wgpu::VertexStepMode::Instance, &BODY),
         ];
         let topology = wgpu::PrimitiveTopology::TriangleList;
-        [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
+        [("vs_stroke", Some("fs_stroke")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
             self.create(&PipelineDesc { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
         })
     }

@@ -6,7 +6,7 @@ use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use metachron_render::{
-    Actor, Appearance, Camera, Form, Level, Material, Offscreen, RendererOptions, SceneView, Shading, Size, States,
+    Actor, Appearance, Camera, Form, Level, Material, MeshKey, Offscreen, RendererOptions, SceneView, Shading, Size, States,
     Style,
 };
 use metachron_scene::Source;
@@ -260,9 +260,34 @@ fn a_tree_of_points_and_lines_covers_about_what_the_whole_tree_does() {
     assert!(whole > 300.0, "{whole}");
     for (trunk, leaves) in [(124, 240), (124, 60), (60, 20)] {
         let share = covered(trunk, leaves) / whole;
-        // leaves that face away are not drawn at the finest rung, and few large points overlap less
-        assert!((0.6..1.7).contains(&share), "{trunk} and {leaves}: {share}");
+        // few large points overlap less
+        assert!((0.7..1.4).contains(&share), "{trunk} and {leaves}: {share}");
     }
+    // from strokes alone to all in full in twelve steps, near enough for lines of two pixels
+    let steps: Vec<f64> = (0..=12).map(|k| covered(124 + 496 * k / 12, 240 + 20 * k) / whole).collect();
+    let most = steps.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+    assert!(most < 0.05, "{steps:?}");
+}
+
+#[test]
+fn thick_boughs_and_thin_ones_are_drawn_at_once_each_by_its_width() {
+    let spec = TreeSpec { seed: 3, height_m: 5.0, branches: 62, leaves: 240, prefix: false };
+    let parts = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
+    let mut stage = stage(&parts[..1], 1.0);
+    let mut runs = |distance: f64| {
+        let camera = Camera::looking(DVec3::new(0.0, -distance, 2.0), DVec3::new(0.0, 0.0, 2.0), FOV_RAD);
+        stage.survey(&camera, Size { width: 1280, height: 960 });
+        let picture = stage.compose(&camera, &[level(230, Shading::PerPixel)], Style::default(), None);
+        picture.solids.iter().fold((0, 0), |(full, lines), run| match run.kind.mesh {
+            MeshKey::Pieces(_, triangles) => (full + triangles, lines),
+            MeshKey::Strokes(_, _, triangles) => (full, lines + triangles),
+            _ => (full, lines),
+        })
+    };
+    // (230 - 2 · 62)/8 boughs in full, and near by those of more than 20 pixels, which leave fewer lines to the others
+    let (far, near) = (runs(40.0), runs(5.0));
+    assert_eq!(far, (130, 98));
+    assert!(near.0 > 130 && near.0 < 230 && near.1 > 0 && near.0 + near.1 <= 230, "{near:?}");
 }
 
 #[test]

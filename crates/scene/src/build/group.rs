@@ -1,6 +1,7 @@
-//! Reads the groups of a scene file: scenery that may be drawn as one mesh.
+//! Reads the groups of a scene file: scenery, and groups of it, that may be drawn as one mesh.
 //!
-//! In: `[[group]]` tables and all scenery. Out: groups, and the scenery reordered so that the members of a group are adjacent.
+//! In: `[[group]]` tables and all scenery. Out: groups, inner ones first, and the scenery reordered so that the members of a group are
+//! adjacent.
 //! Never here: the mesh that replaces them, and when it is drawn.
 
 use super::impostors::impostors;
@@ -25,7 +26,7 @@ pub(crate) fn groups(
         c.wrong(&Place::new("", ""), "group", format_args!("has {} entries", files.len()), expected);
         return Vec::new();
     }
-    let mut owner = vec![None; objects.scenery.len()];
+    let mut owners = Owners { scenery: vec![None; objects.scenery.len()], groups: vec![None; files.len()] };
     for (number, file) in files.iter().enumerate() {
         let place = group_place(number, file);
         if objects.names.is_known(&file.name) || files[..number].iter().any(|other| other.name == file.name) {
@@ -36,23 +37,69 @@ pub(crate) fn groups(
                 "expected a unique name",
             );
         }
-        claim(c, number, file, objects, &mut owner);
+        claim(c, number, files, objects, &mut owners);
     }
-    let mut order: Vec<usize> = (0..owner.len()).collect();
-    // scenery of no group first, then group by group
-    order.sort_by_key(|&i| owner[i].map_or(0, |group: usize| group + 1));
-    objects.scenery = order.iter().map(|&i| objects.scenery[i].clone()).collect();
-    let mut start = owner.iter().filter(|group| group.is_none()).count();
+    if let Some(number) = owners.in_itself() {
+        let what = format_args!("put group `{}` into itself", files[number].name);
+        let expected = "expected groups that contain each other in one direction";
+        c.wrong(&group_place(number, &files[number]), "members", what, expected);
+        return Vec::new();
+    }
+    let order = owners.inner_first();
+    let rank: Vec<usize> = (0..files.len()).map(|g| order.iter().position(|o| *o == g).unwrap_or(g)).collect();
+    // scenery of no group first, then group by group, so that a group's own comes after that of the groups in it
+    let key = |i: &usize| owners.scenery[*i].map_or(0, |group| rank[group] + 1);
+    let mut sorted: Vec<usize> = (0..owners.scenery.len()).collect();
+    sorted.sort_by_key(key);
+    objects.scenery = sorted.iter().map(|&i| objects.scenery[i].clone()).collect();
+    let before = |rank: usize| sorted.iter().filter(|i| key(i) <= rank).count();
     let mut made = Vec::with_capacity(files.len());
-    for (number, file) in files.iter().enumerate() {
-        let end = start + owner.iter().filter(|group| **group == Some(number)).count();
-        let place = group_place(number, file);
-        if let Some((proxy, levels)) = impostors(c, &place, file, &objects.scenery[start..end], source) {
-            made.push(Group { proxy, levels, members: start..end });
+    for (at, &number) in order.iter().enumerate() {
+        let first = at - order[..at].iter().filter(|&&other| owners.is_within(other, number)).count();
+        let members = before(first)..before(at + 1);
+        let place = group_place(number, &files[number]);
+        if let Some((proxy, levels)) = impostors(c, &place, &files[number], &objects.scenery[members.clone()], source) {
+            made.push(Group { proxy, levels, members, groups: first..at });
         }
-        start = end;
     }
     made
+}
+
+/// For every object of the scenery and for every group the group that it is in.
+struct Owners {
+    scenery: Vec<Option<usize>>,
+    groups: Vec<Option<usize>>,
+}
+
+impl Owners {
+    /// The groups around a group, from within; endless where one is in itself.
+    fn around(&self, group: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::successors(self.groups[group], |outer| self.groups[*outer])
+    }
+
+    /// The first group that is in itself.
+    fn in_itself(&self) -> Option<usize> {
+        let all = self.groups.len();
+        (0..all).find(|group| self.around(*group).take(all).any(|outer| outer == *group))
+    }
+
+    fn is_within(&self, inner: usize, outer: usize) -> bool {
+        self.around(inner).any(|group| group == outer)
+    }
+
+    /// All groups, each after those in it, which come directly before it.
+    fn inner_first(&self) -> Vec<usize> {
+        let mut order = Vec::with_capacity(self.groups.len());
+        self.push_within(None, &mut order);
+        order
+    }
+
+    fn push_within(&self, outer: Option<usize>, order: &mut Vec<usize>) {
+        for group in (0..self.groups.len()).filter(|group| self.groups[*group] == outer) {
+            self.push_within(Some(group), order);
+            order.push(group);
+        }
+    }
 }
 
 /// The place of group `number` in the scene file.
@@ -60,34 +107,33 @@ fn group_place(number: usize, file: &GroupFile) -> Place {
     Place::new(format!("group.{number}"), format!("of group `{}`", file.name))
 }
 
-/// Assigns its members to group `number`; `owner` holds the group of every object of the scenery.
-fn claim(c: &mut Checker<'_, '_>, number: usize, file: &GroupFile, objects: &Objects, owner: &mut [Option<usize>]) {
-    let place = &group_place(number, file);
-    if file.members.is_empty() {
-        c.wrong(place, "members", "is empty", "expected names of meshes and trees");
+/// Assigns its members to group `number`.
+fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &Objects, owners: &mut Owners) {
+    let place = &group_place(number, &files[number]);
+    if files[number].members.is_empty() {
+        c.wrong(place, "members", "is empty", "expected names of meshes, trees and groups");
     }
-    for (at, wanted) in file.members.iter().enumerate() {
+    for (at, wanted) in files[number].members.iter().enumerate() {
         let key = format!("members.{at}");
-        let found: Vec<usize> = (0..owner.len()).filter(|&i| is_meant(&objects.scenery[i].name, wanted)).collect();
         let others = objects.names.only(|named| named != NamedObject::Scenery);
         if let Some(other) = others.into_iter().find(|name| is_meant(name, wanted)) {
             let what = format_args!("names `{other}`, which is neither mesh nor tree");
-            return c.wrong(
-                place,
-                &key,
-                what,
-                "expected scenery: simulated and fixed objects cannot be members of a group",
-            );
+            let expected = "expected scenery and groups: simulated and fixed objects cannot be members of a group";
+            return c.wrong(place, &key, what, expected);
         }
-        if found.is_empty() {
-            c.reference(place, &key, wanted, objects.names.only(|named| named == NamedObject::Scenery));
-        }
-        for i in found {
-            if owner[i].is_some_and(|other| other != number) {
-                let what = format_args!("names `{}`, which is in another group", objects.scenery[i].name);
+        let scenery = objects.scenery.iter().map(|it| &it.name).zip(&mut owners.scenery);
+        let groups = files.iter().map(|file| &file.name).zip(&mut owners.groups);
+        let mut found = 0;
+        for (name, owner) in scenery.chain(groups).filter(|(name, _)| is_meant(name, wanted)) {
+            if owner.is_some_and(|other| other != number) {
+                let what = format_args!("names `{name}`, which is in another group");
                 return c.wrong(place, &key, what, "expected every object in one group at most");
             }
-            owner[i] = Some(number);
+            *owner = Some(number);
+            found += 1;
+        }
+        if found == 0 {
+            c.reference(place, &key, wanted, objects.names.only(|named| named == NamedObject::Scenery));
         }
     }
 }
@@ -103,6 +149,7 @@ fn is_meant(name: &str, wanted: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use crate::{Source, load};
+    use metachron_world::Scene;
 
     /// The problems of a scene with a group of these members, a mesh `a1` and a falling ball `a2`; empty if there are none.
     fn message(members: &str) -> String {
@@ -121,5 +168,42 @@ mod tests {
             assert!(message.contains("names `a2`, which is neither mesh nor tree"), "{members}: {message}");
         }
         assert!(message("[\"b*\"]").contains("does not exist"));
+    }
+
+    /// Four meshes and these groups of name and members.
+    fn nested(groups: &[(&str, &str)]) -> Result<Scene, String> {
+        let mesh = "format = 1\n[[object]]\nname = \"b\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\ntriangles = 200\ngrid = [4, 1, 1]\nspacing_m = [3, 3, 0]\n";
+        let group = |(name, members): &(&str, &str)| format!("[[group]]\nname = \"{name}\"\nmembers = [{members}]\n");
+        let text = mesh.to_owned() + &groups.iter().map(group).collect::<String>();
+        let loaded = Source::memory("nested", text.as_bytes()).and_then(|source| load(&source, &[]));
+        loaded.map_err(|problems| format!("{problems:?}"))
+    }
+
+    #[test]
+    fn a_group_of_groups_holds_all_that_is_in_them_and_comes_after_them() {
+        let scene =
+            nested(&[("all", "\"left\", \"b-3\", \"right\""), ("right", "\"b-2\""), ("left", "\"b-0\", \"b-1\"")])
+                .unwrap();
+        let of = |name: &str| scene.groups.iter().position(|group| group.proxy.name == name).unwrap();
+        let all = &scene.groups[of("all")];
+        assert_eq!((of("all"), all.groups.clone(), all.members.len()), (2, 0..2, 4));
+        for (name, members) in [("left", vec!["b-0", "b-1"]), ("right", vec!["b-2"])] {
+            let group = &scene.groups[of(name)];
+            let names: Vec<_> = scene.scenery[group.members.clone()].iter().map(|it| it.name.as_str()).collect();
+            assert_eq!((names, group.groups.len()), (members, 0));
+        }
+        // the impostor of all of them spans the four of them
+        let extent = all.proxy.model.extent();
+        assert!(extent.radius > 4.5, "{extent:?}");
+    }
+
+    #[test]
+    fn a_group_in_itself_is_refused_with_its_name() {
+        let direct = nested(&[("g", "\"b-0\", \"g\"")]).unwrap_err();
+        assert!(direct.contains("put group `g` into itself"), "{direct}");
+        let round = nested(&[("g", "\"b-0\", \"h\""), ("h", "\"b-1\", \"g\"")]).unwrap_err();
+        assert!(round.contains("put group `g` into itself"), "{round}");
+        let twice = nested(&[("g", "\"b-0\""), ("h", "\"g\""), ("k", "\"g\"")]).unwrap_err();
+        assert!(twice.contains("names `g`, which is in another group"), "{twice}");
     }
 }

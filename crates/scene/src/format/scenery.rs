@@ -69,15 +69,15 @@ pub struct TreeFile {
     pub rotation_deg: Option<Point>,
 }
 
-/// Meshes and trees that may be drawn as one mesh instead, which has levels of its own.
+/// Meshes, trees and groups of them that may be drawn as one mesh instead, which has levels of its own.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupFile {
     /// The group's name: unique among objects and groups.
     #[schemars(length(min = 1, max = 64))]
     pub name: String,
-    /// Names of its meshes and trees; one that ends in `*` selects every name that begins with the part before it. No object is
-    /// in two groups.
+    /// Names of its meshes, trees and groups; one that ends in `*` selects every name that begins with the part before it. Nothing is
+    /// in two groups, and no group in itself.
     #[schemars(length(min = 1, max = 10_000))]
     pub members: Vec<String>,
     /// The mesh that replaces all of them, reduced to `levels`. Default: one made of their own coarse meshes.

@@ -4,7 +4,7 @@
 //! path has 1000 frames, with most trees in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
 
 use super::camera_path::{CameraPath, stop};
-use super::{Choices, FLOOR, head};
+use super::{Choices, head};
 
 /// A kind of tree.
 struct Kind {
@@ -22,6 +22,9 @@ const KINDS: [Kind; 3] = [
     Kind { name: "beech", branches: 89, leaves: 360, leaves_colour: "#5a8a42" },
     Kind { name: "oak", branches: 174, leaves: 900, leaves_colour: "#47713c" },
 ];
+/// The sky, and the ground.
+const SKY: &str = "\n[world]\nenvironment = \"sky\"\n";
+const MEADOW: &str = "\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\ncolour = \"#67743a\"\n";
 /// Side of the square for 600 trees, metres; the area grows with their number.
 const SIDE_M: f64 = 240.0;
 const TREES: f64 = 600.0;
@@ -36,10 +39,11 @@ pub(super) fn text(choices: &Choices) -> String {
         &format!("a walk along a grove of {} trees", choices.trees),
         &path(choices.zigzag, side_m),
     );
+    text += SKY;
     for (number, kind) in (0..).zip(KINDS) {
         text += &trees(choices, number, &kind, 0.5 * side_m);
     }
-    text + FLOOR
+    text + MEADOW
 }
 
 fn trees(choices: &Choices, number: u32, kind: &Kind, half_m: f64) -> String {

@@ -125,8 +125,8 @@ mod tests {
             let each = [620, 480, 890, 720, 1740, 1800].map(of);
             assert_eq!(each.iter().sum::<u32>(), 2 * trees);
             assert!(each.iter().all(|n| n.abs_diff(trees / 3) <= 1), "{each:?}");
-            let rungs = |it: &Model| if let Model::Foliage(foliage) = it { foliage.rungs().len() } else { 0 };
-            assert!(scene.scenery.iter().all(|it| (rungs(&it.model) == 1) == prefix));
+            let strokes = |it: &Model| matches!(it, Model::Foliage(foliage) if !foliage.full_only());
+            assert!(scene.scenery.iter().all(|it| strokes(&it.model) != prefix));
         }
     }
 

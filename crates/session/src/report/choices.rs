@@ -29,6 +29,8 @@ pub struct ChoiceSummary {
     pub lag_ms: Option<Spread>,
     /// Objects in view that were left out for lack of time, over all frames.
     pub holes: Option<u64>,
+    /// Passes of a hierarchical search that goes on from the frame before (MB97); `None` for other policies.
+    pub passes: Option<Spread>,
     /// Fraction of its width and height that the picture was drawn with; `None` without a frame.
     pub render_scale: Option<ScaleSummary>,
     /// Share of the frames in which objects threw shadows, where the light does; `None` without a frame.
@@ -67,6 +69,7 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         draw_ms: spread(|row| row.draw_ms),
         lag_ms: spread(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
+        passes: some(|row| (row.passes > 0).then_some(f64::from(row.passes))),
         render_scale: scales(frames),
         shadows: Spread::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
     }

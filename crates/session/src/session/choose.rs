@@ -9,6 +9,7 @@ use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
 use metachron_lod::control::Backdrop;
 use metachron_render::{Camera, Hand, Picture, Size, Style};
+use metachron_runtime::AgentHandle;
 use std::time::Duration;
 
 impl Session {
@@ -97,6 +98,21 @@ impl Session {
     fn backdrop(&self, size: Size, triangles: f64) -> Backdrop {
         let drawn = size.scaled(self.control.render_scale());
         Backdrop { pixels: drawn.pixels(), enlarged: if drawn == size { 0.0 } else { size.pixels() }, triangles }
+    }
+
+    /// Logic done elsewhere while a frame was drawn in `draw`: the next choice, and what the steps of agents took of each core. In virtual
+    /// time agents do not slow the drawing.
+    pub fn logic_beside(&mut self, draw: Duration) -> Duration {
+        let next = self.chosen.select_next.unwrap_or_default();
+        if self.is_virtual() {
+            return next;
+        }
+        let cpu_s = self.world.agents().iter().map(AgentHandle::cpu_s).sum::<f64>();
+        let now = self.now();
+        let (then, before_s) = std::mem::replace(&mut self.agents_cpu, (now, cpu_s));
+        let all_s = now.saturating_sub(then).as_secs_f64() * f64::from(self.cores());
+        let share = if all_s > 0.0 { ((cpu_s - before_s) / all_s).clamp(0.0, 1.0) } else { 0.0 };
+        next + draw.mul_f64(share)
     }
 
     /// Declared time of finding visible objects; zero in real time, where it is measured.

@@ -35,6 +35,7 @@ impl Session {
             changes: plan.changes,
             reversals: plan.reversals,
             holes: promise.holes,
+            passes: promise.passes,
             eps: self.control.eps_hat(),
             n,
             render_scale: self.scene_view.picture().scale,

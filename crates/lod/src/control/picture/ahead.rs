@@ -101,7 +101,7 @@ impl PictureControl {
     }
 
     /// Time of the objects in view at these levels by the prices, seconds.
-    fn drawn_s(&self, levels: &[LevelDemand]) -> f64 {
+    pub(super) fn drawn_s(&self, levels: &[LevelDemand]) -> f64 {
         let prices = self.picture_prices();
         prices.objects_s(self.views.iter().map(|seen| &seen.view), levels)
     }

@@ -2,6 +2,7 @@
 
 mod ahead;
 mod groups;
+mod papers;
 mod policies;
 
 use super::super::view::{Kind, Shading};
@@ -13,7 +14,7 @@ use std::time::Duration;
 
 /// A frame in which nothing is done but drawing.
 fn frame_work(work: Duration, skip: bool) -> FrameWork {
-    FrameWork { work, draw: work, skip }
+    FrameWork { work, draw: work, skip, ..FrameWork::default() }
 }
 
 /// A machine that draws: 1.4 ms + 6 ns for 921,600 pixels + 0.22 µs a triangle on two cores with Mesa, times `slower`.
@@ -217,7 +218,7 @@ fn an_object_out_of_view_takes_no_polygons_and_returns_at_once() {
 #[test]
 fn feedback_draws_the_members_of_a_group_as_themselves() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
-    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
+    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), groups: (0, 0), impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
     run.objects.push(object(9, kind, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
     let mesh = Kind::Counted { radius_m: 0.1, least: 20, most: 50_000 };
     run.objects.push(object(7, mesh, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) }));

@@ -13,7 +13,7 @@ fn vs_floor(@builtin(vertex_index) corner: u32) -> Ground {
     let centre = g.focus.xyz - n * dot(g.focus.xyz - g.floor_point.xyz, n);
     let s = vec2f(f32(corner & 1u), f32(corner >> 1u)) * 2.0 - 1.0;
     var out: Ground;
-    out.p = centre + (x * s.x + y * s.y) * (5.0 * g.focus.w);
+    out.p = centre + (x * s.x + y * s.y) * (select(300.0, 5.0, FADES) * g.focus.w);
     out.clip = clip(out.p);
     return out;
 }
@@ -23,7 +23,7 @@ fn fs_floor(in: Ground) -> @location(0) vec4f {
     let within = pool(in.p);
     let share = lit(shadow_place(in.p, g.floor_normal.xyz)) * within;
     let far = far_out(in.p);
-    let back = background(in.p - g.eye.xyz);
+    let back = behind(in.p - g.eye.xyz);
     return ground(paint(), in.p.xy * 10.0, vec3f(within, haze(far), line_share(far)), share, back);
 }
 
@@ -46,14 +46,23 @@ fn far_out(p: vec3f) -> f32 {
     return length(arm - g.floor_normal.xyz * dot(arm, g.floor_normal.xyz)) / g.focus.w;
 }
 
-// How far the floor has faded into the background.
-fn haze(far: f32) -> f32 {
-    return smoothstep(0.9, 2.8, far);
+// What lies behind everything in a direction of view: in the open the ground reaches to the horizon, whose haze is all that is below it.
+fn behind(direction: vec3f) -> vec3f {
+    if FADES {
+        return background(direction);
+    }
+    let d = normalize(direction);
+    return background(vec3f(d.x + 1e-6, d.y, max(d.z, 0.0)));
 }
 
-// Strength of the grid's lines.
+// How far the floor has faded into the background: a room's at its end, in the open by the air in between.
+fn haze(far: f32) -> f32 {
+    return select(1.0 - exp(-0.05 * far), smoothstep(0.9, 2.8, far), FADES);
+}
+
+// Strength of the grid's lines: there are none in the open.
 fn line_share(far: f32) -> f32 {
-    return 0.16 * (1.0 - smoothstep(0.5, 3.0, far));
+    return select(0.0, 0.16, FADES) * (1.0 - smoothstep(0.5, 3.0, far));
 }
 
 // The floor's light. `lines` are its coordinates in spaces of the grid; `air`: within the pool, haze, strength of the lines.
@@ -127,12 +136,12 @@ fn vs_floor_rings(@builtin(vertex_index) vertex: u32) -> Cell {
 
 @fragment
 fn fs_floor_patch(in: Cell) -> @location(0) vec4f {
-    return ground(Paint(in.key, in.sky), in.lines, in.air, lit(in.at) * in.air.x, background(in.direction));
+    return ground(Paint(in.key, in.sky), in.lines, in.air, lit(in.at) * in.air.x, behind(in.direction));
 }
 
 @fragment
 fn fs_floor_rings(in: Cell) -> @location(0) vec4f {
-    return ground(Paint(in.key, in.sky), in.lines, in.air, in.air.x, background(in.direction));
+    return ground(Paint(in.key, in.sky), in.lines, in.air, in.air.x, behind(in.direction));
 }
 
 struct Room {
@@ -150,5 +159,5 @@ fn vs_room(@builtin(vertex_index) corner: u32) -> Room {
 
 @fragment
 fn fs_room(in: Room) -> @location(0) vec4f {
-    return finish(background(in.direction));
+    return finish(behind(in.direction));
 }

@@ -19,7 +19,7 @@ impl Chooser for RobinHood {
     fn choose(&mut self, _: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
         let instances: Vec<_> = seen.iter().map(|s| instance(self.0, scene, s)).collect();
         let drawing = Overlap::Printed(PRINTED_C).drawing(time.target, time.logic);
-        let shared = distribute(drawing, &instances, TooLittle::Part);
+        let shared = distribute(drawing, &instances);
         // `distribute` takes forms best first; levels are ordered best last
         let pick = |(i, s): (usize, &VisibleObject)| match shared.form[i] {
             Some(form) => part_of(&shared, i, s.levels.len() as u32 - 1 - form, scene, s),
@@ -38,6 +38,7 @@ fn instance(value: Value, scene: &Scene, s: &VisibleObject) -> Instance {
         complexity: object.complexity,
         value: value.of(area, s.depth_m.max(object.radius_m), s.distance_m, object.importance),
         forms: s.levels.iter().rev().map(|(cost, _)| *cost).collect(),
+        too_little: TooLittle::Part,
     }
 }
 
