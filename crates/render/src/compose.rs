@@ -10,7 +10,7 @@ use super::picture::{
     Colouring, MeshKey, Picture, SkinSample, SolidInstance, Style, TubeRun, age_colour, detail_colour,
     resolution_colour,
 };
-use super::scene_view::{Appearance, Form, Material, SceneView, Track};
+use super::scene_view::{Appearance, Form, Material, SceneView, StaticShape, Track};
 use super::skin::{ShownSkin, SkinOptions, SkinScratch, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec2, DVec3, Vec3};
@@ -79,7 +79,11 @@ impl SceneView {
                 track.geomorph = None;
             }
         }
-        self.statics.iter().for_each(|prop| add_static(prop, &mut picture, &mut scratch.solids));
+        let shaded = picture.environment.throws_shadows().then(|| LightColumn::of(&picture));
+        let shades = |prop: &StaticShape| shaded.is_some_and(|column| column.holds(prop.position, prop.body.radius_m));
+        for prop in self.statics.iter().filter(|prop| prop.seen || shades(prop)) {
+            add_static(prop, &mut picture, &mut scratch.solids);
+        }
         self.add_grasps(&picture, &mut scratch);
         if let Some((from, to)) =
             hand.and_then(|hand| Some((self.anchor_position(hand.object, hand.anchor)?, hand.target)))

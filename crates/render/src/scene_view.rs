@@ -10,7 +10,7 @@ use super::pose;
 use super::tessellation::SkinEdges;
 use super::texturing::Painting;
 use super::view::{Camera, Size};
-use super::visibility::Visibility;
+use super::visibility::{Survey, Visibility};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use metachron_geometry::SurfaceShape;
@@ -146,6 +146,7 @@ pub struct SceneView {
     pub(super) statics: Vec<StaticShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
+    pub(super) survey: Survey,
     /// Results of the last survey, and the camera and picture size of that survey.
     pub(super) found: Vec<Visibility>,
     /// The actors that the last survey updated.
@@ -192,6 +193,8 @@ pub(super) struct StaticShape {
     pub position: DVec3,
     pub rotation: DQuat,
     pub body: BodyShape,
+    /// Whether the camera may see it.
+    pub seen: bool,
 }
 
 /// The mesh of a solid that is not a primitive, and the size of any solid.
@@ -381,7 +384,12 @@ impl StaticShape {
     fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
-        Self { solid, appearance: prop.appearance, position, rotation, body }
+        Self { solid, appearance: prop.appearance, position, rotation, body, seen: true }
+    }
+
+    /// A bounding ball and box; without a size for a plane.
+    pub fn bounds(&self) -> Bounds {
+        Bounds { centre: self.position, radius_m: self.body.radius_m, half_m: self.half_extents() }
     }
 
     /// Half extents of the axis-aligned bounding box about its position, metres.

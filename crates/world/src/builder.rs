@@ -7,10 +7,10 @@ use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
-use super::scene::{Appearance, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
+use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Obstacle, Solid};
+use metachron_geometry::{Cells, Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
 use std::sync::Arc;
@@ -330,6 +330,8 @@ impl SceneBuilder {
                 gains: Gains::default(),
                 lag: None,
                 raise: false,
+                may_vanish: false,
+                factors: Factors::default(),
                 render_scale: RENDER_SCALE,
             },
             camera: None,
@@ -339,6 +341,7 @@ impl SceneBuilder {
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
+            cells: Cells::default(),
             contacts: true,
             joints: Arc::new([]),
             couplings: Vec::new(),
@@ -356,6 +359,7 @@ const DEFAULT_APPEARANCE: Appearance = Appearance {
     colour: [200, 160, 150],
     material: Material::Plastic,
     importance: 1.0,
+    may_vanish: None,
     shading: ShadingKind::PerPixel,
 };
 

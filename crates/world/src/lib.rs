@@ -36,7 +36,7 @@ pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
 pub use initial_overlap::Moved;
 pub use overlap::Overlap;
 pub use scene::{
-    Appearance, Camera, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe, RENDER_SCALE,
+    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe, RENDER_SCALE,
     Scene, Scenery, Spec, Target, View,
 };
 pub use spec::Division;

@@ -122,6 +122,7 @@ const POLICIES: &[Entry] = &[
     entry::<policies::still::Still>(),
     entry::<policies::selection::Selection>(),
     entry::<policies::bound::Bound>(),
+    entry::<policies::scanline::Scanline>(),
     entry::<policies::every::Every>(),
 ];
 

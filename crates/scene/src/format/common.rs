@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 17] = [
+pub const COMMON_KEYS: [&str; 18] = [
     "name",
     "rate_hz",
     "dt_ms",
@@ -14,6 +14,7 @@ pub const COMMON_KEYS: [&str; 17] = [
     "tolerance_m",
     "n",
     "importance",
+    "may_vanish",
     "colour",
     "material",
     "shading",
@@ -52,6 +53,9 @@ pub struct CommonFile {
     /// Weight of the object's picture relative to that of others, 0.001 … 1000. Default 1.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub importance: Option<f64>,
+    /// Whether greedy and marginal policies and `adaptive` may leave the object out of the picture where time is short, at the price of its
+    /// whole benefit. Default: that of `[target]`.
+    pub may_vanish: Option<bool>,
     /// Colour as `#rrggbb` (sRGB). Default: by material.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
     pub colour: Option<String>,

@@ -29,6 +29,12 @@ pub struct ChoiceSummary {
     pub lag_ms: Option<Spread>,
     /// Objects in view that were left out for lack of time, over all frames.
     pub holes: Option<u64>,
+    /// Objects per frame in cells that the eye reached through portals, and those in no cell in view.
+    pub potentially_visible: Option<f64>,
+    /// Objects per frame in view: where there are cells, those that portals leave in view.
+    pub visible: Option<f64>,
+    /// Objects per frame in view that were drawn: as themselves, not left out and not replaced by an impostor.
+    pub drawn: Option<f64>,
     /// Fraction of its width and height that the picture was drawn with; `None` without a frame.
     pub render_scale: Option<ScaleSummary>,
 }
@@ -65,6 +71,9 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         draw_ms: spread(|row| row.draw_ms),
         lag_ms: spread(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
+        potentially_visible: spread(|row| row.potentially_visible as f64).map(|s| s.mean),
+        visible: spread(|row| row.objects as f64).map(|s| s.mean),
+        drawn: spread(|row| row.drawn as f64).map(|s| s.mean),
         render_scale: scales(frames),
     }
 }

@@ -3,6 +3,7 @@
 mod ahead;
 mod groups;
 mod policies;
+mod vanishing;
 
 use super::super::view::{Kind, Shading};
 use super::*;
