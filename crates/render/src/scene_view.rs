@@ -137,6 +137,8 @@ pub struct StaticObject {
     pub obstacle: Obstacle,
     /// Its colour and material.
     pub appearance: Appearance,
+    /// Whether it throws a shadow, and the light is fitted to it: walls and ceilings of rooms do not, or it would be dark in them.
+    pub throws_shadow: bool,
 }
 
 /// All objects that can be drawn, and their states at the time of a frame.
@@ -193,6 +195,7 @@ pub(super) struct StaticShape {
     pub position: DVec3,
     pub rotation: DQuat,
     pub body: BodyShape,
+    pub throws_shadow: bool,
     /// Whether the camera may see it.
     pub seen: bool,
 }
@@ -384,7 +387,8 @@ impl StaticShape {
     fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
-        Self { solid, appearance: prop.appearance, position, rotation, body, seen: true }
+        let StaticObject { appearance, throws_shadow, .. } = prop;
+        Self { solid, appearance, position, rotation, body, throws_shadow, seen: true }
     }
 
     /// A bounding ball and box; without a size for a plane.

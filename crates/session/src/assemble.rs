@@ -117,8 +117,12 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
     });
     let actors = agents.chain(still);
-    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances);
-    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
+    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances).enumerate();
+    let props = props.map(|(at, (obstacle, wish))| StaticObject {
+        obstacle: obstacle.clone(),
+        appearance: appearance(wish),
+        throws_shadow: !scene.walls.contains(&at),
+    });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
     scene_view.set_cells(scene.cells.clone());
     scene_view.set_environment(match scene.environment {

@@ -4,11 +4,11 @@ use super::super::bounds_tree::Random;
 use super::super::scene_view::{Actor, Appearance, Form, Material, States};
 use super::*;
 use metachron_core::{RigidState, SimTime, Snapshot};
-use metachron_geometry::{Cell, Portal, Solid};
+use metachron_geometry::{Portal, Solid};
 use std::sync::Arc;
 
 const SIZE: Size = Size { width: 160, height: 90 };
-const BALLS: u32 = 150;
+const BALLS: u32 = 300;
 
 /// The cells and portals of a built-in scene.
 fn cells_of(scene: &str) -> Cells {
@@ -45,7 +45,7 @@ fn balls(cells: &Cells, random: &mut Random) -> (SceneView, Vec<(DVec3, f64)>) {
     let low = cells.all().iter().map(|cell| cell.low_m).reduce(DVec3::min).unwrap() - 2.0;
     let high = cells.all().iter().map(|cell| cell.high_m).reduce(DVec3::max).unwrap() + 2.0;
     let places: Vec<_> =
-        (0..BALLS).map(|_| (low + (high - low) * random.point(), 0.05 + 0.6 * random.next())).collect();
+        (0..BALLS).map(|_| (low + (high - low) * random.point(), 0.1 + 0.9 * random.next())).collect();
     let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
     let actor = |(id, (_, radius_m)): (u32, &(DVec3, f64))| Actor {
         id: AgentId(id),
@@ -118,7 +118,7 @@ fn no_object_that_a_ray_sees_is_missed() {
             let is_seen = |at: usize| scene_view.seen()[at].visible;
             in_frustum += balls.iter().filter(|(centre, radius_m)| frustum.sees(*centre, *radius_m)).count();
             found += (0..balls.len()).filter(|at| is_seen(*at)).count();
-            for _ in 0..40 {
+            for _ in 0..60 {
                 let pixel = glam::DVec2::new(160.0 * random.next(), 90.0 * random.next());
                 let ray = camera.ray(pixel, SIZE).direction;
                 let most = reach_of(&cells, eye, ray);

@@ -20,6 +20,7 @@ mod machine;
 mod metrics;
 mod played;
 mod scene;
+pub(super) mod rooms;
 pub(super) mod scanline;
 pub(super) mod selection;
 pub(super) mod still;
