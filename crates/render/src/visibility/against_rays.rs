@@ -134,7 +134,7 @@ fn no_object_that_a_ray_sees_is_missed() {
         }
         assert!(hit > 1000 && found < in_frustum, "{name}: {hit} hits, {found} of {in_frustum} in the frustum");
         if name == "maze" {
-            assert!(2 * found < in_frustum, "{found} of {in_frustum}: a maze hides more than half");
+            assert!(4 * found < 3 * in_frustum, "{found} of {in_frustum}: a maze hides more than a quarter");
         }
     }
 }
