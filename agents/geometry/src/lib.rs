@@ -23,6 +23,7 @@
 pub mod aabb;
 pub mod cage;
 pub mod capsule_chain;
+pub mod cells;
 pub mod closest_points;
 pub mod collision_shape;
 pub mod contact_traits;
@@ -49,6 +50,7 @@ pub mod topology;
 
 pub use aabb::Aabb;
 pub use cage::{Cage, CageCell, Carried, cage_counts};
+pub use cells::{Cell, Cells, CellsError, Exposure, Portal, Region, Side};
 pub use closest_points::{near_segments, near_triangle};
 pub use collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,

@@ -70,6 +70,7 @@ fn stage() -> Vec<ObjectView> {
         off_centre: 0.0,
         from_focus_m: 0.0,
         visible: true,
+        may_vanish: false,
     };
     let tube = Kind::Tube { length_m: 1.6, radius_m: 0.015 };
     let mut stage = vec![object(0, tube, ResolutionRange { eps_m: (5e-4, 0.04), n: (0, 5) }, 1e9)];

@@ -22,6 +22,7 @@
 //! ```
 #[cfg(feature = "gpu")]
 mod benchmark;
+mod bounds_tree;
 mod compose;
 #[cfg(feature = "gpu")]
 mod draw;
@@ -36,6 +37,7 @@ mod lod_transition;
 pub mod offscreen;
 mod pick;
 mod picture;
+mod portals;
 mod pose;
 mod scene_view;
 mod skin;
@@ -65,4 +67,4 @@ pub use tessellation::skin_divisions;
 #[cfg(feature = "gpu")]
 pub use upscale::{Upscaled, Upscaler};
 pub use view::{Camera, Frustum, Ray, Size};
-pub use visibility::Visibility;
+pub use visibility::{Visibility, VisibleCounts};

@@ -10,7 +10,7 @@ use super::pose;
 use super::tessellation::SkinEdges;
 use super::texturing::Painting;
 use super::view::{Camera, Size};
-use super::visibility::Visibility;
+use super::visibility::{Survey, Visibility};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use metachron_geometry::SurfaceShape;
@@ -137,6 +137,8 @@ pub struct StaticObject {
     pub obstacle: Obstacle,
     /// Its colour and material.
     pub appearance: Appearance,
+    /// Whether it throws a shadow, and the light is fitted to it: walls and ceilings of rooms do not, or it would be dark in them.
+    pub throws_shadow: bool,
 }
 
 /// All objects that can be drawn, and their states at the time of a frame.
@@ -146,6 +148,7 @@ pub struct SceneView {
     pub(super) statics: Vec<StaticShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
+    pub(super) survey: Survey,
     /// Results of the last survey, and the camera and picture size of that survey.
     pub(super) found: Vec<Visibility>,
     /// The actors that the last survey updated.
@@ -192,6 +195,9 @@ pub(super) struct StaticShape {
     pub position: DVec3,
     pub rotation: DQuat,
     pub body: BodyShape,
+    pub throws_shadow: bool,
+    /// Whether the camera may see it.
+    pub seen: bool,
 }
 
 /// The mesh of a solid that is not a primitive, and the size of any solid.
@@ -386,7 +392,13 @@ impl StaticShape {
     fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
-        Self { solid, appearance: prop.appearance, position, rotation, body }
+        let StaticObject { appearance, throws_shadow, .. } = prop;
+        Self { solid, appearance, position, rotation, body, throws_shadow, seen: true }
+    }
+
+    /// A bounding ball and box; without a size for a plane.
+    pub fn bounds(&self) -> Bounds {
+        Bounds { centre: self.position, radius_m: self.body.radius_m, half_m: self.half_extents() }
     }
 
     /// Half extents of the axis-aligned bounding box about its position, metres.

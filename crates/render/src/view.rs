@@ -255,6 +255,28 @@ impl Frustum {
             |&(across, tan, secant): &(DVec3, f64, f64)| from_eye.dot(across).abs() - depth * tan > radius_m * secant;
         depth + radius_m > self.near_m && !self.sides.iter().any(beside)
     }
+
+    /// Position of the eye, metres.
+    pub(super) fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// The direction of view, a unit vector, and the distance of the near plane, metres.
+    pub(super) fn near(&self) -> (DVec3, f64) {
+        (self.forward, self.near_m)
+    }
+
+    /// Unit normals, inwards, of its sides: planes through the eye.
+    pub(super) fn sides(&self) -> [DVec3; 4] {
+        let [(right, tan_x, secant_x), (up, tan_y, secant_y)] = self.sides;
+        let side = |across: DVec3, tan: f64, secant: f64| (self.forward * tan + across) / secant;
+        [
+            side(right, tan_x, secant_x),
+            side(-right, tan_x, secant_x),
+            side(up, tan_y, secant_y),
+            side(-up, tan_y, secant_y),
+        ]
+    }
 }
 
 #[cfg(test)]

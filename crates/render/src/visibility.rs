@@ -2,10 +2,13 @@
 //!
 //! In: posed objects and a camera. Out: one [`Visibility`] per actor. Never here: levels.
 
-use super::scene_view::{Form, SceneView, Track};
+use super::bounds_tree::{BoundingBox, BoundsTree};
+use super::portals::{Bounded, Reach};
+use super::scene_view::{Bounds, Form, SceneView, StaticShape, Track};
 use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState};
+use metachron_geometry::{Cell, Cells, Exposure, Region};
 
 /// The view of an actor by the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,17 +35,112 @@ pub struct Visibility {
     pub radius_m: f64,
 }
 
+/// How many actors a view may show, by three tests of which each is stricter than the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VisibleCounts {
+    /// Those with a part in a cell that the eye reaches through portals, or in no cell and in the frustum (eye-to-cell visibility).
+    pub potentially_visible: u64,
+    /// Those in what portals leave of the frustum in their cells (eye-to-object visibility).
+    pub visible: u64,
+}
+
+/// What is seen of all actors and static solids, and the structures by which it is found.
+#[derive(Debug, Default)]
+pub(super) struct Survey {
+    cells: Cells,
+    /// Everything that can be drawn: actors, then static solids.
+    items: Vec<Bounded>,
+    tree: BoundsTree,
+    reach: Reach,
+    /// The items that the last camera may see.
+    in_sight: Vec<bool>,
+    counts: VisibleCounts,
+}
+
+impl Survey {
+    /// Updates the bounds of the actors that were posed again.
+    fn refit(&mut self, tracks: &[Track], statics: &[StaticShape]) {
+        let Self { cells, items, tree, in_sight, .. } = self;
+        let count = tracks.len() + statics.len();
+        if tree.len() != count {
+            items.clear();
+            items.extend(tracks.iter().map(|track| bounded(&track.bounds, cells)));
+            items.extend(statics.iter().map(|prop| bounded(&prop.bounds(), cells)));
+            tree.build(items.iter().map(|item| item.bounds));
+            in_sight.clear();
+            in_sight.resize(count, false);
+            return;
+        }
+        for (at, track) in tracks.iter().enumerate().filter(|(_, track)| track.fresh) {
+            items[at] = bounded(&track.bounds, cells);
+            tree.set(at, items[at].bounds);
+        }
+    }
+
+    /// Finds the items that the camera may see.
+    fn look(&mut self, frustum: &Frustum) {
+        let Self { cells, items, tree, reach, in_sight, .. } = self;
+        reach.find(cells, frustum);
+        in_sight.fill(false);
+        tree.find(|bounds| reach.may_show(bounds), |item| in_sight[item] = reach.sees(cells, &items[item]));
+    }
+
+    /// Tests an item again that moved while the camera did not.
+    fn look_at(&mut self, item: usize) {
+        self.in_sight[item] = self.reach.sees(&self.cells, &self.items[item]);
+    }
+
+    /// Whether an item has a part in a region that is reached.
+    fn is_potentially_visible(&self, item: usize) -> bool {
+        let Bounded { bounds, exposure, .. } = self.items[item];
+        let is_in = |(number, cell): (usize, &Cell)| {
+            cell.overlaps(bounds.low, bounds.high) && self.reach.is_reached(Region::Cell(number))
+        };
+        match exposure {
+            Exposure::Outside => self.in_sight[item],
+            Exposure::Partly if self.reach.is_reached(Region::Outside) => true,
+            _ => self.cells.all().iter().enumerate().any(is_in),
+        }
+    }
+}
+
+/// What is tested of an object with these bounds; one without a size is nowhere.
+fn bounded(bounds: &Bounds, cells: &Cells) -> Bounded {
+    let ball = (bounds.centre, bounds.radius_m);
+    let bounds = BoundingBox::around(bounds.centre, bounds.half_m);
+    Bounded { bounds, ball, exposure: cells.exposure(bounds.low, bounds.high) }
+}
+
 impl SceneView {
-    /// Updates [`SceneView::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`SceneView::updated`] lists
-    /// the updated ones). Stores the visibility for [`SceneView::compose`].
+    /// Gives the scene its cells and portals: walls then hide what is in cells.
+    pub fn set_cells(&mut self, cells: Cells) {
+        (self.survey, self.eye) = (Survey { cells, ..Survey::default() }, None);
+    }
+
+    /// Updates [`SceneView::seen`]: of the actors that are in view, that came out of it, or that were posed again ([`SceneView::updated`] lists
+    /// the updated ones). The others keep what was found of them last, when they were in view. Stores the visibility for
+    /// [`SceneView::compose`].
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
         self.eye = eye;
         let frustum = camera.frustum(size);
+        let is_first = self.found.len() != self.tracks.len();
+        self.survey.refit(&self.tracks, &self.statics);
+        if moved {
+            self.survey.look(&frustum);
+        }
         self.updated.clear();
-        for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
-            let view = visibility_of(track, camera, size, &frustum);
+        for (at, track) in self.tracks.iter_mut().enumerate() {
+            if track.fresh && !moved {
+                self.survey.look_at(at);
+            }
+            let in_sight = self.survey.in_sight[at];
+            let is_new = track.fresh || is_first || moved && (track.seen || in_sight);
+            if !is_new {
+                continue;
+            }
+            let view = visibility_of(track, camera, size, &frustum, in_sight);
             (track.seen, track.fresh) = (view.visible, false);
             if !track.seen {
                 track.geomorph = None;
@@ -53,6 +151,37 @@ impl SceneView {
             }
             self.updated.push(at);
         }
+        for (prop, in_sight) in self.statics.iter_mut().zip(&self.survey.in_sight[self.tracks.len()..]) {
+            prop.seen = *in_sight || prop.body.radius_m == 0.0;
+        }
+        self.count();
+    }
+
+    /// The cells, each with whether the eye of the last survey reaches it.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, bool)> + '_ {
+        let Survey { cells, reach, .. } = &self.survey;
+        let cells = cells.all().iter().enumerate();
+        cells.map(|(number, cell)| (*cell, reach.is_reached(Region::Cell(number))))
+    }
+
+    /// How many actors the last survey found.
+    #[must_use]
+    pub fn visible_counts(&self) -> VisibleCounts {
+        self.survey.counts
+    }
+
+    fn count(&mut self) {
+        let drawn = |track: &&(usize, &Track)| !is_unseen(track.1);
+        let all = self.tracks.iter().enumerate();
+        let count = |of: &dyn Fn(usize, &Track) -> bool| {
+            all.clone().filter(|track| drawn(&track)).filter(|(at, track)| of(*at, track)).count() as u64
+        };
+        let visible = count(&|_, track| track.seen);
+        let potentially_visible = match self.survey.cells.all().is_empty() {
+            true => visible,
+            false => count(&|at, _| self.survey.is_potentially_visible(at)),
+        };
+        self.survey.counts = VisibleCounts { potentially_visible, visible };
     }
 
     /// The indices of the actors that the last [`SceneView::survey`] updated, ascending.
@@ -78,10 +207,14 @@ impl SceneView {
     }
 }
 
-fn visibility_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum) -> Visibility {
+/// Whether an actor has nothing to draw.
+fn is_unseen(track: &Track) -> bool {
+    matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing)
+}
+
+fn visibility_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum, in_sight: bool) -> Visibility {
     let bounds = track.bounds;
-    let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
-    let visible = !unseen && frustum.sees(bounds.centre, bounds.radius_m);
+    let visible = in_sight && !is_unseen(track) && !size.is_empty();
     let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
     let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
     let (area, speed_m_s, tube_m) = match &track.pose {
@@ -149,6 +282,9 @@ fn tube_measures(curve: &CurveState) -> Option<(f64, f64)> {
 }
 
 #[cfg(test)]
+mod against_rays;
+
+#[cfg(test)]
 mod tests {
     use super::super::scene_view::{Actor, Appearance, Material, States};
     use super::*;
@@ -201,7 +337,8 @@ mod tests {
         assert_eq!(frame(0, &all, 0.0), (1010, 1010, 0.0));
         assert_eq!(frame(10, &[], 0.0), (10, 10, 0.0));
         assert_eq!(frame(20, &[], 0.0), (10, 10, 0.0));
-        assert_eq!(frame(30, &[], 500.0), (10, 1010, 0.0), "another camera");
+        // the ten, and of the others the five that came into view; three of the ten went out of it
+        assert_eq!(frame(30, &[], 500.0), (10, 15, 0.0), "another camera");
         assert_eq!(frame(40, &[], 500.0), (10, 10, 0.0));
         // speed after five steps of 10 ms; a frame shows one step less
         assert_eq!(frame(50, &[700], 500.0), (11, 11, 40.0));

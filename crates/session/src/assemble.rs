@@ -12,7 +12,7 @@ use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_lod::control;
 use metachron_lod::control::{
     ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, RateControl,
-    RateDemand, RateLimits, Stages, Value,
+    RateDemand, RateLimits, Sliders, Stages, Value,
 };
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
@@ -20,7 +20,7 @@ use metachron_render::{
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
 use metachron_world::kinds::{EnvironmentKind, LawKind, PolicyKind, ShadingKind, ValueKind};
-use metachron_world::{Member, Scene, Scenery, machine};
+use metachron_world::{Factors, Member, Scene, Scenery, machine};
 use std::sync::Arc;
 
 /// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
@@ -117,9 +117,14 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
     });
     let actors = agents.chain(still);
-    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances);
-    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
+    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances).enumerate();
+    let props = props.map(|(at, (obstacle, wish))| StaticObject {
+        obstacle: obstacle.clone(),
+        appearance: appearance(wish),
+        throws_shadow: !scene.walls.contains(&at),
+    });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
+    scene_view.set_cells(scene.cells.clone());
     scene_view.set_environment(match scene.environment {
         EnvironmentKind::Room => Environment::Room,
         EnvironmentKind::Sky => Environment::Sky,
@@ -153,6 +158,7 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
     let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
     control.set_value(value(target.value));
+    control.set_sliders(sliders(control.policy().usual_sliders(), target.factors));
     control.set_raise(target.raise);
     control.set_render_scale(target.render_scale);
     if let Some((lag_s, share)) = target.lag {
@@ -163,6 +169,16 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
         control.set_margin(margin);
     }
     control
+}
+
+/// Sliders with the factors that the scene gives.
+fn sliders(usual: Sliders, given: Factors) -> Sliders {
+    Sliders {
+        focus: given.focus.unwrap_or(usual.focus),
+        motion: given.motion.unwrap_or(usual.motion),
+        hysteresis: given.hysteresis.unwrap_or(usual.hysteresis),
+        ..usual
+    }
 }
 
 /// Control's type for a policy; scenes and control use the same names.
@@ -231,19 +247,30 @@ pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &
 
 /// Actors are agents, then scenery, then groups.
 fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
+    let (view, appearance) = view_and_appearance(at, seen, scene);
+    ObjectView { may_vanish: appearance.may_vanish.unwrap_or(scene.target.may_vanish), ..view }
+}
+
+fn view_and_appearance<'a>(
+    at: usize,
+    seen: &Visibility,
+    scene: &'a Scene,
+) -> (ObjectView, &'a metachron_world::Appearance) {
     let (agents, members) = (scene.agents.len(), scene.scenery.len());
     if let Some(member) = scene.agents.get(at) {
-        return view(seen, member);
+        return (view(seen, member), &member.appearance);
     }
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
-        return still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most });
+        let kind = Kind::Counted { radius_m: seen.radius_m, least, most };
+        return (still_view(seen, it, kind), &it.appearance);
     }
     let group = &scene.groups[at - agents - members];
     let groups = (agents + members + group.groups.start, group.groups.len());
     let members = (agents + group.members.start, group.members.len());
     let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
-    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, groups, impostors })
+    let kind = Kind::Group { radius_m: seen.radius_m, members, groups, impostors };
+    (still_view(seen, &group.proxy, kind), &group.proxy.appearance)
 }
 
 fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {
@@ -294,6 +321,7 @@ fn view_of(
         off_centre: seen.off_centre,
         from_focus_m: seen.from_focus_m,
         visible: seen.visible,
+        may_vanish: false,
     }
 }
 

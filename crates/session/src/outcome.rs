@@ -28,8 +28,12 @@ pub struct FrameRecord {
     pub full_ms: f64,
     /// Triangles drawn.
     pub triangles: u64,
-    /// Objects in view.
+    /// Objects in view: of the potentially visible ones those that what portals leave of the frustum shows.
     pub objects: u64,
+    /// Objects in cells that the eye reaches through portals, and those in no cell in view.
+    pub potentially_visible: u64,
+    /// Objects in view that are drawn: as themselves, not left out and not replaced by an impostor.
+    pub drawn: u64,
     /// Gathering states and finding visible objects, milliseconds; declared in lockstep, as is choosing.
     pub cull_ms: f64,
     /// Choosing levels, milliseconds; with a bounded lag those of the next frame, during the drawing of this one.

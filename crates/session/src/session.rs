@@ -107,6 +107,8 @@ struct Chosen {
     /// Triangles without a chosen level: fixed solids, the floor, the caps of tubes.
     other_triangles: f64,
     objects: u64,
+    potentially_visible: u64,
+    drawn: u64,
     /// Time of the chosen objects on the declared machine, seconds.
     objects_s: f64,
     /// Mean level.

@@ -106,12 +106,13 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     let policy = control.policy();
     status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
     status.sliders = policy.predicts().then(|| control.sliders());
-    status.damped = policy == Policy::Adaptive;
+    status.damped = policy.has_hysteresis();
     status.frozen = control.is_frozen();
     status.loop_value = Some(control.eps_hat());
     status.policy = session.policy_name().to_owned();
     status.clamp = session.clamp();
     status.triangles = session.picture().triangles();
+    status.objects = session.newest_frames(1).last().map_or([0; 3], |f| [f.potentially_visible, f.objects, f.drawn]);
     status.render_scale = session.picture().scale;
     status.shadows = session.picture().shadows;
     status.shares = shares(session, meter);

@@ -7,10 +7,10 @@ use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
-use super::scene::{Appearance, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
+use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
 use std::sync::Arc;
@@ -377,6 +377,8 @@ impl SceneBuilder {
                 gains: Gains::default(),
                 lag: None,
                 raise: false,
+                may_vanish: false,
+                factors: Factors::default(),
                 render_scale: RENDER_SCALE,
             },
             camera: None,
@@ -386,6 +388,8 @@ impl SceneBuilder {
             obstacles,
             scenery: Vec::new(),
             groups: Vec::new(),
+            cells: Cells::default(),
+            walls: 0..0,
             contacts: true,
             joints: joints?,
             couplings: Vec::new(),
@@ -423,8 +427,13 @@ impl Joined {
 }
 
 /// Appearance of parts that declare none.
-const DEFAULT_APPEARANCE: Appearance =
-    Appearance { colour: [200, 160, 150], material: Material::Plastic, importance: 1.0, shading: ShadingKind::Any };
+const DEFAULT_APPEARANCE: Appearance = Appearance {
+    colour: [200, 160, 150],
+    material: Material::Plastic,
+    importance: 1.0,
+    may_vanish: None,
+    shading: ShadingKind::Any,
+};
 
 fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {

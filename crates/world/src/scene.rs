@@ -12,7 +12,7 @@ use super::kinds::{
 use super::overlap::Overlap;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Model, Obstacle, Placement, Texture};
+use metachron_geometry::{Cells, Model, Obstacle, Placement, Texture};
 use metachron_models::rigid::Joint;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
@@ -55,6 +55,10 @@ pub struct Scene {
     pub scenery: Vec<Scenery>,
     /// Scenery that may be drawn as one mesh; a group comes after the groups in it.
     pub groups: Vec<Group>,
+    /// Rooms and the openings between them.
+    pub cells: Cells,
+    /// Which obstacles are walls of rooms: light falls in through them.
+    pub walls: Range<usize>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
     /// Joints between rigid agents.
@@ -87,6 +91,10 @@ pub struct Target {
     pub lag: Option<(f64, f64)>,
     /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
     pub raise: bool,
+    /// Whether objects that do not say may be left out of the picture where time is short.
+    pub may_vanish: bool,
+    /// How much some factors count in the benefit of a level.
+    pub factors: Factors,
     /// Least and most fraction of its width and height that the picture is drawn with, 0.35 … 1: fewer pixels where all else is at its coarsest
     /// and frames are late.
     pub render_scale: (f64, f64),
@@ -94,6 +102,17 @@ pub struct Target {
 
 /// The range of [`Target::render_scale`], and its default.
 pub const RENDER_SCALE: (f64, f64) = (0.35, 1.0);
+
+/// How much some factors count in the benefit of a level (FS93, §5), 0 … 1; `None` is the policy's own default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Factors {
+    /// Away from the middle of the picture.
+    pub focus: Option<f64>,
+    /// Blurred by motion.
+    pub motion: Option<f64>,
+    /// Unlike the frame before.
+    pub hysteresis: Option<f64>,
+}
 
 /// Gains of the feedback laws; `None` is the law's own default.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -305,6 +324,8 @@ pub struct Appearance {
     pub material: Material,
     /// Weight of its picture relative to that of others, 0.001 … 1000.
     pub importance: f64,
+    /// Whether it may be left out of the picture; `None`: as [`Target::may_vanish`] says.
+    pub may_vanish: Option<bool>,
     /// Its shading.
     pub shading: ShadingKind,
 }

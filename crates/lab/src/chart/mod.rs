@@ -122,6 +122,8 @@ const POLICIES: &[Entry] = &[
     entry::<policies::still::Still>(),
     entry::<policies::selection::Selection>(),
     entry::<policies::bound::Bound>(),
+    entry::<policies::scanline::Scanline>(),
+    entry::<policies::rooms::Rooms>(),
     entry::<policies::every::Every>(),
 ];
 

@@ -3,6 +3,7 @@
 //! In: an object as the camera sees it, triangles, a shading. Out: a weight for the object and an accuracy for the level; their product
 //! is the benefit, in pixels. Never here: costs. Theory: `docs/theory/control.md`, eq. 20 … 22.
 
+use super::ladder::Rung;
 use super::view::{Kind, ObjectView, Shading};
 use crate::cost::benefit;
 use crate::cost::benefit::{BASE_ERROR, Picture, Sliders, size_worth};
@@ -39,6 +40,34 @@ pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f
     factors.into_iter().fold(size, |all, (factor, slider)| all * (1.0 - slider * (1.0 - factor)).max(0.0))
 }
 
+/// Benefit of a level as printed (FS93, §5): accuracy by samples, motion by the size of the level's own polygons, and hysteresis by `change`,
+/// the distance from the level of the frame before as a fraction of the ladder; pixels.
+pub(super) fn printed(view: &ObjectView, rung: &Rung, change: f64, sliders: &Sliders) -> f64 {
+    let still = Sliders { motion: 0.0, ..*sliders };
+    let covered = pixels(view);
+    let polygon_px = libm::sqrt(covered / rung.polygons.max(1.0)).max(1e-3);
+    let blur = if view.speed_px_s > 0.0 { (view.speed_px_s * BLUR_S / polygon_px).min(1.0) } else { 0.0 };
+    let lost = [
+        (1.0 - printed_accuracy(rung, view.shading.1, covered), sliders.accuracy),
+        (blur, sliders.motion),
+        (change.clamp(0.0, 1.0), sliders.hysteresis),
+    ];
+    lost.into_iter().fold(weight(view, &still, polygon_px), |all, (lost, slider)| all * (1.0 - slider * lost).max(0.0))
+}
+
+/// Accuracy = 1 − 0.5 / samples^m as printed: flat, samples are polygons and m = 1; Gouraud, vertices and m = 2. Light at every pixel, which
+/// the paper has for ray tracing alone, interpolates normals between vertices: m = 3.
+fn printed_accuracy(rung: &Rung, best: Shading, pixels: f64) -> f64 {
+    let vertices = 0.5 * rung.polygons + 2.0;
+    let (samples, m) = match rung.shading {
+        Shading::Flat => (rung.polygons, 1),
+        Shading::Gouraud => (vertices, 2),
+        Shading::PerPixel | Shading::Textured | Shading::Shadowed => (vertices, 3),
+    };
+    let samples = samples.min(pixels).max(1.0);
+    (1.0 - BASE_ERROR / (0..m).fold(1.0, |power, _| power * samples)) * painted(rung.shading, best)
+}
+
 /// The fraction of an object's pixels that a level draws correctly, 0 … 1: its shape by the triangles, its light by the shading
 /// (control.md, eq. 21 and 22), relative to the best shading allowed.
 pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, best: Shading, pixels: f64) -> f64 {
@@ -57,6 +86,10 @@ pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, best: Shadi
         Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
         Shading::PerPixel | Shading::Textured | Shading::Shadowed => 1.0,
     };
-    let painted = if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 };
-    shape * light * painted
+    shape * light * painted(shading, best)
+}
+
+/// What a shading leaves of the benefit of an object that has a texture.
+fn painted(shading: Shading, best: Shading) -> f64 {
+    if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 }
 }

@@ -13,7 +13,7 @@ use super::feedback::{Feedback, POLYGONS_AT_ONE, unseen};
 use super::flicker::Changes;
 use super::groups::Groups;
 use super::hierarchy::Hierarchy;
-use super::ladder::Ladders;
+use super::ladder::{Ladder, Ladders};
 use super::level;
 use super::logic::Logic;
 use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
@@ -51,7 +51,8 @@ pub struct PictureControl {
     target_hz: f64,
     /// The fraction of a frame to be left free, if the user sets one.
     margin: Option<f64>,
-    sliders: Sliders,
+    /// How much each factor counts in a benefit, if scene or user say.
+    sliders: Option<Sliders>,
     value: Value,
     prices: Prices,
     backdrop: Backdrop,
@@ -97,7 +98,7 @@ impl PictureControl {
             policy,
             target_hz,
             margin: None,
-            sliders: usual_sliders(),
+            sliders: None,
             value: Value::Plain,
             prices: Prices::default(),
             backdrop: Backdrop::default(),
@@ -203,7 +204,8 @@ impl PictureControl {
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
-        self.ladders.update(&self.views, raised, &prices, &self.sliders);
+        let sliders = self.sliders();
+        self.ladders.update(&self.views, raised, &prices, &sliders);
         self.groups.update(&self.views);
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
@@ -308,7 +310,8 @@ impl PictureControl {
     #[must_use]
     pub fn weight(&self, at: usize) -> f64 {
         let Some(seen) = self.views.get(at) else { return 0.0 };
-        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(&seen.view, &self.sliders, ladder.polygon_px()))
+        let weight = |ladder: &Ladder| benefit::weight(&seen.view, &self.sliders(), ladder.polygon_px());
+        self.ladders.get(at).map_or(0.0, weight)
     }
 
     /// The state of the controller; its text is for the viewer and the report.
@@ -361,11 +364,6 @@ impl PictureControl {
     pub fn target_hz(&self) -> f64 {
         self.target_hz
     }
-}
-
-/// Size, accuracy and importance count in full, motion by half: moving objects are judged less strictly than resting ones.
-fn usual_sliders() -> Sliders {
-    Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
 }
 
 #[cfg(test)]

@@ -94,6 +94,27 @@ impl Policy {
         !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
     }
 
+    /// Whether the policy weighs levels by the benefit as it is printed (FS93, §5): accuracy by samples, motion and hysteresis by level.
+    #[must_use]
+    pub const fn has_printed_benefit(self) -> bool {
+        matches!(self, Self::Greedy | Self::GreedyIncremental | Self::GreedyRepaired)
+    }
+
+    /// Whether the slider of hysteresis changes what the policy chooses.
+    #[must_use]
+    pub const fn has_hysteresis(self) -> bool {
+        self.has_printed_benefit() || matches!(self, Self::Adaptive)
+    }
+
+    /// How much each factor counts in the benefit of a level where neither scene nor user says: size, accuracy and importance in full. With
+    /// the benefit as printed that is all, as in the timed test of (FS93, §7); else motion counts by half: moving objects are judged less
+    /// strictly than resting ones.
+    #[must_use]
+    pub const fn usual_sliders(self) -> Sliders {
+        let motion = if self.has_printed_benefit() { 0.0 } else { 0.5 };
+        Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion, hysteresis: 0.0 }
+    }
+
     /// Whether the policy takes pixels from the picture where all else is at its coarsest: one that ignores the time of frames does not.
     #[must_use]
     pub const fn scales_pictures(self) -> bool {

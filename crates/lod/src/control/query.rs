@@ -97,7 +97,12 @@ impl FrameQuery<'_> {
 
     /// A rung of an object as an entry of a knapsack.
     pub fn entry(&self, weight: f64, rung: &Rung) -> Entry {
-        Entry::measured(TICKS * rung.cost_s, PARTS_OF_A_PIXEL * weight * rung.accuracy, USUAL).0
+        self.entry_of(rung, weight * rung.accuracy)
+    }
+
+    /// A rung of an object as an entry of a knapsack with this benefit, pixels.
+    pub fn entry_of(&self, rung: &Rung, benefit: f64) -> Entry {
+        Entry::measured(TICKS * rung.cost_s, PARTS_OF_A_PIXEL * benefit, USUAL).0
     }
 }
 

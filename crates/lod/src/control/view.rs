@@ -90,6 +90,8 @@ pub struct ObjectView {
     pub from_focus_m: f64,
     /// Whether any part of it may be in the picture.
     pub visible: bool,
+    /// Whether it may be left out where time is short, at the price of its whole benefit (FS93, §3: no polygons at all).
+    pub may_vanish: bool,
 }
 
 /// Least distance, metres: nearer, the eye is inside the object, and smaller polygons are pointless.
@@ -141,6 +143,7 @@ impl ObjectView {
             off_centre: 0.0,
             from_focus_m: 0.0,
             visible: true,
+            may_vanish: false,
         }
     }
 }

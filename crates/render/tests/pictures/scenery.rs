@@ -6,8 +6,8 @@ use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use metachron_render::{
-    Actor, Appearance, Camera, Form, Level, Material, MeshKey, Offscreen, RendererOptions, SceneView, Shading, Size, States,
-    Style,
+    Actor, Appearance, Camera, Form, Level, Material, MeshKey, Offscreen, RendererOptions, SceneView, Shading, Size,
+    States, Style,
 };
 use metachron_scene::Source;
 use metachron_world::Scene;

@@ -89,10 +89,12 @@ fn tray() -> Vec<StaticObject> {
             traits: ContactTraits::default(),
         },
         appearance: steel,
+        throws_shadow: true,
     };
     let floor = StaticObject {
         obstacle: Obstacle { solid: Solid::Plane, ..side(DVec3::new(0.0, 0.0, -0.016), DVec3::ONE).obstacle },
         appearance: Appearance { colour: [30, 58, 66], material: Material::Skin },
+        throws_shadow: true,
     };
     vec![
         floor,

@@ -179,7 +179,8 @@ pub(super) fn painted_appearance(
         }),
     };
     let importance = c.optional(place, "importance", file.importance, &IMPORTANCE).unwrap_or(1.0);
-    Appearance { colour, material, importance, shading: file.shading.unwrap_or_default() }
+    let shading = file.shading.unwrap_or_default();
+    Appearance { colour, material, importance, may_vanish: file.may_vanish, shading }
 }
 
 fn colour_of(material: Material) -> [u8; 3] {

@@ -3,6 +3,7 @@
 //! In: [`super::format`] types and the document they came from. Out: [`Scene`] parts, problems to the [`Checker`].
 //! Never here: text and its syntax.
 
+mod cells;
 mod common;
 mod contact;
 mod coupling;
@@ -32,6 +33,7 @@ mod tube;
 
 use crate::check::{Allowed, allowed};
 
+pub(super) use cells::cells;
 pub(super) use common::world_faults;
 pub(super) use coupling::couplings;
 pub(super) use group::groups;

@@ -8,7 +8,7 @@ use crate::format::{
 };
 use glam::DVec3;
 use metachron_core::{SimSpan, gains};
-use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, RENDER_SCALE, Target, View};
+use metachron_world::{Camera, Factors, Gains, Machine, ObjectCost, Probe, RENDER_SCALE, Target, View};
 
 /// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
 const OPTIMISER_SHARE: f64 = 0.05;
@@ -41,6 +41,12 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         lead: gain("lead", f.lead, gain_range(gains::LEAD)),
         margin: gain("margin", f.margin, gain_range(gains::MARGIN)),
     });
+    let mut factor = |key: &str, value: Option<f64>| value.map(|v| c.number(&place, key, v, &allowed(0.0..=1.0, "")));
+    let factors = file.map_or_else(Factors::default, |f| Factors {
+        focus: factor("focus", f.focus),
+        motion: factor("motion", f.motion),
+        hysteresis: factor("hysteresis", f.hysteresis),
+    });
     let scales = file
         .and_then(|f| f.render_scale)
         .map(|scales| c.ends(&place, "render_scale", scales, &allowed(RENDER_SCALE.0..=RENDER_SCALE.1, "")));
@@ -52,6 +58,8 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         law: file.and_then(|f| f.law).unwrap_or_default(),
         gains: given,
         raise: file.and_then(|f| f.raise).unwrap_or_default(),
+        may_vanish: file.and_then(|f| f.may_vanish).unwrap_or_default(),
+        factors,
         render_scale: scales.unwrap_or(RENDER_SCALE),
     }
 }

@@ -14,6 +14,7 @@ pub const COMMON_KEYS: [&str; 18] = [
     "tolerance_m",
     "n",
     "importance",
+    "may_vanish",
     "colour",
     "material",
     "shading",
@@ -53,6 +54,9 @@ pub struct CommonFile {
     /// Weight of the object's picture relative to that of others, 0.001 … 1000. Default 1.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub importance: Option<f64>,
+    /// Whether greedy and marginal policies and `adaptive` may leave the object out of the picture where time is short, at the price of its
+    /// whole benefit. Default: that of `[target]`.
+    pub may_vanish: Option<bool>,
     /// Colour as `#rrggbb` (sRGB). Default: by material.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
     pub colour: Option<String>,

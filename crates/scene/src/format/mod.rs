@@ -3,6 +3,7 @@
 //! In: TOML values. Out: the same values, typed; keys that do not exist are refused.
 //! Never here: defaults that depend on other keys, and rules between keys (see `build`).
 
+mod cells;
 mod common;
 mod contact;
 mod coupling;
@@ -16,6 +17,7 @@ mod tool;
 mod tube;
 mod value;
 
+pub use cells::{CellFile, PortalFile, SideKind};
 pub use common::{COMMON_KEYS, CommonFile, HoldKind};
 pub use contact::{CombineRuleName, ContactFile};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};

@@ -1,6 +1,6 @@
 //! The tables of a scene other than its objects.
 
-use super::{CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point};
+use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile};
 use metachron_core::gains;
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
@@ -48,6 +48,14 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub group: Vec<GroupFile>,
+    /// Rooms of a building; at most 1000. What is in a cell is drawn only where it may be seen through portals.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub cell: Vec<CellFile>,
+    /// Openings between cells; at most 1000.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub portal: Vec<PortalFile>,
     /// Accepted here as a key only: each object is read by its model.
     #[serde(default)]
     #[schemars(skip)]
@@ -125,6 +133,21 @@ pub struct TargetFile {
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
+    /// Whether greedy and marginal policies and `adaptive` may leave objects out of the picture where time is short, at the price of their
+    /// whole benefit: for objects without a `may_vanish` of their own. Default false.
+    pub may_vanish: Option<bool>,
+    /// How much a level's benefit falls with the distance from the middle of the picture, 0 … 1. Default 0. This and the next two are for
+    /// policies that choose by cost.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub focus: Option<f64>,
+    /// How much it falls with speed across the picture, 0 … 1. Default 0 for `greedy`, `greedy-incremental` and `greedy-repaired`, 0.5 for
+    /// the others.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub motion: Option<f64>,
+    /// How much it falls with the distance from the level of the frame before, 0 … 1: for `greedy`, `greedy-incremental`,
+    /// `greedy-repaired`, and in addition to its own for `adaptive`. Default 0.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub hysteresis: Option<f64>,
     /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both, 0.35 … 1 in steps of 0.05; then it is
     /// enlarged.
     /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.

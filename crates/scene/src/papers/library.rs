@@ -56,12 +56,42 @@ const FURNITURE: [Furniture; 5] = [
     Furniture { kind: "books", triangles: 88, colour: "#ffffff", texture: Some("books"), rows: BOOKS },
 ];
 
+/// The room, and a corridor beside it behind a door.
+const ROOMS: &str = r##"
+[[cell]]
+name = "library"
+from_m = [-6.2, -3.4, 0.0]
+to_m = [10.8, 3.4, 4.4]
+walls_m = 0.1
+without = ["floor"]
+colour = "#cdbfa6"
+
+[[cell]]
+name = "corridor"
+from_m = [-6.2, -6.4, 0.0]
+to_m = [10.8, -3.4, 3.0]
+walls_m = 0.1
+without = ["floor"]
+colour = "#b4b8b0"
+
+[[portal]]
+between = ["library", "corridor"]
+from_m = [-5.0, -3.4, 0.0]
+to_m = [-3.6, -3.4, 2.2]
+
+[[portal]]
+between = ["library", "outside"]
+from_m = [-5.4, 3.4, 1.0]
+to_m = [-2.8, 3.4, 2.8]
+"##;
+
 pub(super) fn text() -> String {
     let mut text = head(
         "A textured room of 19,800 triangles in which the policy chooses the shading as well (FS93, fig. 11).",
         "a library whose triangles and shading are chosen together",
         &path(),
     );
+    text += ROOMS;
     for furniture in &FURNITURE {
         for (number, row) in furniture.rows.iter().enumerate() {
             text += &furniture.row(number, row);

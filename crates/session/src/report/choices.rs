@@ -31,6 +31,12 @@ pub struct ChoiceSummary {
     pub holes: Option<u64>,
     /// Passes of a hierarchical search that goes on from the frame before (MB97); `None` for other policies.
     pub passes: Option<Spread>,
+    /// Objects per frame in cells that the eye reached through portals, and those in no cell in view.
+    pub potentially_visible: Option<f64>,
+    /// Objects per frame in view: where there are cells, those that portals leave in view.
+    pub visible: Option<f64>,
+    /// Objects per frame in view that were drawn: as themselves, not left out and not replaced by an impostor.
+    pub drawn: Option<f64>,
     /// Fraction of its width and height that the picture was drawn with; `None` without a frame.
     pub render_scale: Option<ScaleSummary>,
     /// Share of the frames in which objects threw shadows, where the light does; `None` without a frame.
@@ -70,6 +76,9 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         lag_ms: spread(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
         passes: some(|row| (row.passes > 0).then_some(f64::from(row.passes))),
+        potentially_visible: spread(|row| row.potentially_visible as f64).map(|s| s.mean),
+        visible: spread(|row| row.objects as f64).map(|s| s.mean),
+        drawn: spread(|row| row.drawn as f64).map(|s| s.mean),
         render_scale: scales(frames),
         shadows: Spread::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
     }

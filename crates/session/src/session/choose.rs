@@ -72,7 +72,10 @@ impl Session {
         let plan = self.control.last_plan();
         self.levels.clear();
         self.levels.extend(self.views.iter().zip(&plan.levels).map(|(view, demand)| assemble::level(view, demand)));
-        self.chosen.objects = self.scene_view.seen().iter().filter(|s| s.visible).count() as u64;
+        let counts = self.scene_view.visible_counts();
+        (self.chosen.objects, self.chosen.potentially_visible) = (counts.visible, counts.potentially_visible);
+        let drawn = self.views.iter().zip(&self.levels).filter(|(view, level)| view.visible && level.triangles > 0);
+        self.chosen.drawn = drawn.count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
         let declared = self.declared.with_shadows(self.control.shadows());
         self.chosen.objects_s = declared.objects_s(self.views.iter(), &plan.levels);

@@ -12,6 +12,7 @@ use std::time::Duration;
 impl Session {
     pub(super) fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
         let Chosen { sim, triangles, more_triangles, objects, cull, select, select_next, build, n, .. } = self.chosen;
+        let Chosen { potentially_visible, drawn, .. } = self.chosen;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let plan = self.control.last_plan();
         let promise = plan.promise;
@@ -26,6 +27,8 @@ impl Session {
             full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
             triangles,
             objects,
+            potentially_visible,
+            drawn,
             cull_ms: ms(cull),
             select_ms: ms(select + select_next.unwrap_or_default()),
             draw_ms: ms(build + finished.draw),

@@ -225,6 +225,8 @@ pub struct Status {
     pub clamp: Option<String>,
     /// Triangles in the last picture.
     pub triangles: u64,
+    /// Objects of that picture: potentially visible, visible, drawn; each part of the one before.
+    pub objects: [u64; 3],
     /// Fraction of its width and height that it was drawn with, 0 … 1.
     pub render_scale: f64,
     /// Whether shadows are drawn in it, where the light throws any.

@@ -208,6 +208,9 @@ fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
         ui.end_row();
     });
     value(ui, "Triangles", &text::count(status.triangles), "In the last picture");
+    let [potentially, visible, drawn] = status.objects.map(text::count);
+    let objects = format!("{drawn} of {visible} of {potentially}");
+    value(ui, "Objects", &objects, "Drawn, of those in view, of those in rooms that the eye reaches");
     value(
         ui,
         "Scale",

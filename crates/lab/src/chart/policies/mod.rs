@@ -19,6 +19,8 @@ pub(super) mod live;
 mod machine;
 mod metrics;
 mod played;
+pub(super) mod rooms;
+pub(super) mod scanline;
 mod scene;
 pub(super) mod selection;
 pub(super) mod still;

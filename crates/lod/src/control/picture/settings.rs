@@ -51,8 +51,8 @@ impl PictureControl {
 
     /// Changes how much each factor counts in the benefit of a level.
     pub fn set_sliders(&mut self, sliders: Sliders) {
-        if sliders != self.sliders {
-            self.sliders = sliders;
+        if sliders != self.sliders() {
+            self.sliders = Some(sliders);
             self.forget_ladders();
         }
     }
@@ -60,7 +60,7 @@ impl PictureControl {
     /// How much each factor counts in the benefit of a level.
     #[must_use]
     pub fn sliders(&self) -> Sliders {
-        self.sliders
+        self.sliders.unwrap_or(self.policy.usual_sliders())
     }
 
     /// Changes the value formula of Robin Hood.
