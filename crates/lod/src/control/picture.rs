@@ -204,7 +204,7 @@ impl PictureControl {
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
-        let sliders = self.sliders();
+        let sliders = self.policy.sliders(self.sliders());
         self.ladders.update(&self.views, raised, &prices, &sliders);
         self.groups.update(&self.views);
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
@@ -220,7 +220,6 @@ impl PictureControl {
         if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }
-        let sliders = self.policy.sliders(self.sliders);
         let query = FrameQuery {
             views: &self.views,
             ladders: &self.ladders,

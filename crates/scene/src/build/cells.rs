@@ -8,7 +8,7 @@ use super::object::{OBSTACLES_MAX, Objects, too_many};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CellFile, Point, PortalFile, SideKind};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Cell, Cells, CellsError, Obstacle, Portal, Region, Side, Solid};
+use metachron_geometry::{Cell, Cells, CellsError, ContactTraits, Obstacle, Portal, Region, Side, Solid};
 use metachron_world::Appearance;
 use metachron_world::kinds::{Material, ShadingKind};
 
@@ -222,6 +222,7 @@ fn build_walls(c: &mut Checker<'_, '_>, files: &[CellFile], cells: &Cells, objec
                 rotation: DQuat::IDENTITY,
                 friction: WALL_SURFACE.0,
                 restitution: WALL_SURFACE.1,
+                traits: ContactTraits::default(),
             });
             objects.obstacle_appearances.push(appearance);
         }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 18] = [
+pub const COMMON_KEYS: [&str; 19] = [
     "name",
     "rate_hz",
     "dt_ms",
