@@ -133,6 +133,7 @@ const POLICIES_LIVE: &[Entry] = &[
     entry::<Live<2>>(),
     entry::<Live<3>>(),
     entry::<Live<4>>(),
+    entry::<policies::live::held::Held>(),
     entry::<policies::live::views::Views>(),
     entry::<policies::live::prediction::Prediction>(),
     entry::<policies::live::traversal::Traversal>(),

@@ -2,6 +2,7 @@
 //!
 //! In: a scene's number among the plays. Out: an experiment. Never here: how frames are drawn ([`super::played`]), a declared machine.
 
+pub(in super::super) mod held;
 pub(in super::super) mod prediction;
 pub(in super::super) mod traversal;
 pub(in super::super) mod views;
