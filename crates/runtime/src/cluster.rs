@@ -289,9 +289,7 @@ impl AgentRunner {
                 if let Some(doubling) = &mut doubling {
                     doubling.compare(&list);
                 }
-                // what held until now may have kept them still
-                let still = stepper.held_fast() && !stepper.is_driven();
-                let calm = still && list.iter().all(|one| one.member.is_calm());
+                let calm = stepper.lets_rest() && list.iter().all(|one| one.member.is_calm());
                 Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
             })
         });

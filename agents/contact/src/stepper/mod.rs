@@ -465,10 +465,11 @@ impl ClusterStepper {
         self.torn().is_empty() && self.yielded().is_empty()
     }
 
-    /// Whether a motor kept a joint moving in the last fine step: what is driven does not rest, however slow it is.
+    /// Whether members that are calm may rest: not where an attachment has just given way, which may have kept them still until now, or where
+    /// a motor keeps a joint moving, however slowly.
     #[must_use]
-    pub const fn is_driven(&self) -> bool {
-        self.joints.drives
+    pub fn lets_rest(&self) -> bool {
+        self.held_fast() && !self.joints.drives
     }
 
     /// Work of a participant's own steps in the last macro step, in the unit of its model.
