@@ -13,6 +13,7 @@ mod links;
 mod own_model;
 mod own_skin;
 mod passing;
+mod plate;
 mod rebounds;
 mod scenes;
 mod sets;
