@@ -9,6 +9,7 @@ use super::kinds::{
 };
 use super::scene::{Appearance, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
+use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
@@ -54,6 +55,7 @@ pub enum SceneBuildError {
 #[derive(Debug, Clone)]
 pub struct SceneBuilder {
     gravity: DVec3,
+    contact_depth_m: f64,
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
 }
@@ -267,13 +269,20 @@ impl Tube {
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
     pub(super) const fn new() -> Self {
-        Self { gravity: GRAVITY_DEFAULT, fixed: Vec::new(), parts: Vec::new() }
+        Self { gravity: GRAVITY_DEFAULT, contact_depth_m: DEPTH_DEFAULT_M, fixed: Vec::new(), parts: Vec::new() }
     }
 
     /// Gravity, m/s².
     #[must_use]
     pub fn gravity(mut self, gravity_m_s2: [f64; 3]) -> Self {
         self.gravity = gravity_m_s2.into();
+        self
+    }
+
+    /// How deep what lies on each other rests, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not seen.
+    #[must_use]
+    pub fn contact_depth_m(mut self, contact_depth_m: f64) -> Self {
+        self.contact_depth_m = contact_depth_m;
         self
     }
 
@@ -304,7 +313,7 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
-        let Self { gravity, fixed, parts } = self;
+        let Self { gravity, contact_depth_m, fixed, parts } = self;
         let names: Vec<&String> =
             fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
         if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
@@ -340,6 +349,7 @@ impl SceneBuilder {
             scenery: Vec::new(),
             groups: Vec::new(),
             contacts: true,
+            contact_depth_m,
             joints: Arc::new([]),
             couplings: Vec::new(),
             probes: Vec::new(),

@@ -248,7 +248,7 @@ mod tests {
     fn turns(keys: &str) -> Result<Vec<DVec3>, String> {
         let text = format!("format = 1\n[[object]]\nname = \"b\"\ngrid = [3, 3, 3]\nspacing_m = [1, 1, 1]\n{keys}");
         let source = crate::Source::memory("grid", text.as_bytes()).unwrap();
-        let scene = crate::load(&source, &[]).map_err(|error| error.problems[0].message.clone())?;
+        let scene = crate::load(&source, &[]).map_err(|error| error.to_string())?;
         let of = |member: &Member| match &member.spec {
             Spec::Rigid(body) => body.rotation.to_scaled_axis(),
             _ => DVec3::ZERO,
