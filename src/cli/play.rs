@@ -176,6 +176,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         (summary, choices) = (summarise_undrawn(frames), choices.undrawn());
     }
     let spent_share = summary.frame_ms.map(|work| work.mean / outcome.target_ms);
+    let clusters = clusters(scene, &outcome);
     let report = Report {
         scene: outcome.scene,
         policy: outcome.policy.to_owned(),
@@ -194,7 +195,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
         events: outcome.events.iter().map(|one| event(scene, one)).collect(),
         sensors: outcome.sensors.iter().map(|one| sensor(scene, one)).collect(),
-        clusters: clusters(scene, &outcome.clusters),
+        clusters,
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
         oracle: None,
@@ -251,7 +252,8 @@ fn quantiles(spread: Spread) -> Quantiles {
 }
 
 /// The clusters of more than one member, or with contacts, by their leaders.
-fn clusters(scene: &Scene, parts: &[Option<ClusterState>]) -> Vec<ClusterRow> {
+fn clusters(scene: &Scene, outcome: &Outcome) -> Vec<ClusterRow> {
+    let parts = &outcome.clusters;
     let name = |at: usize| scene.name_of(AgentId(at as u32)).to_owned();
     let led = |leader: AgentId| {
         let all = parts.iter().enumerate().filter_map(move |(at, part)| Some((at, (*part)?)));
@@ -266,14 +268,17 @@ fn clusters(scene: &Scene, parts: &[Option<ClusterState>]) -> Vec<ClusterRow> {
             id: name(at),
             members,
             h_ms: state.step_s * 1e3,
+            slack: 1.0 - led(leader).map(|(at, _)| outcome.agents[at].stats.work_s).sum::<f64>() / state.step_s,
             steps: led(leader).map(|(_, part)| part.parts).collect(),
             contacts: solves.contacts,
             problems: solves.problems,
             factors: solves.factors as f64 / solves.problems.max(1) as f64,
+            products: solves.products as f64 / solves.problems.max(1) as f64,
             passes: solves.passes,
             cut: solves.cut,
             depth_m: solves.depth_m,
             depth_max_m: solves.deepest_m,
+            depth_wanted_m: scene.contact_depth_m,
         })
     };
     parts.iter().enumerate().filter_map(row).collect()

@@ -24,6 +24,8 @@ pub struct ClusterSolves {
     pub problems: u64,
     /// Factors of the coupled matrix.
     pub factors: u64,
+    /// Products of conjugate gradients: of problems that are solved without factors.
+    pub products: u64,
     /// Convex passes: the way that is taken where Newton's method gives up.
     pub passes: u64,
     /// Problems whose solve came to no end.

@@ -62,8 +62,7 @@ pub(super) struct ClusterSeat {
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
     doubling: Option<Box<StepDoubling>>,
-    /// How far the repeated steps of the present row left it from the finer ones, metres, and the error of the last row (control.md, eq. 31).
-    apart_m: f64,
+    /// The error of the last row of repeated steps, metres (control.md, eq. 31).
     drift_m: f64,
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
@@ -135,7 +134,6 @@ impl ClusterSeat {
             helped: Helped::default(),
             schedule: DoublingSchedule::default(),
             doubling: None,
-            apart_m: 0.0,
             drift_m: 0.0,
             state: None,
             solves: ClusterSolves::default(),
@@ -175,8 +173,14 @@ impl ClusterSeat {
 
     /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
     fn repeats(&mut self, steps: u64, me: AgentId) -> Option<Box<StepDoubling>> {
-        self.schedule.begins(steps, me);
-        self.schedule.is_on().then(|| self.doubling.take().unwrap_or_default())
+        let begins = self.schedule.begins(steps, me);
+        self.schedule.is_on().then(|| {
+            let mut doubling = self.doubling.take().unwrap_or_default();
+            if begins {
+                doubling.begin_row();
+            }
+            doubling
+        })
     }
 
     /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
@@ -405,11 +409,12 @@ impl AgentRunner {
     fn note_solves(&mut self, report: &ClusterReport, plan: Plan, dt: SimSpan) {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
-        let ClusterReport { contacts, factors, passes, cut, depth_m, .. } = *report;
+        let ClusterReport { contacts, factors, products, passes, cut, depth_m, .. } = *report;
         let solves = &mut seat.solves;
         solves.contacts = contacts;
         solves.problems += u64::from(report.fine_steps);
         solves.factors += u64::from(factors);
+        solves.products += u64::from(products);
         solves.passes += u64::from(passes);
         solves.cut += u64::from(cut);
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
@@ -426,18 +431,16 @@ impl AgentRunner {
     /// Hands every member how far a step of `dt` is from the same in halves.
     fn note_errors(&mut self, doubling: Box<StepDoubling>, dt: SimSpan) {
         let Some(seat) = &mut self.cluster else { return };
-        let is_first = seat.schedule.span_s() == 0.0;
         let span_s = seat.schedule.finish_step(dt.as_secs_f64()).then_some(seat.schedule.span_s());
         if doubling.apart_m().is_empty() {
             seat.schedule.cancel();
         }
         let mut apart_m = doubling.apart_m().iter();
         self.each_member(|actor| {
-            if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next()) {
-                seat.apart_m = if is_first { *apart_m } else { seat.apart_m + apart_m };
-                if let Some(span_s) = span_s {
-                    seat.drift_m = drift_m(seat.apart_m, 1, span_s);
-                }
+            if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next())
+                && let Some(span_s) = span_s
+            {
+                seat.drift_m = drift_m(*apart_m, 1, span_s);
             }
         });
         if let Some(seat) = &mut self.cluster {

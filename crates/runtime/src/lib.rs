@@ -32,6 +32,8 @@ mod clock;
 mod cluster;
 mod cpu;
 mod dirty_set;
+#[cfg(test)]
+mod executor_tests;
 mod faults;
 mod governor;
 mod handle;

@@ -35,11 +35,13 @@ pub use schema::json_schema;
 pub use source::{SCENE_BYTES_MAX, Source};
 
 use build::{Objects, SceneContext};
-use check::{Checker, Place};
+use check::{Checker, Place, allowed};
 use diagnostic::Problem;
 use document::Document;
 use format::{ContactsFile, SceneFile, WorldFile};
 use glam::DVec3;
+use metachron_contact::cluster::DEPTH_DEFAULT_M;
+use metachron_contact::stepper::DEPTH_RANGE_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
 
@@ -124,6 +126,11 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
             "expected no such key: contacts are solved in clusters; or false, for those that a coupling names alone";
         c.wrong(&Place::new("world", "of `[world]`"), "contacts", "is neither true nor false", expected);
     }
+    let depth = file.world.as_ref().and_then(|world| world.contact_depth_m);
+    let contact_depth_m = depth.map_or(DEPTH_DEFAULT_M, |depth_m| {
+        let range = allowed(DEPTH_RANGE_M, "m");
+        c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, &range)
+    });
     let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
@@ -144,6 +151,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         cells,
         walls,
         contacts: contacts != Some(ContactsFile::Whether(false)),
+        contact_depth_m,
         joints: joints.into(),
         couplings,
         probes,

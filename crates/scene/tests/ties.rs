@@ -235,3 +235,13 @@ coupling = [{ kind = "attach", a = "beam", b = "tool", at_a = [0, 0, 0], at_b = 
         assert_eq!(world.agents()[1].led_by(), None, "{executor:?}: they parted");
     }
 }
+
+#[test]
+fn the_world_says_how_deep_contacts_rest() {
+    assert_eq!(balls("").contact_depth_m, 20e-6);
+    assert_eq!(balls("world.contact_depth_m = 3e-6").contact_depth_m, 3e-6);
+    let source = Source::memory("deep", b"format = 1\nworld.contact_depth_m = 0.1").unwrap();
+    let SceneError { problems, .. } = load(&source, &[]).unwrap_err();
+    let said = format!("{}; {}", problems[0].message, problems[0].expected);
+    assert!(said.contains("`contact_depth_m` of `[world]` is 0.1") && said.contains("0.000001 to 0.001 m"), "{said}");
+}

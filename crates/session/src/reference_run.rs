@@ -282,10 +282,10 @@ mod tests {
         let outcome = played(&scene, 60);
         let until = |share: f64| {
             compare_with_reference(&scene, &outcome, &mut |done| done < share)
-                .map(|o| (o.sim_s, o.interrupted, o.pairs))
+                .map(|o| (o.sim_s, o.interrupted, o.pairs, o.sensitivity_m))
                 .unwrap()
         };
-        let (sim_s, interrupted, pairs) = until(0.4);
+        let (sim_s, interrupted, pairs, _) = until(0.4);
         assert!(interrupted && (0.3..0.5).contains(&sim_s), "{sim_s} s");
         let [pair] = &pairs[..] else { panic!("only one pair has met: {pairs:?}") };
         // equal masses that bounce without loss exchange their 1 m/s; a solve is done at 5e-6 m/s
@@ -294,8 +294,10 @@ mod tests {
             (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 5e-6),
             "{pair:?}"
         );
-        let (sim_s, interrupted, pairs) = until(2.0);
+        let (sim_s, interrupted, pairs, sensitivity_m) = until(2.0);
         assert!(!interrupted && (sim_s, pairs.len()) == (outcome.sim_s, 2), "{sim_s} s, {pairs:?}");
+        // a ball that is met off its middle by up to 2 µm goes on aside, by up to that over its radius for each metre
+        assert!((MOVED_M..4.0 * MOVED_M / 0.1).contains(&sensitivity_m), "{sensitivity_m} m");
     }
 
     /// `frames` frames of `scene`, with a trace.
@@ -321,7 +323,10 @@ mod tests {
             true
         });
         // free flight is exact at any step; between ticks of 0.5 ms it is interpolated linearly: g dt²/2 = 1.2 µm
-        let states = oracle.unwrap().states;
+        let oracle = oracle.unwrap();
+        let states = oracle.states;
+        // what nothing touches stays as far from where it was as its start was moved
+        assert!((oracle.sensitivity_m / MOVED_M - 1.0).abs() < 1e-6, "{} m", oracle.sensitivity_m);
         assert!(states > 40 && calls > 5 && !distances.is_empty(), "{states} states, told {calls} times");
         for distance in distances {
             assert!(distance.max_m < 2e-6 && distance.momentum_max_n_s < 1e-6, "{distance:?}");

@@ -39,6 +39,7 @@ pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) 
 fn surroundings(scene: &Scene) -> Result<ClusterScene, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
+    let among = among.resting_at(scene.contact_depth_m).map_err(|error| failed(error.to_string()))?;
     let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
     let among = among.with_passages(passages);
     among.jointed(Arc::clone(&scene.joints)).map_err(|error| failed(error.to_string()))

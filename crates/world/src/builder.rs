@@ -9,6 +9,7 @@ use super::kinds::{
 };
 use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
+use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
@@ -68,6 +69,7 @@ pub enum SceneBuildError {
 #[derive(Debug, Clone)]
 pub struct SceneBuilder {
     gravity: DVec3,
+    contact_depth_m: f64,
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
     joints: Vec<Joined>,
@@ -298,13 +300,27 @@ impl Tube {
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
     pub(super) const fn new() -> Self {
-        Self { gravity: GRAVITY_DEFAULT, fixed: Vec::new(), parts: Vec::new(), joints: Vec::new() }
+        let joints = Vec::new();
+        Self {
+            gravity: GRAVITY_DEFAULT,
+            contact_depth_m: DEPTH_DEFAULT_M,
+            fixed: Vec::new(),
+            parts: Vec::new(),
+            joints,
+        }
     }
 
     /// Gravity, m/s².
     #[must_use]
     pub fn gravity(mut self, gravity_m_s2: [f64; 3]) -> Self {
         self.gravity = gravity_m_s2.into();
+        self
+    }
+
+    /// How deep what lies on each other rests, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not seen.
+    #[must_use]
+    pub fn contact_depth_m(mut self, contact_depth_m: f64) -> Self {
+        self.contact_depth_m = contact_depth_m;
         self
     }
 
@@ -349,7 +365,7 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
-        let Self { gravity, fixed, parts, joints } = self;
+        let Self { gravity, contact_depth_m, fixed, parts, joints } = self;
         let names: Vec<&String> =
             fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
         if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
@@ -391,6 +407,7 @@ impl SceneBuilder {
             cells: Cells::default(),
             walls: 0..0,
             contacts: true,
+            contact_depth_m,
             joints: joints?,
             couplings: Vec::new(),
             probes: Vec::new(),

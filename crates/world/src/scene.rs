@@ -11,6 +11,8 @@ use super::kinds::{
 };
 use super::overlap::Overlap;
 use glam::DVec3;
+#[cfg(doc)]
+use metachron_contact::stepper::DEPTH_RANGE_M;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Model, Obstacle, Placement, Texture};
 use metachron_models::rigid::Joint;
@@ -61,6 +63,8 @@ pub struct Scene {
     pub walls: Range<usize>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
+    /// How deep what lies on each other rests, metres ([`DEPTH_RANGE_M`]).
+    pub contact_depth_m: f64,
     /// Joints between rigid agents.
     pub joints: Arc<[Joint]>,
     /// Pairs that interact otherwise than by the default contact.

@@ -29,6 +29,7 @@
 //!     surface_m_s: DVec3::ZERO,
 //!     owed_slip_m: DVec3::ZERO,
 //!     warm_n_s: DVec3::ZERO,
+//!     load_n_s: 0.0,
 //! };
 //! let contacts = [corner(-0.1, -0.1), corner(0.1, -0.1), corner(-0.1, 0.1), corner(0.1, 0.1)];
 //! let mut solver = Solver::default();
@@ -73,7 +74,7 @@ pub use error::ProblemError;
 pub use joint::{Hold, JointRow, Pressed, Spring};
 pub use problem::{Block, Contact, Member, Problem, Response, multiply};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
-pub use solver::{Report, Settings, Solution, Solver, Way};
+pub use solver::{DEPTH_DEFAULT_M, Report, Settings, Solution, Solver, Way};
 pub use sparse_factor::SparseFactor;
 pub use system::StepForm;
 

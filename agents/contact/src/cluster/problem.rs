@@ -95,6 +95,8 @@ pub struct Contact {
     pub owed_slip_m: DVec3,
     /// The impulse of the last step, world axes, N·s; zero where there is none.
     pub warm_n_s: DVec3,
+    /// The load that its compliance is for where that is more, N·s (eq. 5): the most that it has lately borne; 0 for a new contact.
+    pub load_n_s: f64,
 }
 
 /// All that touch or are joined, at one moment.

@@ -168,18 +168,18 @@ impl Row {
         if self.calm.is_some() { BLOW_SHARE * yield_m_s } else { yield_m_s }
     }
 
-    /// The compliance that gives way by `yield_m_s` under an impulse (eq. 5).
-    pub fn compliance_under(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
+    /// The compliance that gives way by `yield_m_s` under a load (eq. 5).
+    pub fn compliance_under(&self, load_n_s: f64, yield_m_s: f64) -> f64 {
         let yield_m_s = self.own_yield_m_s(yield_m_s);
         let (least, most) = (COMPLIANCE_MIN * self.scale, COMPLIANCE_MAX * self.scale);
-        self.given.unwrap_or_else(|| (yield_m_s / impulse.length()).clamp(least, most))
+        self.given.unwrap_or_else(|| (yield_m_s / load_n_s).clamp(least, most))
     }
 
     /// The compliance, made harder where it gives way too far under an impulse.
     pub fn hardened(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
         let load = impulse.length();
         if self.given.is_none() && self.compliance * load > HARDEN_PAST * self.own_yield_m_s(yield_m_s) {
-            self.compliance_under(impulse, yield_m_s)
+            self.compliance_under(load, yield_m_s)
         } else {
             self.compliance
         }

@@ -35,10 +35,13 @@ pub struct Settings {
     pub still_m_s: f64,
 }
 
+/// How deep contacts rest where nothing else is said, metres.
+pub const DEPTH_DEFAULT_M: f64 = 20e-6;
+
 impl Default for Settings {
     fn default() -> Self {
-        let form = StepForm::Direct;
-        Self { tolerance_m_s: 5e-6, depth_m: 20e-6, passes: 60, convex_only: false, form, still_m_s: 5e-8 }
+        let (form, depth_m) = (StepForm::Direct, DEPTH_DEFAULT_M);
+        Self { tolerance_m_s: 5e-6, depth_m, passes: 60, convex_only: false, form, still_m_s: 5e-8 }
     }
 }
 
@@ -139,6 +142,11 @@ impl Solver {
         self.settings.form = form;
     }
 
+    /// Lets contacts rest `depth_m` metres deep from now on, > 0.
+    pub fn set_depth_m(&mut self, depth_m: f64) {
+        self.settings.depth_m = depth_m;
+    }
+
     /// A solver with its settings.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
@@ -191,17 +199,18 @@ impl Solver {
         rows.gather(problem, offsets, velocities);
         system.scale_rows(problem.members, rows);
         let yield_m_s = self.settings.yield_m_s(problem.h_s);
-        let given = problem.contacts.iter().map(|c| c.warm_n_s).chain(problem.rows.iter().map(|r| r.warm_n_s));
+        let of_contacts = problem.contacts.iter().map(|contact| (contact.warm_n_s, contact.load_n_s));
+        let given = of_contacts.chain(problem.rows.iter().map(|row| (row.warm_n_s, 0.0)));
         self.warm.clear();
         self.compliances.clear();
-        for (k, warm) in given.enumerate() {
+        for (k, (warm, load_n_s)) in given.enumerate() {
             if k == problem.contacts.len() {
                 rows.press(&self.warm);
             }
             let row = &rows.rows[k];
             let warm = row.law.project(Form::Disc, row.frame.transpose() * warm * row.held).value;
             self.warm.push(warm);
-            self.compliances.push(row.compliance_under(warm, yield_m_s));
+            self.compliances.push(row.compliance_under(warm.length().max(load_n_s), yield_m_s));
         }
         self.iterate.reset(self.solution.velocities.len());
         self.iterate.take_unanswered(problem.members);

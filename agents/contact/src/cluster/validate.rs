@@ -85,7 +85,7 @@ fn contact_fault(contact: &Contact) -> Option<&'static str> {
     if !(contact.approach_m_s.is_finite() && contact.gained_m_s.is_finite() && contact.surface_m_s.is_finite()) {
         return Some("its approach or the velocity of its surface is not finite");
     }
-    let vectors = contact.owed_slip_m.is_finite() && contact.warm_n_s.is_finite();
+    let vectors = contact.owed_slip_m.is_finite() && contact.warm_n_s.is_finite() && contact.load_n_s.is_finite();
     (!vectors).then_some("its slip owed or its impulse of the last step is not finite")
 }
 

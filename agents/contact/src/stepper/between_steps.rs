@@ -16,6 +16,7 @@ impl ClusterStepper {
         for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
             let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
+            contact.load_n_s = place.load_n * h_s;
             owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
         }
     }
@@ -31,7 +32,8 @@ impl ClusterStepper {
             // a blow is over
             let (lasting, spin) =
                 if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
-            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, owed_slip_m, spin };
+            let load_n = contact.load_n_s / h_s;
+            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, load_n, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {

@@ -1,12 +1,11 @@
 //! The error that a macro step of a cluster makes, of each member: the step made a second time in halves, without a trace.
 //!
-//! In: members at the start of a macro step. Out: how far each is from where the same step in twice as many parts would leave it. Never here:
-//! which steps are repeated, what is made of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
+//! In: members at the start of a macro step. Out: how far each is from where the same steps in twice as many parts would leave it, over a row of
+//! them. Never here: which steps are repeated, what is made of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
 
 use super::{ClusterMember, ClusterScene, ClusterStepper, Participant};
 use glam::DVec3;
-use metachron_core::step_doubling::farthest;
-use metachron_core::{ParallelFor, SimSpan, StepError};
+use metachron_core::{AgentId, ParallelFor, SimSpan, StepError};
 use metachron_geometry::{ShapeKind, ShapePose};
 
 /// A macro step in twice as many parts.
@@ -19,10 +18,18 @@ pub struct StepDoubling {
     /// Whether there was one.
     made: bool,
     now: Vec<DVec3>,
+    /// By whom and by how much each point is off in the row so far.
+    row: Vec<AgentId>,
+    off: Vec<Vec<DVec3>>,
     apart_m: Vec<f64>,
 }
 
 impl StepDoubling {
+    /// Begins a row: what steps so far were off by no longer counts.
+    pub fn begin_row(&mut self) {
+        self.row.clear();
+    }
+
     /// Makes the coming macro step of `dt` with every member in twice as many parts, and takes it back. Its work, in the unit of
     /// [`metachron_core::StepReport::work`].
     ///
@@ -51,19 +58,30 @@ impl StepDoubling {
         Ok(report.work)
     }
 
-    /// Compares the members with where the finer step left them, after the same macro step.
+    /// Compares the members with where the finer step left them, after the same macro step. What a step is off by adds to what those of its row
+    /// before were off by, point by point: what trembles is off to the other side in the next step.
     pub fn compare(&mut self, all: &[Participant<'_>]) {
-        let Self { finer, made, now, apart_m, .. } = self;
+        let Self { finer, made, now, row, off, apart_m, .. } = self;
         apart_m.clear();
-        if std::mem::take(made) && finer.len() == all.len() {
-            apart_m.extend(all.iter().zip(finer).map(|(one, finer)| {
-                probe(&*one.member, now);
-                farthest(now, finer)
-            }));
+        let goes_on = row.iter().copied().eq(all.iter().map(|one| one.id));
+        if !std::mem::take(made) || finer.len() != all.len() || !(row.is_empty() || goes_on) {
+            return;
+        }
+        off.resize_with(all.len(), Vec::new);
+        if !goes_on {
+            row.extend(all.iter().map(|one| one.id));
+            off.iter_mut().for_each(Vec::clear);
+        }
+        for ((one, finer), off) in all.iter().zip(finer).zip(off) {
+            probe(&*one.member, now);
+            off.resize(now.len(), DVec3::ZERO);
+            off.iter_mut().zip(now.iter().zip(finer)).for_each(|(off, (now, finer))| *off += *now - *finer);
+            apart_m.push(off.iter().map(|off| off.length_squared()).fold(0.0, f64::max).sqrt());
         }
     }
 
-    /// How far each member was from where the finer step left it when that was last compared, metres; empty where there was no finer step.
+    /// How far each member was from where the finer steps of the row so far would have left it, metres; empty where there was no finer step,
+    /// or where the members are no longer those with which the row began.
     #[must_use]
     pub fn apart_m(&self) -> &[f64] {
         &self.apart_m

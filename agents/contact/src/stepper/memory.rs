@@ -9,6 +9,8 @@ use glam::DVec3;
 use metachron_core::{AgentId, SensorPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::TouchKey;
 
+/// A pair that bears less than this share of the most that its places have borne is relieved.
+const RELIEVED_SHARE: f64 = 0.125;
 /// Two bodies belong together until they have not been near each other for this long, seconds.
 const PART_S: f64 = 0.2;
 
@@ -42,6 +44,8 @@ pub(super) struct Remembered {
     pub key: TouchKey,
     /// The impulse of one second at the rate of the last step: its mean force, world axes, N.
     pub force_n: DVec3,
+    /// The most that it has borne since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
+    pub load_n: f64,
     /// The slip owed, world axes, metres.
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
@@ -52,7 +56,7 @@ impl Remembered {
     /// A place that owes nothing.
     pub const fn new(key: TouchKey, force_n: DVec3) -> Self {
         let spin = Spin { radius_m: 0.0, torque_n_m: 0.0, owed_rad: 0.0 };
-        Self { key, force_n, owed_slip_m: DVec3::ZERO, spin }
+        Self { key, force_n, load_n: 0.0, owed_slip_m: DVec3::ZERO, spin }
     }
 }
 
@@ -78,6 +82,23 @@ impl Clone for PairMemory {
         (self.partner, self.near_until) = (from.partner, from.near_until);
         self.places.clone_from(&from.places);
         self.next.clone_from(&from.next);
+    }
+}
+
+impl PairMemory {
+    /// Notes what each place has borne in the step that was made. A compliance that followed each step's load would let a place rest equally
+    /// deep whatever it bears: nothing would resist where load moves from one side of a body to the other, and what is tall would sway for ever.
+    fn note_loads(&mut self) {
+        let (mut bears_n, mut borne_n) = (0.0, 0.0);
+        for place in &mut self.places {
+            let force_n = place.force_n.length();
+            place.load_n = place.load_n.max(force_n);
+            (bears_n, borne_n) = (bears_n + force_n, borne_n + place.load_n);
+        }
+        // what a body bears as a whole has become another: it landed, or was relieved
+        if bears_n < RELIEVED_SHARE * borne_n {
+            self.places.iter_mut().for_each(|place| place.load_n = place.force_n.length());
+        }
     }
 }
 
@@ -152,6 +173,7 @@ impl ContactMemory {
             pair.next.clear();
             // contacts come in the order of their whole names, which say more than what is remembered
             pair.places.sort_unstable_by_key(|place| place.key);
+            pair.note_loads();
         }
         self.pairs.retain(|pair| !pair.places.is_empty() || pair.near_until > now);
     }
@@ -264,7 +286,13 @@ mod tests {
         let mut memory = ContactMemory::default();
         let (partner, now) = (Partner::Static(3), SimTime::ZERO);
         let key = |vertex: u32| TouchKey { features: [vertex, 0], ..TouchKey::default() };
-        let place = Remembered { key: key(70_000), force_n: DVec3::Z, owed_slip_m: DVec3::X, ..Remembered::default() };
+        let place = Remembered {
+            key: key(70_000),
+            force_n: DVec3::Z,
+            load_n: 2.0,
+            owed_slip_m: DVec3::X,
+            ..Remembered::default()
+        };
         memory.pair(partner).next.push(place);
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)), place);
@@ -273,6 +301,26 @@ mod tests {
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
+    }
+
+    #[test]
+    fn a_place_keeps_the_most_that_it_bore_until_its_pair_is_relieved() {
+        let mut memory = ContactMemory::default();
+        let partner = Partner::Static(0);
+        let key = |vertex: u32| TouchKey { features: [vertex, 0], ..TouchKey::default() };
+        let mut load_n = |forces_n: [f64; 2]| {
+            for (vertex, force_n) in (0..).zip(forces_n) {
+                let before = memory.recall(partner, key(vertex));
+                memory.pair(partner).next.push(Remembered { force_n: DVec3::Z * force_n, ..before });
+            }
+            memory.turn(SimTime::ZERO);
+            [0, 1].map(|vertex| memory.recall(partner, key(vertex)).load_n)
+        };
+        assert_eq!(load_n([4.0, 1.0]), [4.0, 1.0]);
+        // load moves from one place to the other: both are as hard as what they have borne
+        assert_eq!(load_n([0.0, 5.0]), [4.0, 5.0]);
+        assert_eq!(load_n([1.0, 1.0]), [4.0, 5.0]);
+        assert_eq!(load_n([0.5, 0.25]), [0.5, 0.25], "an eighth of nine is more than they bear");
     }
 
     #[test]

@@ -43,7 +43,7 @@ mod weighing;
 mod yielding;
 
 use crate::StepContext;
-use crate::cluster::{Member, Settings, Solver};
+use crate::cluster::{DEPTH_DEFAULT_M, Member, Settings, Solver};
 use crate::law::Law;
 use blows::Rebounds;
 pub use doubling::StepDoubling;
@@ -60,7 +60,7 @@ pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
-pub use scene::{ClusterScene, Passage};
+pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 use search::{Judge, Round, Search};
 use spin_friction::SpinFriction;
 use tearing::Tearing;
@@ -133,6 +133,8 @@ pub struct ClusterReport {
     pub contacts: u32,
     /// Factors of the coupled matrix in all fine steps.
     pub factors: u32,
+    /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
+    pub products: u32,
     /// Convex passes in all fine steps.
     pub passes: u32,
     /// Solves in all fine steps.
@@ -168,6 +170,7 @@ pub struct PairTotal {
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
 pub struct ClusterStepper {
+    /// How deep contacts rest in the scene of the macro step that is made, metres.
     depth_m: f64,
     solver: Solver,
     search: Search,
@@ -199,17 +202,9 @@ pub struct ClusterStepper {
 
 impl Default for ClusterStepper {
     fn default() -> Self {
-        Self::new(Settings::default().depth_m)
-    }
-}
-
-impl ClusterStepper {
-    /// A stepper whose contacts rest `depth_m` metres deep.
-    #[must_use]
-    pub fn new(depth_m: f64) -> Self {
         Self {
-            depth_m,
-            solver: Solver::new(Settings { depth_m, ..Settings::default() }),
+            depth_m: DEPTH_DEFAULT_M,
+            solver: Solver::new(Settings::default()),
             search: Search::default(),
             ties: Ties::default(),
             joints: Joints::default(),
@@ -231,7 +226,9 @@ impl ClusterStepper {
             joints_missed_m: f64::INFINITY,
         }
     }
+}
 
+impl ClusterStepper {
     /// The macro step that was made last, seconds.
     #[must_use]
     pub const fn macro_s(&self) -> f64 {
@@ -265,6 +262,8 @@ impl ClusterStepper {
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
+        self.depth_m = scene.depth_m();
+        self.solver.set_depth_m(self.depth_m);
         self.joints_missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
         self.foresee(all, self.macro_s, threads)?;

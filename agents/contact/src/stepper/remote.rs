@@ -17,8 +17,6 @@ use std::sync::Arc;
 
 /// No partner is foretold by more than this many of its steps.
 const FORETOLD_STEPS: f64 = 2.0;
-/// How deep contacts rest, metres: docs/theory/clusters.md, eq. 5.
-const RESTS_M: f64 = 20e-6;
 
 /// A partner that is stepped elsewhere.
 #[derive(Debug, Default)]
@@ -45,12 +43,12 @@ pub struct RemoteMember {
 }
 
 /// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: what is deeper than contacts
-/// rest is pushed out once in that time, and not in each step of `h_s` until it shows (eq. 8).
-pub(super) fn slower_push_out(touch: &Touch, h_s: f64, late_s: f64) -> DVec3 {
-    if touch.gap_m >= -RESTS_M || late_s <= h_s {
+/// rest, `rests_m`, is pushed out once in that time, and not in each step of `h_s` until it shows (eq. 8).
+pub(super) fn slower_push_out(touch: &Touch, rests_m: f64, h_s: f64, late_s: f64) -> DVec3 {
+    if touch.gap_m >= -rests_m || late_s <= h_s {
         return DVec3::ZERO;
     }
-    let slow = push_out_m_s(-RESTS_M, h_s) + push_out_m_s(touch.gap_m + RESTS_M, late_s);
+    let slow = push_out_m_s(-rests_m, h_s) + push_out_m_s(touch.gap_m + rests_m, late_s);
     touch.normal * (push_out_m_s(touch.gap_m, h_s) - slow).min(0.0)
 }
 

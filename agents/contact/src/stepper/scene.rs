@@ -1,16 +1,19 @@
-//! What never changes around all clusters of a scene: static solids and joints.
+//! What never changes around all clusters of a scene: static solids, joints, how deep contacts rest.
 //!
 //! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
 
+use crate::cluster::DEPTH_DEFAULT_M;
 use crate::joint::{Joint, JointError};
 use metachron_core::AgentId;
 use metachron_geometry::Obstacle;
 use metachron_geometry::narrow_phase::{StaticSolid, StaticSolidError};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// The surroundings that all clusters of a scene share.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct ClusterScene {
+    depth_m: f64,
     statics: Vec<StaticSolid>,
     joints: Arc<[Joint]>,
     /// Numbers of joints, by their first bodies and then by themselves.
@@ -28,6 +31,31 @@ pub struct Passage {
     pub body: AgentId,
     /// The solid's number.
     pub solid: u32,
+}
+
+/// How deep contacts may be made to rest, metres. Below it the velocity by which they give way (clusters.md, eq. 5) drowns in the tolerance of
+/// a solve; above it bodies are seen to lie in each other.
+pub const DEPTH_RANGE_M: RangeInclusive<f64> = 1e-6..=1e-3;
+
+/// A depth outside its range.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("contacts would rest {depth_m} m deep; it must be {} to {} m", DEPTH_RANGE_M.start(), DEPTH_RANGE_M.end())]
+pub struct BadDepth {
+    /// The depth given.
+    pub depth_m: f64,
+}
+
+impl Default for ClusterScene {
+    fn default() -> Self {
+        Self {
+            depth_m: DEPTH_DEFAULT_M,
+            statics: Vec::new(),
+            joints: Arc::default(),
+            by_body: Vec::new(),
+            apart: Vec::new(),
+            passages: Vec::new(),
+        }
+    }
 }
 
 impl ClusterScene {
@@ -62,6 +90,20 @@ impl ClusterScene {
         self.passages.extend(passages);
         self.passages.sort_unstable();
         self
+    }
+
+    /// The same with contacts that rest `depth_m` metres deep.
+    ///
+    /// # Errors
+    /// [`BadDepth`] outside [`DEPTH_RANGE_M`].
+    pub fn resting_at(self, depth_m: f64) -> Result<Self, BadDepth> {
+        if DEPTH_RANGE_M.contains(&depth_m) { Ok(Self { depth_m, ..self }) } else { Err(BadDepth { depth_m }) }
+    }
+
+    /// How deep contacts rest, metres.
+    #[must_use]
+    pub const fn depth_m(&self) -> f64 {
+        self.depth_m
     }
 
     /// Whether a body passes through a static solid.

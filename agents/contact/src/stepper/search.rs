@@ -337,9 +337,9 @@ impl Search {
                     Err(_) => ends_m < 0.0,
                     // on its way it meets another place than the one it was kept from
                     Ok(at) if swept && ends_m < -LOOK_M => {
-                        let Contact { warm_n_s, owed_slip_m, .. } = contacts[at];
+                        let Contact { warm_n_s, load_n_s, owed_slip_m, .. } = contacts[at];
                         let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
-                        contacts[at] = Contact { warm_n_s, owed_slip_m, ..found };
+                        contacts[at] = Contact { warm_n_s, load_n_s, owed_slip_m, ..found };
                         owners[at].meets_s = None;
                         *moved = true;
                         false
@@ -470,7 +470,8 @@ struct Skinned<'a> {
 fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned<'_>) -> Contact {
     let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
     let found = contact(touch, sides.facing, sides.skins, round.progress);
-    Contact { surface_m_s: found.surface_m_s + remote::slower_push_out(touch, round.h_s, late_s), ..found }
+    let let_go_m_s = remote::slower_push_out(touch, round.scene.depth_m(), round.h_s, late_s);
+    Contact { surface_m_s: found.surface_m_s + let_go_m_s, ..found }
 }
 
 fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
@@ -489,5 +490,6 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
+        load_n_s: 0.0,
     }
 }

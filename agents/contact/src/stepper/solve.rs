@@ -154,6 +154,7 @@ impl ClusterStepper {
             solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
         }
         report.factors += took.factors as u32;
+        report.products += took.products as u32;
         report.passes += took.passes as u32;
         report.solves += 1;
         report.convex += u32::from(took.passes > 0);

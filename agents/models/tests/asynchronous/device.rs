@@ -123,17 +123,22 @@ fn a_device_on_a_local_model_is_steady() {
     }
 }
 
-/// The whole of a step late, as where it takes as long as the time that it covers: the limit of what a device may see.
+/// The whole of a step late, as where it takes as long as the time that it covers: the limit of what a device may see. A stiff column is
+/// steady there with the W of its cluster; softer ones let go of the tip with either.
 #[test]
 fn a_device_that_sees_states_at_their_time_diverges_on_the_bodys_own_w() {
+    for (young_pa, wanted_n) in [(1e4, 1.67), (1e5, 7.4), (1e6, 9.63)] {
+        for rate_hz in [60.0, 30.0] {
+            let free = press(young_pa, rate_hz, true, Some(own));
+            let case = format!("{young_pa:e} Pa, {rate_hz} Hz, own W: {free:.2?}");
+            println!("{case}");
+            assert!(free.spread_n >= free.mean_n && free.least_n == 0.0 && free.most_n > 5.0 * wanted_n, "{case}");
+        }
+    }
     for rate_hz in [60.0, 30.0] {
-        let [held, free] = [None, Some(own as Tamper)].map(|tamper| press(1e6, rate_hz, true, tamper));
-        println!("{rate_hz} Hz: {held:.2?}, own W {free:.2?}");
+        let held = press(1e6, rate_hz, true, None);
+        println!("{rate_hz} Hz: {held:.2?}");
         // how deep its lightest moment is differs by rounding; it never lets go
         assert!(held.spread_n < 0.25 * held.mean_n && held.least_n > 0.0, "{rate_hz} Hz: {held:?}");
-        assert!(
-            free.spread_n > free.mean_n && free.least_n == 0.0 && free.most_n > 5.0 * 9.63,
-            "{rate_hz} Hz: {free:?}"
-        );
     }
 }

@@ -15,6 +15,7 @@ mod organ;
 mod own_model;
 mod own_skin;
 mod passing;
+mod plate;
 mod rebounds;
 mod scenes;
 mod sets;

@@ -95,7 +95,7 @@ impl Table {
 
     pub fn among(bodies: Vec<Placed>, obstacles: &[Obstacle]) -> Self {
         let scene = ClusterScene::new(obstacles).unwrap();
-        let (stepper, snapshot) = (ClusterStepper::new(20e-6), Snapshot::default());
+        let (stepper, snapshot) = (ClusterStepper::default(), Snapshot::default());
         Self {
             bodies,
             time: SimTime::ZERO,
@@ -113,6 +113,11 @@ impl Table {
     /// The same with joints between its bodies, which are numbered in their order.
     pub fn jointed(self, joints: impl IntoIterator<Item = Joint>) -> Self {
         Self { scene: self.scene.jointed(joints.into_iter().collect()).unwrap(), ..self }
+    }
+
+    /// The same with contacts that rest so deep, metres.
+    pub fn resting_at(self, depth_m: f64) -> Self {
+        Self { scene: self.scene.resting_at(depth_m).unwrap(), ..self }
     }
 
     /// Links two bodies by a spring, as both of them see it.
@@ -197,6 +202,7 @@ impl Table {
         }
         let mut report = ClusterReport::default();
         if let Some(doubling) = &mut self.doubling {
+            doubling.begin_row();
             doubling.foresee(&self.scene, &mut all, dt, &PlainLoop).unwrap();
         }
         let mut advance = || report = self.stepper.step(&self.scene, &mut all, dt, &PlainLoop).unwrap();
@@ -246,6 +252,17 @@ impl Table {
     pub fn inverse_mass_per_kg(&self, body: usize, partner: Partner) -> [f64; 2] {
         let of_pair = |total: &&PairTotal| total.member == body && total.partner == partner;
         self.stepper.totals().iter().find(of_pair).map_or([f64::NAN; 2], |total| total.inverse_mass_per_kg)
+    }
+
+    /// Where the points are that a body publishes.
+    pub fn points(&mut self, body: usize) -> Vec<DVec3> {
+        self.bodies[body].agent.write_snapshot(&mut self.snapshot);
+        match &self.snapshot.body {
+            metachron_core::Body::Rigid(state) => vec![state.position],
+            metachron_core::Body::Soft(soft) => soft.positions.clone(),
+            metachron_core::Body::Curve(curve) => curve.positions.clone(),
+            _ => vec![],
+        }
     }
 
     /// Where a material point is.

@@ -1,11 +1,12 @@
-//! Objects that a scene repeats on a grid: how many, where, and under which names.
+//! Objects that a scene repeats on a grid: how many, where, how turned, and under which names.
 //!
 //! In: the common keys of one object. Out: [`Copies`]. Never here: what the object is.
 
 use super::POSITION_MAX_M;
-use crate::check::{Checker, Place, allowed};
+use super::rigid::rotation;
+use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CommonFile, OneOrEach};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_world::{Member, Spec};
 
@@ -14,21 +15,44 @@ const SIDE_MAX: u32 = 1000;
 /// Greatest spacing of neighbours in a grid, and greatest random displacement, metres.
 const SPACING_MAX_M: f64 = 1e4;
 
-/// Offsets of the copies of one object from the object's own position, metres.
+/// Greatest random turn about an axis to either side, degrees: any turn there is.
+const TURN_MAX_DEG: f64 = 180.0;
+
+/// The copies of one object.
 #[derive(Debug, Clone)]
 pub(super) struct Copies {
-    offsets_m: Vec<DVec3>,
+    all: Vec<CopyPlace>,
     numbered: bool,
+}
+
+/// Where one copy of an object is, by the object itself.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CopyPlace {
+    /// From the object's own position, metres, along the world's axes.
+    pub(super) offset_m: DVec3,
+    /// Beyond the object's own rotation, about the world's axes.
+    pub(super) turn: DQuat,
+}
+
+/// What a grid can do with the objects of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Repeats {
+    /// The model has no position of its own.
+    Nothing,
+    /// Its copies are moved.
+    Moved,
+    /// They may be turned as well.
+    MovedAndTurned,
 }
 
 impl Copies {
     /// The object itself and no other.
     pub(super) fn single() -> Self {
-        Self { offsets_m: vec![DVec3::ZERO], numbered: false }
+        Self { all: vec![CopyPlace { offset_m: DVec3::ZERO, turn: DQuat::IDENTITY }], numbered: false }
     }
 
     pub(super) fn len(&self) -> usize {
-        self.offsets_m.len()
+        self.all.len()
     }
 
     /// The name of every copy.
@@ -39,22 +63,32 @@ impl Copies {
     /// Every copy of `member`, which is the first; ids count up from its own.
     pub(super) fn members<'a>(&'a self, member: &'a Member) -> impl Iterator<Item = Member> + 'a {
         let names = self.names(&member.name);
-        (member.id.0..).zip(names).zip(&self.offsets_m).map(|((id, name), offset)| {
-            let spec = moved(member.spec.clone(), *offset);
+        (member.id.0..).zip(names).zip(&self.all).map(|((id, name), place)| {
+            let spec = placed(member.spec.clone(), place);
             Member { id: AgentId(id), name, spec, ..member.clone() }
         })
     }
 
-    /// The offset and the name of every copy.
-    pub(super) fn places<'a>(&'a self, name: &'a str) -> impl Iterator<Item = (DVec3, String)> + 'a {
-        self.offsets_m.iter().copied().zip(self.names(name))
+    /// The place and the name of every copy.
+    pub(super) fn places<'a>(&'a self, name: &'a str) -> impl Iterator<Item = (CopyPlace, String)> + 'a {
+        self.all.iter().copied().zip(self.names(name))
     }
 }
 
-fn moved(spec: Spec, by: DVec3) -> Spec {
+impl CopyPlace {
+    /// A rotation of the object as its copy has it.
+    pub(super) fn turned(self, rotation: DQuat) -> DQuat {
+        // untouched bits where nothing turns
+        if self.turn == DQuat::IDENTITY { rotation } else { (self.turn * rotation).normalize() }
+    }
+}
+
+fn placed(spec: Spec, place: &CopyPlace) -> Spec {
+    let by = place.offset_m;
     match spec {
         Spec::Rigid(mut body) => {
             body.position += by;
+            body.rotation = place.turned(body.rotation);
             Spec::Rigid(body)
         }
         Spec::Tube(mut tube) => {
@@ -69,20 +103,20 @@ fn moved(spec: Spec, by: DVec3) -> Spec {
     }
 }
 
-/// Reads the copies of an object; `can_move` says whether its model has a position of its own, `most` how many there may be.
+/// Reads the copies of an object, of which there may be `most`.
 pub(super) fn copies(
     c: &mut Checker<'_, '_>,
     place: &Place,
     common: &CommonFile,
-    can_move: bool,
+    repeats: Repeats,
     most: usize,
 ) -> Copies {
     let Some(grid) = common.grid else {
-        let scatter = common.scatter_m.is_some();
         let strays = [
             ("spacing_m", common.spacing_m.is_some()),
             ("rise_m", common.rise_m.is_some()),
-            ("scatter_m", scatter),
+            ("scatter_m", common.scatter_m.is_some()),
+            ("scatter_deg", common.scatter_deg.is_some()),
             ("scatter_seed", common.scatter_seed.is_some()),
         ];
         for (key, _) in strays.into_iter().filter(|(_, given)| *given) {
@@ -90,7 +124,7 @@ pub(super) fn copies(
         }
         return Copies::single();
     };
-    if !can_move {
+    if repeats == Repeats::Nothing {
         c.wrong(
             place,
             "grid",
@@ -110,26 +144,47 @@ pub(super) fn copies(
         return Copies::single();
     };
     let spacing = c.point(place, "spacing_m", spacing, SPACING_MAX_M);
-    let mut most = |value: f64| c.number(place, "scatter_m", value, &allowed(0.0..=SPACING_MAX_M, "m"));
-    let scatter_m = match common.scatter_m {
-        None => DVec3::ZERO,
-        Some(OneOrEach::One(value)) => DVec3::splat(most(value)),
-        Some(OneOrEach::Each(values)) => DVec3::from(values.map(most)),
-    };
-    let seed = u64::from(common.scatter_seed.unwrap_or(0));
     let [rise_x, rise_y] = common.rise_m.unwrap_or_default();
     let rise = c.point(place, "rise_m", [rise_x, rise_y, 0.0], SPACING_MAX_M);
+    let scatter = scatter(c, place, common, repeats);
     let at = |k: u32| {
-        let steps = DVec3::from(grid_place(grid, k));
-        steps * spacing + DVec3::Z * rise.dot(steps) + scatter_m * random_cube(seed, k)
+        let (steps, random) = (DVec3::from(grid_place(grid, k)), random_cubes(scatter.seed, k));
+        let offset_m = steps * spacing + DVec3::Z * rise.dot(steps) + scatter.reach_m * random[0];
+        CopyPlace { offset_m, turn: rotation(scatter.reach_deg * random[1]) }
     };
-    let offsets_m: Vec<DVec3> = (0..count as u32).map(at).collect();
-    if offsets_m.iter().any(|o| o.abs().max_element() > POSITION_MAX_M) {
+    let all: Vec<CopyPlace> = (0..count as u32).map(at).collect();
+    if all.iter().any(|copy| copy.offset_m.abs().max_element() > POSITION_MAX_M) {
         let expected = format!("expected a grid that ends within {POSITION_MAX_M} m");
         c.wrong(place, "spacing_m", "places objects too far away", expected);
         return Copies::single();
     }
-    Copies { offsets_m, numbered: true }
+    Copies { all, numbered: true }
+}
+
+/// How far copies stray at random from the places of their grid, to either side along and about each axis.
+struct Scatter {
+    reach_m: DVec3,
+    reach_deg: DVec3,
+    seed: u64,
+}
+
+fn scatter(c: &mut Checker<'_, '_>, place: &Place, common: &CommonFile, repeats: Repeats) -> Scatter {
+    if common.scatter_deg.is_some() && repeats != Repeats::MovedAndTurned {
+        c.wrong(place, "scatter_deg", "turns rigid bodies alone", "expected no `scatter_deg` for this model");
+    }
+    let reach_m = each(c, place, "scatter_m", common.scatter_m, &allowed(0.0..=SPACING_MAX_M, "m"));
+    let reach_deg = each(c, place, "scatter_deg", common.scatter_deg, &allowed(0.0..=TURN_MAX_DEG, "degrees"));
+    Scatter { reach_m, reach_deg, seed: u64::from(common.scatter_seed.unwrap_or(0)) }
+}
+
+/// One number for all axes, or one each; zero where none is given.
+fn each(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<OneOrEach>, range: &Allowed) -> DVec3 {
+    let mut number = |value: f64| c.number(place, key, value, range);
+    match given {
+        None => DVec3::ZERO,
+        Some(OneOrEach::One(value)) => DVec3::splat(number(value)),
+        Some(OneOrEach::Each(values)) => DVec3::from(values.map(number)),
+    }
 }
 
 /// Grid coordinates of copy `k`, counted along x, then y, then z.
@@ -137,10 +192,10 @@ fn grid_place([x, y, _]: [u32; 3], k: u32) -> [f64; 3] {
     [k % x, k / x % y, k / (x * y)].map(f64::from)
 }
 
-/// A pseudo-random point of the cube from −1 to 1, the same for the same seed and number.
-fn random_cube(seed: u64, number: u32) -> DVec3 {
+/// Two pseudo-random points of the cube from −1 to 1, the same for the same seed and number.
+fn random_cubes(seed: u64, number: u32) -> [DVec3; 2] {
     let mut state = seed << 32 | u64::from(number);
-    DVec3::from_array(std::array::from_fn(|_| {
+    let mut next = || {
         // SplitMix64 (Steele, Lea, Flood 2014): one state per coordinate
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
@@ -148,7 +203,8 @@ fn random_cube(seed: u64, number: u32) -> DVec3 {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^= z >> 31;
         (z >> 11) as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0
-    }))
+    };
+    [(); 2].map(|()| DVec3::new(next(), next(), next()))
 }
 
 #[cfg(test)]
@@ -166,7 +222,17 @@ mod tests {
 
     #[test]
     fn random_distances_fill_the_cube_and_depend_on_the_seed() {
-        let all: Vec<_> = (0..4000).map(|k| random_cube(7, k)).collect();
+        let both: Vec<_> = (0..4000).map(|k| random_cubes(7, k)).collect();
+        for all in [0, 1].map(|which| both.iter().map(|points| points[which]).collect::<Vec<_>>()) {
+            fills_the_cube(&all);
+        }
+        assert_ne!(random_cubes(7, 3), random_cubes(8, 3));
+        // places and turns have nothing to do with each other: of two uniform numbers the mean product is 0, with variance 1/9
+        let together = both.iter().map(|[a, b]| *a * *b).sum::<DVec3>() / 4000.0;
+        assert!(together.abs().max_element() < 4.0 / (3.0 * 4000.0_f64.sqrt()), "{together}");
+    }
+
+    fn fills_the_cube(all: &[DVec3]) {
         let mean = all.iter().sum::<DVec3>() / 4000.0;
         let square = all.iter().map(|p| *p * *p).sum::<DVec3>() / 4000.0;
         // uniform on −1 … 1: mean 0, mean square 1/3; four standard errors of 4000 draws
@@ -176,6 +242,33 @@ mod tests {
             "{square}"
         );
         assert!(all.iter().all(|p| p.abs().max_element() <= 1.0));
-        assert_ne!(random_cube(7, 3), random_cube(8, 3));
+    }
+
+    /// The turns of 27 copies of an object beyond its own, about the world's axis of each, radians.
+    fn turns(keys: &str) -> Result<Vec<DVec3>, String> {
+        let text = format!("format = 1\n[[object]]\nname = \"b\"\ngrid = [3, 3, 3]\nspacing_m = [1, 1, 1]\n{keys}");
+        let source = crate::Source::memory("grid", text.as_bytes()).unwrap();
+        let scene = crate::load(&source, &[]).map_err(|error| error.to_string())?;
+        let of = |member: &Member| match &member.spec {
+            Spec::Rigid(body) => body.rotation.to_scaled_axis(),
+            _ => DVec3::ZERO,
+        };
+        Ok(scene.agents.iter().map(of).collect())
+    }
+
+    #[test]
+    fn copies_of_a_rigid_body_are_turned_at_random_as_far_as_asked() {
+        let cube = "model = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.1, 0.1, 0.1]\n";
+        let deg = 10.0_f64.to_radians();
+        let about_z = turns(&format!("{cube}scatter_deg = [0, 0, 10]\nscatter_seed = 4")).unwrap();
+        assert!(about_z.iter().all(|turn| turn.truncate().length() < 1e-15 && turn.z.abs() <= deg));
+        // of 27 draws some are in each of the outer quarters
+        assert!(about_z.iter().any(|turn| turn.z > 0.5 * deg) && about_z.iter().any(|turn| turn.z < -0.5 * deg));
+        let other = turns(&format!("{cube}scatter_deg = [0, 0, 10]\nscatter_seed = 5")).unwrap();
+        assert_ne!(about_z, other);
+        assert!(turns(cube).unwrap().iter().all(|turn| *turn == DVec3::ZERO));
+        let rope =
+            "model = \"rope\"\npath_m = [[0, 0, 0], [0.1, 0, 0]]\nradius_m = 0.01\nyoung_pa = 1e5\nscatter_deg = 5";
+        assert!(turns(rope).unwrap_err().contains("scatter_deg"));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::common::{appearance, faults, levels, pace, refuse_tolerance, tolerance};
 use super::contact::{self, GroupNames};
-use super::grid::{Copies, copies};
+use super::grid::{Copies, Repeats, copies};
 use super::joint::WORLD;
 use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
@@ -159,6 +159,15 @@ impl ModelFile {
     const fn is_scenery(&self) -> bool {
         matches!(self, Self::Mesh(_) | Self::Tree(_))
     }
+
+    /// What a grid can do with it.
+    const fn repeats(&self) -> Repeats {
+        match self {
+            Self::Tool(_) | Self::Synthetic(_) => Repeats::Nothing,
+            Self::Rigid(_) => Repeats::MovedAndTurned,
+            _ => Repeats::Moved,
+        }
+    }
 }
 
 /// Input that all objects of a scene share.
@@ -195,9 +204,8 @@ pub(crate) fn read_objects(
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
         entry.fixed |= entry.model.is_scenery();
-        let can_move = !matches!(entry.model, ModelFile::Tool(_) | ModelFile::Synthetic(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
-        entry.copies = copies(c, &entry.place, &entry.common, can_move, most);
+        entry.copies = copies(c, &entry.place, &entry.common, entry.model.repeats(), most);
     }
     let names = assign_names(c, &entries);
     let groups = GroupNames::of(c, entries.iter().filter_map(|e| Some((&e.place, e.common.contact.as_ref()?))));
@@ -323,8 +331,9 @@ fn fixed_objects(
         let traits = groups.traits(c, &entry.place, entry.common.contact.as_ref());
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
             let obstacle = Obstacle { traits, ..obstacle };
-            for (offset, name) in entry.copies.places(&entry.common.name) {
-                found.0.push(Obstacle { name, position: obstacle.position + offset, ..obstacle.clone() });
+            for (copy, name) in entry.copies.places(&entry.common.name) {
+                let (position, rotation) = (obstacle.position + copy.offset_m, copy.turned(obstacle.rotation));
+                found.0.push(Obstacle { name, position, rotation, ..obstacle.clone() });
                 found.1.push(appearance);
             }
         }

@@ -69,10 +69,10 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
         if c.count() > before {
             continue;
         }
-        for (offset, name) in entry.copies.places(&entry.common.name) {
+        for (copy, name) in entry.copies.places(&entry.common.name) {
             scenery.extend(parts.iter().map(|(suffix, part)| Scenery {
                 name: format!("{name}{suffix}"),
-                at: Placement { position: part.at.position + offset, ..part.at },
+                at: Placement { position: part.at.position + copy.offset_m, ..part.at },
                 ..part.clone()
             }));
         }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 19] = [
+pub const COMMON_KEYS: [&str; 20] = [
     "name",
     "rate_hz",
     "dt_ms",
@@ -25,6 +25,7 @@ pub const COMMON_KEYS: [&str; 19] = [
     "spacing_m",
     "rise_m",
     "scatter_m",
+    "scatter_deg",
     "scatter_seed",
 ];
 
@@ -83,7 +84,10 @@ pub struct CommonFile {
     /// Moves every copy of the grid by a random distance along each axis, uniform up to this far either way, metres, 0 … 1e4; one
     /// number, or one per axis: `[x, y, z]`. Default 0.
     pub scatter_m: Option<OneOrEach>,
-    /// Seed of the random distances. Default 0.
+    /// Turns every copy of the grid, of a rigid body, by a random angle about each of the world's axes, x, then y, then z, uniform up to this far either way,
+    /// degrees, 0 … 180; one number, or one per axis: `[x, y, z]`. Default 0.
+    pub scatter_deg: Option<OneOrEach>,
+    /// Seed of the random distances and turns. Default 0.
     pub scatter_seed: Option<u32>,
 }
 

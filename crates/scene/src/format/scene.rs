@@ -72,6 +72,10 @@ pub struct WorldFile {
     pub environment: Option<EnvironmentKind>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<ContactsFile>,
+    /// How deep objects that lie on each other rest, metres, 1e-6 … 1e-3: the softness of contacts follows from it. Default 2e-5; smaller
+    /// for bodies below a centimetre, at some more factors a step. What weighs too little to be pressed so deep lies less deep.
+    #[schemars(range(min = 1e-6, max = 1e-3))]
+    pub contact_depth_m: Option<f64>,
     /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
 }

@@ -145,6 +145,9 @@ pub struct ClusterRow {
     pub members: Vec<String>,
     /// The last macro step, milliseconds.
     pub h_ms: f64,
+    /// Share of the macro step that its turn leaves unused, by the present cost of its members' steps: 1 where steps cost nothing, below zero
+    /// where it cannot keep up with time.
+    pub slack: f64,
     /// Steps of each member within it.
     pub steps: Vec<u32>,
     /// Contacts of the last step, those that bear nothing included.
@@ -153,6 +156,8 @@ pub struct ClusterRow {
     pub problems: u64,
     /// Factors of the coupled matrix, for each problem.
     pub factors: f64,
+    /// Products of conjugate gradients with the coupled matrix, for each problem: large soft bodies are solved by these, without factors.
+    pub products: f64,
     /// Convex passes in the run: the way that is taken where Newton's method gives up.
     pub passes: u64,
     /// Problems whose solve came to no end.
@@ -161,6 +166,8 @@ pub struct ClusterRow {
     pub depth_m: f64,
     /// The deepest overlap of the run, metres.
     pub depth_max_m: f64,
+    /// How deep its contacts are made to rest, metres.
+    pub depth_wanted_m: f64,
 }
 
 /// The coupling of two agents.
@@ -414,12 +421,15 @@ mod tests {
         "/clusters/0/id",
         "/clusters/0/members/0",
         "/clusters/0/h_ms",
+        "/clusters/0/slack",
         "/clusters/0/steps/0",
         "/clusters/0/contacts",
         "/clusters/0/factors",
+        "/clusters/0/products",
         "/clusters/0/passes",
         "/clusters/0/cut",
         "/clusters/0/depth_m",
+        "/clusters/0/depth_wanted_m",
         "/couplings/0/a",
         "/couplings/0/b",
         "/couplings/0/kind",

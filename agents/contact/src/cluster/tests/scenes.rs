@@ -67,6 +67,7 @@ impl Stack {
             friction: self.friction,
             owed_slip_m: self.owed[index],
             warm_n_s: self.impulses[index],
+            load_n_s: 0.0,
             ..contact([high, low], DVec3::Z)
         }
     }

@@ -11,9 +11,6 @@ use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot}
 use metachron_geometry::Obstacle;
 use std::time::Duration;
 
-/// Softness of contacts in scenes: how deep what lies still is, metres.
-const DEPTH_M: f64 = 20e-6;
-
 /// What a series of steps took.
 pub(super) struct Series {
     /// CPU milliseconds of each step, in rising order.
@@ -55,7 +52,7 @@ impl Play {
             is_alone: obstacles.is_empty() && bodies.len() == 1,
             bodies: bodies.into_iter().map(member).collect(),
             scene: ClusterScene::new(obstacles).context("the static solids")?,
-            stepper: ClusterStepper::new(DEPTH_M),
+            stepper: ClusterStepper::default(),
             time: SimTime::ZERO,
             step_s,
             snapshot: Snapshot::default(),
