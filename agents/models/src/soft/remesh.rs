@@ -141,7 +141,7 @@ impl SoftBody {
         }
         (self.velocities, self.spec.gravity) = (velocities, weight);
         let energy_j = self.energy_j();
-        if !(energy_j <= most_j) {
+        if energy_j.is_nan() || energy_j > most_j {
             self.positions = before;
         }
     }

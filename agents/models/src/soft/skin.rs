@@ -31,7 +31,7 @@ pub(super) struct Skin {
 }
 
 /// How far the points are from where their nodes carry them: what is left of what they would have jumped by.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Apart {
     /// Of each point, turned back to how the body lay when it began, metres; empty where nothing is left.
     by: Vec<DVec3>,
@@ -157,6 +157,19 @@ impl Skin {
     /// The point of the skin that stands for a node.
     pub fn point_of(&self, node: usize) -> u32 {
         self.nearest[node]
+    }
+}
+
+impl Clone for Apart {
+    fn clone(&self) -> Self {
+        Self { by: self.by.clone(), then: self.then.clone(), turn: self.turn }
+    }
+
+    // into storage that is there
+    fn clone_from(&mut self, from: &Self) {
+        self.by.clone_from(&from.by);
+        self.then.clone_from(&from.then);
+        self.turn = from.turn;
     }
 }
 

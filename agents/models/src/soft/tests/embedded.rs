@@ -104,6 +104,25 @@ fn a_change_of_spacing_leaves_the_skin_where_it_is() {
 }
 
 #[test]
+fn a_ball_is_held_by_the_nodes_that_it_comes_near_to_and_by_no_others_at_any_spacing() {
+    // half the finest ε: the bottom's plane is that near as far as 45.8 mm from where a ball of 0.1 m touches it
+    let reach_m = ((0.1_f64 + 0.01).powi(2) - 0.1_f64.powi(2)).sqrt();
+    for eps_m in [0.02, 0.029, 0.05] {
+        let body = SoftBody::new(SoftSpec { held: vec![Side::Bottom], ..spec(ball_shape(eps_m)) }).unwrap();
+        let bottom = body.mesh.rest.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+        let nodes = body.mesh.rest.iter().zip(&body.mesh.held);
+        assert!(body.mesh.held.contains(&true));
+        for (x, held) in nodes {
+            let beside_m = x.truncate().length();
+            let may_be = x.z - bottom < 1e-9 && beside_m < reach_m * 1.05;
+            let must_be = x.z - bottom < 1e-9 && beside_m < reach_m * 0.9;
+            assert!(may_be || !held, "ε {eps_m}: {x} is held");
+            assert!(*held || !must_be, "ε {eps_m}: {x} is not held");
+        }
+    }
+}
+
+#[test]
 fn surfaces_without_an_inside_are_refused_with_the_reason() {
     let SoftShape::Embedded { surface, .. } = ball_shape(0.05) else { panic!() };
     let refused = |points: Vec<DVec3>, triangles: Vec<[u32; 3]>| {
