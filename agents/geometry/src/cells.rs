@@ -263,7 +263,8 @@ impl Cells {
         }
         let volume = |size: DVec3| if size.min_element() > 0.0 { size.element_product() } else { 0.0 };
         // what stands on the floor of a cell is in it
-        let (middle, half) = (0.5 * (low_m + high_m), (0.5 * (high_m - low_m) - TOUCH_M).max(DVec3::splat(0.1 * TOUCH_M)));
+        let (middle, half) =
+            (0.5 * (low_m + high_m), (0.5 * (high_m - low_m) - TOUCH_M).max(DVec3::splat(0.1 * TOUCH_M)));
         let (low, high) = (middle - half, middle + half);
         let within: f64 = self.cells.iter().map(|cell| volume(cell.high_m.min(high) - cell.low_m.max(low))).sum();
         if within >= (1.0 - 1e-9) * volume(high - low) { Exposure::Within } else { Exposure::Partly }
@@ -277,7 +278,8 @@ impl Cells {
         let mut walls = Vec::new();
         for &side in sides {
             let holes = self.portals.iter().filter(|portal| portal.between.contains(&Region::Cell(cell)));
-            let holes: Vec<_> = holes.filter(|portal| it.side_of(&portal.corners_m) == Some(side)).map(bounds).collect();
+            let holes: Vec<_> =
+                holes.filter(|portal| it.side_of(&portal.corners_m) == Some(side)).map(bounds).collect();
             walls.extend(panels(wall(it, side, sides, thickness_m), side.axis, &holes));
         }
         walls
@@ -300,7 +302,8 @@ fn wall(cell: &Cell, side: Side, sides: &[Side], thickness_m: f64) -> (DVec3, DV
 }
 
 /// A slab across `axis` without its holes: strips along the first of the other axes, cut where a hole begins or ends.
-fn panels((low, high): (DVec3, DVec3), axis: usize, holes: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+fn panels(slab: (DVec3, DVec3), axis: usize, holes: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+    let (low, high) = slab;
     let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
     let mut cuts: Vec<f64> = holes.iter().flat_map(|hole| [hole.0[u], hole.1[u]]).chain([low[u], high[u]]).collect();
     cuts.retain(|cut| (low[u]..=high[u]).contains(cut));
@@ -338,7 +341,8 @@ fn fault(cells: &[Cell], number: usize, portal: &Portal) -> Option<CellsError> {
     if portal.between[0] == portal.between[1] {
         return Some(CellsError::Nowhere { portal: number });
     }
-    let named = portal.between.iter().filter_map(|region| if let Region::Cell(cell) = region { Some(*cell) } else { None });
+    let named =
+        portal.between.iter().filter_map(|region| if let Region::Cell(cell) = region { Some(*cell) } else { None });
     if let Some(cell) = named.clone().find(|cell| *cell >= cells.len()) {
         return Some(CellsError::Unknown { portal: number, cell });
     }

@@ -80,7 +80,8 @@ impl SceneView {
             }
         }
         let shaded = picture.environment.throws_shadows().then(|| LightColumn::of(&picture));
-        let shades = |prop: &StaticShape| shaded.is_some_and(|column| column.holds(prop.position, prop.body.radius_m));
+        let is_held = |prop: &StaticShape| shaded.is_some_and(|column| column.holds(prop.position, prop.body.radius_m));
+        let shades = |prop: &StaticShape| prop.throws_shadow && is_held(prop);
         for prop in self.statics.iter().filter(|prop| prop.seen || shades(prop)) {
             add_static(prop, &mut picture, &mut scratch.solids);
         }
@@ -110,7 +111,8 @@ impl SceneView {
         let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
         let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.bounds.half_m));
-        let fixed = self.statics.iter().map(|p| (p.position, p.body.radius_m, p.half_extents()));
+        let fixed = self.statics.iter().filter(|p| p.throws_shadow);
+        let fixed = fixed.map(|p| (p.position, p.body.radius_m, p.half_extents()));
         let (mut ball, mut tight) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], [DVec3::INFINITY, DVec3::NEG_INFINITY]);
         for (centre, radius, half) in moving.chain(fixed).filter(|(c, r, _)| near(*c, *r)) {
             ball = [ball[0].min(centre - radius), ball[1].max(centre + radius)];

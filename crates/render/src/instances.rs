@@ -51,7 +51,7 @@ impl SceneView {
 /// The kind of a mesh without its own texture.
 pub(super) fn kind(shading: Shading, mesh: MeshKey) -> SolidKind {
     let shading = if shading == Shading::Textured { Shading::PerPixel } else { shading };
-    SolidKind { shading, texture: 0, tissue: false, mesh }
+    SolidKind { shading, texture: 0, tissue: false, mesh, shadowless: false }
 }
 
 /// The mesh and size of a solid at level `n`; `None` for one that has neither a given mesh nor a primitive.
@@ -110,7 +110,7 @@ fn add_scenery(track: &mut Track, level: Level, picture: &Picture, solids: &mut 
     let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
     let painted = track.painting.as_ref().map(|painting| painting.apply(&mut paint, level.shading));
     let (kind, wrap) = match painted.flatten() {
-        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, tissue: false, mesh }, wrap),
+        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, ..kind(level.shading, mesh) }, wrap),
         None => (kind(level.shading, mesh), 0.0),
     };
     let still = instance(at.position - picture.origin, at.rotation, size, paint);
@@ -143,7 +143,8 @@ pub(super) fn add_static(prop: &StaticShape, picture: &mut Picture, solids: &mut
     let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.mesh_index, STATIC_LEVEL)) else { return };
     let paint = Paint::of(prop.appearance, [0; 4]);
     let still = instance(prop.position - picture.origin, prop.rotation, size, paint);
-    solids.push(clad(kind(Shading::PerPixel, mesh), still, prop.appearance, prop.body.radius_m));
+    let kind = SolidKind { shadowless: !prop.throws_shadow, ..kind(Shading::PerPixel, mesh) };
+    solids.push(clad(kind, still, prop.appearance, prop.body.radius_m));
 }
 
 /// The same with the texture of tissue where it is a mesh of it, of this radius.

@@ -153,6 +153,8 @@ pub struct SolidKind {
     pub tissue: bool,
     /// Their mesh.
     pub mesh: MeshKey,
+    /// Whether they throw no shadow.
+    pub shadowless: bool,
 }
 
 /// Solids of one kind: instances `first .. first + count`.

@@ -19,6 +19,9 @@ use metachron_geometry::{
 };
 use std::sync::Arc;
 
+/// Width added around static solids in tests of what is seen, metres.
+const RIM_M: f64 = 1e-3;
+
 /// The states that a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum States {
@@ -137,6 +140,8 @@ pub struct StaticObject {
     pub obstacle: Obstacle,
     /// Its colour and material.
     pub appearance: Appearance,
+    /// Whether it throws a shadow, and the light is fitted to it: walls and ceilings of rooms do not, or it would be dark in them.
+    pub throws_shadow: bool,
 }
 
 /// All objects that can be drawn, and their states at the time of a frame.
@@ -193,6 +198,7 @@ pub(super) struct StaticShape {
     pub position: DVec3,
     pub rotation: DQuat,
     pub body: BodyShape,
+    pub throws_shadow: bool,
     /// Whether the camera may see it.
     pub seen: bool,
 }
@@ -384,12 +390,14 @@ impl StaticShape {
     fn new(prop: StaticObject, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         let Obstacle { solid, position, rotation, .. } = prop.obstacle;
         let body = BodyShape::of(&solid, meshes);
-        Self { solid, appearance: prop.appearance, position, rotation, body, seen: true }
+        let StaticObject { appearance, throws_shadow, .. } = prop;
+        Self { solid, appearance, position, rotation, body, throws_shadow, seen: true }
     }
 
-    /// A bounding ball and box; without a size for a plane.
+    /// A bounding ball and box, with a rim: what touches a side of a cell may be that side, and is seen from beyond it too.
     pub fn bounds(&self) -> Bounds {
-        Bounds { centre: self.position, radius_m: self.body.radius_m, half_m: self.half_extents() }
+        let half_m = self.half_extents() + RIM_M;
+        Bounds { centre: self.position, radius_m: self.body.radius_m + 2.0 * RIM_M, half_m }
     }
 
     /// Half extents of the axis-aligned bounding box about its position, metres.

@@ -8,7 +8,7 @@ use super::scene_view::{Bounds, Form, SceneView, StaticShape, Track};
 use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState};
-use metachron_geometry::{Cells, Exposure, Region};
+use metachron_geometry::{Cell, Cells, Exposure, Region};
 
 /// The view of an actor by the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +93,7 @@ impl Survey {
     /// Whether an item has a part in a region that is reached.
     fn is_potentially_visible(&self, item: usize) -> bool {
         let Bounded { bounds, exposure, .. } = self.items[item];
-        let is_in = |(number, cell): (usize, &metachron_geometry::Cell)| {
+        let is_in = |(number, cell): (usize, &Cell)| {
             cell.overlaps(bounds.low, bounds.high) && self.reach.is_reached(Region::Cell(number))
         };
         match exposure {
@@ -155,6 +155,13 @@ impl SceneView {
             prop.seen = *in_sight || prop.body.radius_m == 0.0;
         }
         self.count();
+    }
+
+    /// The cells, each with whether the eye of the last survey reaches it.
+    pub fn cells(&self) -> impl Iterator<Item = (Cell, bool)> + '_ {
+        let Survey { cells, reach, .. } = &self.survey;
+        let cells = cells.all().iter().enumerate();
+        cells.map(|(number, cell)| (*cell, reach.is_reached(Region::Cell(number))))
     }
 
     /// How many actors the last survey found.
@@ -330,7 +337,8 @@ mod tests {
         assert_eq!(frame(0, &all, 0.0), (1010, 1010, 0.0));
         assert_eq!(frame(10, &[], 0.0), (10, 10, 0.0));
         assert_eq!(frame(20, &[], 0.0), (10, 10, 0.0));
-        assert_eq!(frame(30, &[], 500.0), (10, 1010, 0.0), "another camera");
+        // the ten, and of the others the five that came into view; three of the ten went out of it
+        assert_eq!(frame(30, &[], 500.0), (10, 15, 0.0), "another camera");
         assert_eq!(frame(40, &[], 500.0), (10, 10, 0.0));
         // speed after five steps of 10 ms; a frame shows one step less
         assert_eq!(frame(50, &[700], 500.0), (11, 11, 40.0));

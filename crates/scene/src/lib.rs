@@ -115,7 +115,9 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
+    let fixed = objects.obstacles.len();
     let cells = build::cells(c, &file.cell, &file.portal, &mut objects);
+    let walls = fixed..objects.obstacles.len();
     let contacts = file.world.as_ref().and_then(|world| world.contacts);
     if let Some(ContactsFile::By(_)) = contacts {
         let expected =
@@ -140,6 +142,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         scenery: objects.scenery,
         groups,
         cells,
+        walls,
         contacts: contacts != Some(ContactsFile::Whether(false)),
         joints: joints.into(),
         couplings,

@@ -60,7 +60,12 @@ fn what_is_wrong_with_rooms_is_said_where_it_stands() {
         ("[\"room\", \"corridor\"]", "[\"room\", \"room\"]", 13, &["names one cell twice"]),
         ("[\"room\", \"corridor\"]", "[\"room\", \"outside\"]", 13, &["cell `corridor` is behind the portal"]),
         ("from_m = [4, 1, 0]\nto_m = [4, 2, 2]", "from_m = [0, 1, 0]\nto_m = [0, 2, 2]", 14, &["cell `corridor`"]),
-        ("from_m = [4, 1, 0]\nto_m = [4, 2, 2]", "from_m = [4, 1, 0]\nto_m = [4, 4, 2]", 14, &["a side of cell `room`"]),
+        (
+            "from_m = [4, 1, 0]\nto_m = [4, 2, 2]",
+            "from_m = [4, 1, 0]\nto_m = [4, 4, 2]",
+            14,
+            &["a side of cell `room`"],
+        ),
         ("to_m = [4, 2, 2]", "to_m = [5, 2, 2]", 15, &["shares no coordinate"]),
         ("from_m = [4, 1, 0]\nto_m = [4, 2, 2]", "", 13, &["has no opening", "`corners_m`"]),
         (

@@ -117,8 +117,12 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
     });
     let actors = agents.chain(still);
-    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances);
-    let props = props.map(|(obstacle, wish)| StaticObject { obstacle: obstacle.clone(), appearance: appearance(wish) });
+    let props = scene.obstacles.iter().zip(&scene.obstacle_appearances).enumerate();
+    let props = props.map(|(at, (obstacle, wish))| StaticObject {
+        obstacle: obstacle.clone(),
+        appearance: appearance(wish),
+        throws_shadow: !scene.walls.contains(&at),
+    });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
     scene_view.set_cells(scene.cells.clone());
     scene_view.set_environment(match scene.environment {
@@ -247,7 +251,11 @@ fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
     ObjectView { may_vanish: appearance.may_vanish.unwrap_or(scene.target.may_vanish), ..view }
 }
 
-fn view_and_appearance<'a>(at: usize, seen: &Visibility, scene: &'a Scene) -> (ObjectView, &'a metachron_world::Appearance) {
+fn view_and_appearance<'a>(
+    at: usize,
+    seen: &Visibility,
+    scene: &'a Scene,
+) -> (ObjectView, &'a metachron_world::Appearance) {
     let (agents, members) = (scene.agents.len(), scene.scenery.len());
     if let Some(member) = scene.agents.get(at) {
         return (view(seen, member), &member.appearance);

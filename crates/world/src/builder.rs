@@ -342,6 +342,7 @@ impl SceneBuilder {
             scenery: Vec::new(),
             groups: Vec::new(),
             cells: Cells::default(),
+            walls: 0..0,
             contacts: true,
             joints: Arc::new([]),
             couplings: Vec::new(),

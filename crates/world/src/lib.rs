@@ -36,8 +36,8 @@ pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
 pub use initial_overlap::Moved;
 pub use overlap::Overlap;
 pub use scene::{
-    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe, RENDER_SCALE,
-    Scene, Scenery, Spec, Target, View,
+    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe,
+    RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
 pub use spec::Division;
 pub use world::{Object, World, WorldError};

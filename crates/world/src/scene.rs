@@ -57,6 +57,8 @@ pub struct Scene {
     pub groups: Vec<Group>,
     /// Rooms and the openings between them.
     pub cells: Cells,
+    /// Which obstacles are walls of rooms: light falls in through them.
+    pub walls: Range<usize>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
     /// Joints between rigid agents.

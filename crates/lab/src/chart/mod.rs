@@ -123,6 +123,7 @@ const POLICIES: &[Entry] = &[
     entry::<policies::selection::Selection>(),
     entry::<policies::bound::Bound>(),
     entry::<policies::scanline::Scanline>(),
+    entry::<policies::rooms::Rooms>(),
     entry::<policies::every::Every>(),
 ];
 

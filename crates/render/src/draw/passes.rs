@@ -36,7 +36,8 @@ impl Renderer {
         }
         for strokes in [false, true] {
             pass.set_pipeline(if strokes { &self.pipelines.stroke_shadow } else { &self.pipelines.solid_shadow });
-            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.kind.mesh) == strokes) {
+            let runs = picture.solids.iter().filter(|run| !run.kind.shadowless);
+            for run in runs.filter(|run| self.meshes.is_strokes(run.kind.mesh) == strokes) {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }

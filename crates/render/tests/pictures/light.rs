@@ -82,7 +82,11 @@ fn a_ball_is_as_bright_as_lambert_s_law_up_to_its_terminator() {
     for (options, far_m) in QUALITIES.into_iter().flat_map(|options| [(options, 0.0), (options, 8.0)]) {
         // what stands far away makes the texels of the shadow map large: 16 across the ball's radius on a processor
         let (solid, position) = (Solid::Ball { radius_m: 0.05 }, camera.forward() * far_m);
-        let far = StaticObject { obstacle: obstacle(solid, position, DQuat::IDENTITY), appearance: LOOK };
+        let far = StaticObject {
+            obstacle: obstacle(solid, position, DQuat::IDENTITY),
+            appearance: LOOK,
+            throws_shadow: true,
+        };
         let actor = Actor { id: AgentId(0), form: Form::Solid(Solid::Ball { radius_m: RADIUS_M }), appearance: LOOK };
         let mut stage = SceneView::new(vec![actor], vec![far]);
         let body = Body::Rigid(RigidState::default());
@@ -118,7 +122,8 @@ fn a_plane_under_a_low_light_is_evenly_lit() {
         let camera = Camera::looking(n * 3.0 + level * 0.7, DVec3::ZERO, 0.3);
         for options in QUALITIES {
             let solid = Solid::Box { half_extents_m: DVec3::new(1.0, 1.0, 0.05) };
-            let slab = StaticObject { obstacle: obstacle(solid, n * -0.05, rotation), appearance: LOOK };
+            let slab =
+                StaticObject { obstacle: obstacle(solid, n * -0.05, rotation), appearance: LOOK, throws_shadow: true };
             for image in draw(&gpu, &mut SceneView::new(vec![], vec![slab]), &camera, options) {
                 let (below, speckled, count) = worst(&image, |_| Some(n));
                 assert!(count > 100_000, "it fills the picture");

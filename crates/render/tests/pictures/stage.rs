@@ -88,10 +88,12 @@ fn tray() -> Vec<StaticObject> {
             restitution: 0.0,
         },
         appearance: steel,
+        throws_shadow: true,
     };
     let floor = StaticObject {
         obstacle: Obstacle { solid: Solid::Plane, ..side(DVec3::new(0.0, 0.0, -0.016), DVec3::ONE).obstacle },
         appearance: Appearance { colour: [30, 58, 66], material: Material::Skin },
+        throws_shadow: true,
     };
     vec![
         floor,

@@ -2,9 +2,9 @@
 //!
 //! In: `[[cell]]` and `[[portal]]` tables. Out: checked [`Cells`], walls as fixed boxes. Never here: a view.
 
+use super::POSITION_MAX_M;
 use super::common::parse_colour;
 use super::object::{OBSTACLES_MAX, Objects, too_many};
-use super::POSITION_MAX_M;
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CellFile, Point, PortalFile, SideKind};
 use glam::{DQuat, DVec3};
@@ -28,7 +28,12 @@ const WALL_SURFACE: (f64, f64) = (0.5, 0.2);
 const THICKNESS: Allowed = allowed(1e-3..=100.0, "m");
 
 /// Reads cells and portals, and adds the walls of the cells to the fixed objects.
-pub(crate) fn cells(c: &mut Checker<'_, '_>, cells: &[CellFile], portals: &[PortalFile], objects: &mut Objects) -> Cells {
+pub(crate) fn cells(
+    c: &mut Checker<'_, '_>,
+    cells: &[CellFile],
+    portals: &[PortalFile],
+    objects: &mut Objects,
+) -> Cells {
     for (key, count) in [("cell", cells.len()), ("portal", portals.len())] {
         if count > CELLS_MAX {
             let expected = format!("expected at most {CELLS_MAX}");
@@ -167,7 +172,12 @@ fn report(c: &mut Checker<'_, '_>, fault: &CellsError, cells: &[CellFile], porta
             c.wrong(&cell_place(cell, &cells[cell]), "from_m", what, "expected cells that touch at most");
         }
         CellsError::Nowhere { portal } => {
-            c.wrong(&portal_place(portal), "between", "names one cell twice", "expected two cells, or one and `outside`");
+            c.wrong(
+                &portal_place(portal),
+                "between",
+                "names one cell twice",
+                "expected two cells, or one and `outside`",
+            );
         }
         CellsError::Unknown { portal, .. } => {
             c.wrong(&portal_place(portal), "between", "names a cell that does not exist", "expected names of cells");
