@@ -38,6 +38,13 @@ fn every_limit_of_the_closed_loop_is_kept() {
 }
 
 #[test]
+fn rooms_hide_what_is_behind_their_walls_and_scan_lines_have_the_printed_accuracy() {
+    let of = quick(&["scanline", "rooms"]);
+    holds(&of("scanline"), 4);
+    holds(&of("rooms"), 3);
+}
+
+#[test]
 fn live_policies_are_drawn_and_held_against_full_detail() {
     if let Err(error) = metachron_render::Gpu::headless() {
         assert!(std::env::var("METACHRON_REQUIRE_ADAPTER").is_err(), "{error}");

@@ -302,7 +302,8 @@ fn wall(cell: &Cell, side: Side, sides: &[Side], thickness_m: f64) -> (DVec3, DV
 }
 
 /// A slab across `axis` without its holes: strips along the first of the other axes, cut where a hole begins or ends.
-fn panels((low, high): (DVec3, DVec3), axis: usize, holes: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+fn panels(slab: (DVec3, DVec3), axis: usize, holes: &[(DVec3, DVec3)]) -> Vec<(DVec3, DVec3)> {
+    let (low, high) = slab;
     let [u, v] = [[1, 2], [0, 2], [0, 1]][axis];
     let mut cuts: Vec<f64> = holes.iter().flat_map(|hole| [hole.0[u], hole.1[u]]).chain([low[u], high[u]]).collect();
     cuts.retain(|cut| (low[u]..=high[u]).contains(cut));

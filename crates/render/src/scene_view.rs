@@ -19,6 +19,9 @@ use metachron_geometry::{
 };
 use std::sync::Arc;
 
+/// Width added around static solids in tests of what is seen, metres.
+const RIM_M: f64 = 1e-3;
+
 /// The states that a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum States {
@@ -396,9 +399,10 @@ impl StaticShape {
         Self { solid, appearance, position, rotation, body, throws_shadow, seen: true }
     }
 
-    /// A bounding ball and box; without a size for a plane.
+    /// A bounding ball and box, with a rim: what touches a side of a cell may be that side, and is seen from beyond it too.
     pub fn bounds(&self) -> Bounds {
-        Bounds { centre: self.position, radius_m: self.body.radius_m, half_m: self.half_extents() }
+        let half_m = self.half_extents() + RIM_M;
+        Bounds { centre: self.position, radius_m: self.body.radius_m + 2.0 * RIM_M, half_m }
     }
 
     /// Half extents of the axis-aligned bounding box about its position, metres.

@@ -1,10 +1,10 @@
 //! Visibility through portals against rays: no object that a ray reaches is missed.
 
 use super::super::bounds_tree::Random;
-use super::super::scene_view::{Actor, Appearance, Form, Material, States};
+use super::super::scene_view::{Actor, Appearance, Form, Material, States, StaticObject};
 use super::*;
 use metachron_core::{RigidState, SimTime, Snapshot};
-use metachron_geometry::{Portal, Solid};
+use metachron_geometry::{Obstacle, Portal, Solid};
 use std::sync::Arc;
 
 const SIZE: Size = Size { width: 160, height: 90 };
@@ -137,6 +137,31 @@ fn no_object_that_a_ray_sees_is_missed() {
         if name == "maze" {
             assert!(4 * found < 3 * in_frustum, "{found} of {in_frustum}: a maze hides more than a quarter");
         }
+    }
+}
+
+#[test]
+fn a_wall_on_a_side_of_a_cell_is_seen_from_both_sides() {
+    let cell = Cell { low_m: DVec3::ZERO, high_m: DVec3::new(4.0, 4.0, 3.0) };
+    let wall = |x: f64| StaticObject {
+        obstacle: Obstacle {
+            name: String::new(),
+            solid: Solid::Box { half_extents_m: DVec3::new(0.05, 2.0, 1.5) },
+            position: DVec3::new(x, 2.0, 1.5),
+            rotation: glam::DQuat::IDENTITY,
+            friction: 0.5,
+            restitution: 0.0,
+            traits: metachron_geometry::ContactTraits::default(),
+        },
+        appearance: Appearance { colour: [200; 3], material: Material::Plastic },
+        throws_shadow: false,
+    };
+    // one within the sides of the cell, one amid it
+    let mut scene_view = SceneView::new(vec![], vec![wall(0.05), wall(2.0)]);
+    scene_view.set_cells(Cells::new(vec![cell], vec![]).unwrap());
+    for (eye, seen) in [(DVec3::new(-3.0, 2.0, 1.5), [true, false]), (DVec3::new(3.5, 2.0, 1.5), [true, true])] {
+        scene_view.survey(&Camera::looking(eye, DVec3::new(1.0, 2.0, 1.5), 0.9), SIZE);
+        assert_eq!([0, 1].map(|at| scene_view.statics[at].seen), seen, "from {eye}");
     }
 }
 
