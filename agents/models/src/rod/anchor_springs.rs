@@ -128,7 +128,7 @@ pub fn springs<'a>(
 pub fn carry_slips(before: &[NodeSpring], into: &mut [NodeSpring]) {
     for spring in into.iter_mut().filter(|spring| spring.yields()) {
         let same = || before.iter().filter(|other| other.attachment == spring.attachment);
-        let left = same().filter(|other| other.arc_m <= spring.arc_m).next_back();
+        let left = same().rfind(|other| other.arc_m <= spring.arc_m);
         let right = same().find(|other| other.arc_m > spring.arc_m);
         spring.slid = match (left, right) {
             (Some(left), Some(right)) => {

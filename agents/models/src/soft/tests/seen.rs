@@ -28,7 +28,7 @@ fn pictured() -> [Pictured; 3] {
     let liver = generate_surface(Generator::Liver, 0, 4000);
     let points = liver.points.iter().map(|point| *point * 0.1).collect();
     let surface = Arc::new(Triangles { points, ..liver });
-    let organ_m = (0.014, 0.035);
+    let organ_m = (0.0135, 0.0165);
     let organ = SoftShape::Embedded { surface, eps_m: organ_m.0, range_m: organ_m };
     let sheet = SoftShape::Sheet { size_m: [0.32, 0.1], thickness_m: 0.001, segments: [32, 10] };
     let path_m = [[-0.1, 0.2], [0.0, 0.09], [0.1, 0.2]].map(|[x, z]| DVec3::new(x, -0.02, z)).to_vec();
