@@ -121,13 +121,14 @@ fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
         off_centre: 0.0,
         from_focus_m: 0.0,
         visible: true,
+        may_vanish: false,
     };
     let polygon_s = 0.6 / hz / start;
     let frame = |k: u32| {
         let plan = control.plan(&[view]);
         let (n, polygons) = (plan.levels[0].resolution.n, plan.polygons);
         let work = Duration::from_secs_f64((0.3 / hz + polygon_s * polygons) * load(f64::from(k) / hz, k));
-        control.observe(FrameWork { work, draw: work, skip: false });
+        control.observe(FrameWork { work, draw: work, beside: Duration::ZERO, skip: false });
         n
     };
     (0..1200).map(frame).collect()
