@@ -158,7 +158,17 @@ mod tests {
     /// The input of a frame with `budget_s` seconds, all available for the choice, with everything in view.
     fn query<'a>(views: &'a [SizedView], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> FrameQuery<'a> {
         let value = Value::Plain;
-        FrameQuery { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
+        FrameQuery {
+            views,
+            ladders,
+            sliders,
+            value,
+            target_s: budget_s,
+            choose_s: None,
+            margin: 0.0,
+            fixed_s: 0.0,
+            out: &[],
+        }
     }
 
     #[test]

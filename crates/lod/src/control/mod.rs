@@ -26,6 +26,7 @@ mod render_scale;
 mod select;
 mod status;
 mod tolerance;
+mod vanish;
 mod view;
 
 pub use crate::cost::benefit::Sliders;

@@ -29,10 +29,6 @@ const NEWTON_S: f64 = 60e-9;
 /// The interior point stops within a hundredth of the optimum and may come nearer the next time: a smaller relative change of r is ignored.
 const SAME_R: f64 = 0.02;
 
-/// Factor of the benefit of an object that may vanish and was drawn in the frame before, and divisor of that of one that was not: what came
-/// in does not go out again for a slight change.
-const STAY_FACTOR: f64 = 1.25;
-
 /// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Select {
@@ -58,13 +54,12 @@ impl Select {
         }
     }
 
-    /// Every object has one rung, or none if it may vanish; the cheapest of all if even those do not fit.
+    /// Every object has one rung; the cheapest of all if even those do not fit.
     fn knapsack(&mut self, policy: Policy, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Promise {
         let mut problem = Problem::new(Mode::ExactlyOne, query.budget());
         let objects: Vec<_> = query.drawable().collect();
         for &at in &objects {
-            let (mode, entries) = self.entries(policy, query, at);
-            problem.push_as(mode, id(query, at), &entries);
+            problem.push(id(query, at), &self.entries(policy, query, at));
         }
         let selection = self.solve(policy, query, &problem, &objects);
         self.last.clear();
@@ -75,24 +70,18 @@ impl Select {
         promise(query, &selection)
     }
 
-    /// The rungs of an object as entries, and whether it may be left out.
-    fn entries(&self, policy: Policy, query: &FrameQuery<'_>, at: usize) -> (Mode, Vec<Entry>) {
+    /// The rungs of an object as entries.
+    fn entries(&self, policy: Policy, query: &FrameQuery<'_>, at: usize) -> Vec<Entry> {
         let (SizedView { view, .. }, rungs) = (&query.views[at], &query.ladders.of(at).rungs);
         let last = self.last.get(&view.id).copied();
-        let stays = match last.filter(|_| view.may_vanish) {
-            Some(Some(_)) => STAY_FACTOR,
-            Some(None) => 1.0 / STAY_FACTOR,
-            None => 1.0,
-        };
         let steps = rungs.len().max(2) as f64 - 1.0;
         let change = |level: usize| last.flatten().map_or(0.0, |last| (level as f64 - f64::from(last)).abs() / steps);
         let weight = query.weight(at);
         let entry = |(level, rung): (usize, &Rung)| match policy.has_printed_benefit() {
-            true => query.entry_of(rung, stays * benefit::printed(view, rung, change(level), query.sliders)),
-            false => query.entry(stays * weight, rung),
+            true => query.entry_of(rung, benefit::printed(view, rung, change(level), query.sliders)),
+            false => query.entry(weight, rung),
         };
-        let mode = if view.may_vanish { Mode::AtMostOne } else { Mode::ExactlyOne };
-        (mode, rungs.iter().enumerate().map(entry).collect())
+        rungs.iter().enumerate().map(entry).collect()
     }
 
     fn solve(&self, policy: Policy, query: &FrameQuery<'_>, problem: &Problem, objects: &[usize]) -> Selection {
