@@ -162,7 +162,8 @@ impl Reach {
         reach(self.forward) > self.near_m && !self.planes_of(planes).iter().any(|plane| reach(*plane) < 0.0)
     }
 
-    fn planes_of(&self, (first, count): Planes) -> &[DVec3] {
+    fn planes_of(&self, planes: Planes) -> &[DVec3] {
+        let (first, count) = planes;
         &self.planes[first as usize..(first + count) as usize]
     }
 }

@@ -8,9 +8,9 @@
 use super::groups::Groups;
 use super::hierarchy::leave_out_members;
 use super::impostors::ImpostorChoice;
-use super::ladder::Rung;
+use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
-use super::query::{FrameQuery, Promise, TICKS, demand, left_out};
+use super::query::{FrameQuery, Promise, TICKS, demand};
 use super::status::Status;
 use crate::Bound;
 use crate::adaptive::{Adaptive, Offer, Plan, Settings, Time};
@@ -32,8 +32,6 @@ struct ObjectEntry {
     /// Version of the ladder last given to the law, 0 while the object is not there; and the number of its rungs.
     version: u64,
     rungs: usize,
-    /// Whether the law may leave it out.
-    may_vanish: bool,
     /// The weight last given to the law.
     weight: Option<f64>,
 }
@@ -92,9 +90,9 @@ impl AdaptiveChoice {
         let time = Time { target: TICKS * query.target_s, fixed: TICKS * query.fixed_s };
         self.frame += 1;
         self.plan = self.law.choose(self.frame, time);
-        let holes = self.write_levels(query, levels);
+        self.write_levels(query, levels);
         leave_out_members(query, groups, levels);
-        Promise { holes, ..self.promise() }
+        self.promise()
     }
 
     /// Marks the last choice as the one being drawn.
@@ -161,7 +159,6 @@ impl AdaptiveChoice {
                 id: seen.view.id,
                 version: 0,
                 rungs: 0,
-                may_vanish: false,
                 weight: None,
             }));
         }
@@ -174,24 +171,23 @@ impl AdaptiveChoice {
                 true if self.group_choice.is_closed(at) => self.group_choice.impostors(query, at),
                 true => (&[][..], 0.0),
             };
-            if within || !view.visible || rungs.is_empty() {
+            if within || !query.is_offered(at) || rungs.is_empty() {
                 self.withdraw(at);
                 continue;
             }
-            self.offer(at, query, rungs, weight);
+            self.offer(at, ladder, rungs, weight);
         }
     }
 
     /// Offers the given rungs of a ladder: of a group, only its useful impostors.
-    fn offer(&mut self, at: usize, query: &FrameQuery<'_>, rungs: &[Rung], weight: f64) {
-        let (view, version) = (&query.views[at].view, query.ladders.of(at).version);
+    fn offer(&mut self, at: usize, ladder: &Ladder, rungs: &[Rung], weight: f64) {
         let entry = &mut self.entries[at];
         let id = u64::from(entry.id.0);
-        if (entry.version, entry.rungs, entry.may_vanish) != (version, rungs.len(), view.may_vanish) {
+        if (entry.version, entry.rungs) != (ladder.version, rungs.len()) {
             self.offers.clear();
             self.offers.extend(rungs.iter().map(|rung| Offer { cost: TICKS * rung.cost_s, gain: rung.accuracy }));
-            (entry.version, entry.rungs, entry.may_vanish) = (version, rungs.len(), view.may_vanish);
-            self.law.set(id, DRAWING, view.may_vanish, &self.offers);
+            (entry.version, entry.rungs) = (ladder.version, rungs.len());
+            self.law.set(id, DRAWING, false, &self.offers);
         }
         if entry.weight.is_none_or(|held| (weight - held).abs() > WEIGHT_DEADBAND * held) {
             entry.weight = Some(weight);
@@ -214,20 +210,14 @@ impl AdaptiveChoice {
         self.group_choice = ImpostorChoice::default();
     }
 
-    /// Writes the levels chosen, and counts the objects left out.
-    fn write_levels(&self, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> u32 {
-        let mut holes = 0;
+    fn write_levels(&self, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) {
         for (at, entry) in self.entries.iter().enumerate().filter(|(_, entry)| entry.version > 0) {
             let ladder = query.ladders.of(at);
-            let level = self.law.level(u64::from(entry.id.0));
-            if level.is_none() && entry.may_vanish {
-                levels[at] = left_out(at, query.views, ladder);
-                holes += 1;
-            } else if let Some(rung) = ladder.rungs.get(level.map_or(0, |level| level as usize)) {
+            let level = self.law.level(u64::from(entry.id.0)).map_or(0, |level| level as usize);
+            if let Some(rung) = ladder.rungs.get(level) {
                 levels[at] = demand(at, query.views, rung);
             }
         }
-        holes
     }
 
     fn promise(&self) -> Promise {

@@ -56,16 +56,17 @@ pub(super) fn printed(view: &ObjectView, rung: &Rung, change: f64, sliders: &Sli
 }
 
 /// Accuracy = 1 − 0.5 / samples^m as printed: flat, samples are polygons and m = 1; Gouraud, vertices and m = 2. Light at every pixel, which
-/// the paper has for ray tracing alone, interpolates normals between vertices: m = 3.
+/// the paper has for ray tracing alone, interpolates normals between vertices: as Gouraud, with half the error.
 fn printed_accuracy(rung: &Rung, best: Shading, pixels: f64) -> f64 {
     let vertices = 0.5 * rung.polygons + 2.0;
-    let (samples, m) = match rung.shading {
-        Shading::Flat => (rung.polygons, 1),
-        Shading::Gouraud => (vertices, 2),
-        Shading::PerPixel | Shading::Textured | Shading::Shadowed => (vertices, 3),
+    let (samples, error) = match rung.shading {
+        Shading::Flat => (rung.polygons, BASE_ERROR),
+        Shading::Gouraud => (vertices, BASE_ERROR),
+        Shading::PerPixel | Shading::Textured | Shading::Shadowed => (vertices, 0.5 * BASE_ERROR),
     };
     let samples = samples.min(pixels).max(1.0);
-    (1.0 - BASE_ERROR / (0..m).fold(1.0, |power, _| power * samples)) * painted(rung.shading, best)
+    let power = if rung.shading == Shading::Flat { samples } else { samples * samples };
+    (1.0 - error / power) * painted(rung.shading, best)
 }
 
 /// The fraction of an object's pixels that a level draws correctly, 0 … 1: its shape by the triangles, its light by the shading

@@ -195,6 +195,7 @@ mod tests {
             margin: 0.0,
             fixed_s: 0.0,
             spend_rest: false,
+            out: &[],
         }
     }
 

@@ -29,6 +29,7 @@ mod robin_hood;
 mod select;
 mod status;
 mod tolerance;
+mod vanish;
 mod view;
 
 pub use crate::cost::benefit::Sliders;

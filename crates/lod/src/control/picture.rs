@@ -20,10 +20,11 @@ use super::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
 use super::quality_boost::QualityBoost;
-use super::query::{FrameQuery, Promise};
+use super::query::{FrameQuery, Promise, left_out};
 use super::render_scale::RenderScale;
 use super::select::Select;
 use super::status::Status;
+use super::vanish::Vanish;
 use super::view::ObjectView;
 use crate::adaptive::DEFAULT_MARGIN;
 use crate::cost::benefit::Sliders;
@@ -79,6 +80,7 @@ pub struct PictureControl {
     logic: Logic,
     ladders: Ladders,
     groups: Groups,
+    vanish: Vanish,
     changes: Changes,
     /// Speeds on the screen, smoothed, by object.
     speeds: Vec<(AgentId, Option<f64>)>,
@@ -118,6 +120,7 @@ impl PictureControl {
             logic: Logic::default(),
             ladders: Ladders::default(),
             groups: Groups::default(),
+            vanish: Vanish::default(),
             changes: Changes::default(),
             speeds: Vec::new(),
             views: Vec::new(),
@@ -230,7 +233,15 @@ impl PictureControl {
             margin: self.margin_now(),
             fixed_s: self.fixed_s,
             spend_rest: self.raise.is_some(),
+            out: &[],
         };
+        // the default knows how slow the machine is, and keeps more time free where it wanders
+        let (kappa, margin) = match self.policy {
+            Policy::Adaptive => (self.adaptive.kappa(), self.adaptive.margin().max(query.margin)),
+            _ => (1.0, query.margin),
+        };
+        self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, kappa);
+        let query = FrameQuery { out: self.vanish.out(), ..query };
         let mut promise = match self.policy {
             Policy::Adaptive => self.adaptive.choose(&query, &self.groups, levels),
             Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
@@ -238,6 +249,10 @@ impl PictureControl {
             }
             policy => self.select.choose(policy, &query, levels),
         };
+        for (at, _) in query.out.iter().enumerate().filter(|(_, out)| **out) {
+            levels[at] = left_out(at, query.views, query.ladders.of(at));
+            promise.holes += 1;
+        }
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
             raise.observe(&query, levels, &promise, self.policy);
         }

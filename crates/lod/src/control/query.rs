@@ -38,6 +38,8 @@ pub(super) struct FrameQuery<'a> {
     pub fixed_s: f64,
     /// Whether Robin Hood shares once more what nobody took.
     pub spend_rest: bool,
+    /// Which objects are left out of this frame; empty for none.
+    pub out: &'a [bool],
 }
 
 /// The prediction of a choice.
@@ -82,7 +84,12 @@ impl FrameQuery<'_> {
     /// Numbers of the objects in view that are drawn as themselves, not as groups.
     pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
         let itself = |at: &usize| !self.views[*at].view.is_group() && !self.ladders.of(*at).rungs.is_empty();
-        (0..self.views.len()).filter(|at| self.views[*at].view.visible).filter(itself)
+        (0..self.views.len()).filter(|at| self.is_offered(*at)).filter(itself)
+    }
+
+    /// Whether an object is in view and not left out.
+    pub fn is_offered(&self, at: usize) -> bool {
+        self.views[at].view.visible && !self.out.get(at).is_some_and(|out| *out)
     }
 
     /// Number that breaks ties between objects.

@@ -21,10 +21,6 @@ use crate::select::{Entry, Level, Mode, Problem, Selection};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
-/// Factor of the benefit of an object that may vanish and was drawn in the frame before, and divisor of that of one that was not: what came
-/// in does not go out again for a slight change.
-const STAY_FACTOR: f64 = 1.25;
-
 /// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Select {
@@ -51,13 +47,12 @@ impl Select {
         }
     }
 
-    /// Every object has one rung, or none if it may vanish; the cheapest of all if even those do not fit.
+    /// Every object has one rung; the cheapest of all if even those do not fit.
     fn knapsack(&mut self, policy: Policy, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Promise {
         let mut problem = Problem::new(Mode::ExactlyOne, query.budget());
         let objects: Vec<_> = query.drawable().collect();
         for &at in &objects {
-            let (mode, entries) = self.entries(policy, query, at);
-            problem.push_as(mode, query.id(at), &entries);
+            problem.push(query.id(at), &self.entries(policy, query, at));
         }
         let selection = self.solve(policy, query, &problem, &objects);
         self.last.clear();
@@ -68,24 +63,18 @@ impl Select {
         promise(query, &selection)
     }
 
-    /// The rungs of an object as entries, and whether it may be left out.
-    fn entries(&self, policy: Policy, query: &FrameQuery<'_>, at: usize) -> (Mode, Vec<Entry>) {
+    /// The rungs of an object as entries.
+    fn entries(&self, policy: Policy, query: &FrameQuery<'_>, at: usize) -> Vec<Entry> {
         let (SizedView { view, .. }, rungs) = (&query.views[at], &query.ladders.of(at).rungs);
         let last = self.last.get(&view.id).copied();
-        let stays = match last.filter(|_| view.may_vanish) {
-            Some(Some(_)) => STAY_FACTOR,
-            Some(None) => 1.0 / STAY_FACTOR,
-            None => 1.0,
-        };
         let steps = rungs.len().max(2) as f64 - 1.0;
         let change = |level: usize| last.flatten().map_or(0.0, |last| (level as f64 - f64::from(last)).abs() / steps);
         let weight = query.weight(at);
         let entry = |(level, rung): (usize, &Rung)| match policy.has_printed_benefit() {
-            true => query.entry_of(rung, stays * benefit::printed(view, rung, change(level), query.sliders)),
-            false => query.entry(stays * weight, rung),
+            true => query.entry_of(rung, benefit::printed(view, rung, change(level), query.sliders)),
+            false => query.entry(weight, rung),
         };
-        let mode = if view.may_vanish { Mode::AtMostOne } else { Mode::ExactlyOne };
-        (mode, rungs.iter().enumerate().map(entry).collect())
+        rungs.iter().enumerate().map(entry).collect()
     }
 
     fn solve(&self, policy: Policy, query: &FrameQuery<'_>, problem: &Problem, objects: &[usize]) -> Selection {

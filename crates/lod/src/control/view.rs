@@ -90,7 +90,7 @@ pub struct ObjectView {
     pub from_focus_m: f64,
     /// Whether any part of it may be in the picture.
     pub visible: bool,
-    /// Whether it may be left out where time is short, at the price of its whole benefit (FS93, §3: no polygons at all).
+    /// Whether it may be left out where not even the coarsest of everything fits (FS93, §3: no polygons at all).
     pub may_vanish: bool,
 }
 

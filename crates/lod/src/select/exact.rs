@@ -84,7 +84,7 @@ impl Bounds {
 fn relaxation(problem: &Problem, objects: &[usize]) -> Vec<(u64, u64)> {
     let mut sub = Problem::new(problem.mode(), i64::MAX);
     for &object in objects {
-        sub.push_as(problem.mode_of(object), problem.id(object), problem.levels(object));
+        sub.push(problem.id(object), problem.levels(object));
     }
     let hulls = super::hull::Hulls::of(&sub);
     let mut sums = alloc::vec![(sub.cost(&hulls.bases), sub.value(&hulls.bases))];

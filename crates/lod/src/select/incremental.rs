@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use super::linear::linear;
-use super::problem::{Level, Problem, Selection};
+use super::problem::{Level, Mode, Problem, Selection};
 use super::ratio::{Rank, Ratio};
 
 /// Which of the visited states is the answer.
@@ -138,7 +138,7 @@ impl<'a> Search<'a> {
         if (next as usize) < levels.len() {
             self.rises.push(Reverse(rank(next)));
         }
-        let lowest = self.problem.least(object);
+        let lowest = if self.problem.mode() == Mode::AtMostOne { None } else { self.problem.least(object) };
         if let Some(held) = self.levels[object].filter(|_| self.levels[object] > lowest) {
             self.falls.push(rank(held));
         }

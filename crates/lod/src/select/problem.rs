@@ -57,8 +57,6 @@ pub struct Problem {
     mode: Mode,
     budget: u64,
     ids: Vec<u64>,
-    /// Whether each object may be left out.
-    modes: Vec<Mode>,
     starts: Vec<usize>,
     entries: Vec<Entry>,
 }
@@ -67,21 +65,14 @@ impl Problem {
     /// A problem without objects. `budget` in ticks; a negative one is 0.
     #[must_use]
     pub fn new(mode: Mode, budget: i64) -> Self {
-        let budget = budget.max(0) as u64;
-        Self { mode, budget, ids: Vec::new(), modes: Vec::new(), starts: alloc::vec![0], entries: Vec::new() }
+        Self { mode, budget: budget.max(0) as u64, ids: Vec::new(), starts: alloc::vec![0], entries: Vec::new() }
     }
 
     /// Adds an object with its levels, coarsest first. `id` breaks ties, so it must not change between frames.
     ///
     /// An object without levels is never drawn, in either mode.
     pub fn push(&mut self, id: u64, levels: &[Entry]) {
-        self.push_as(self.mode, id, levels);
-    }
-
-    /// The same for an object whose mode may differ from that of the others.
-    pub fn push_as(&mut self, mode: Mode, id: u64, levels: &[Entry]) {
         self.ids.push(id);
-        self.modes.push(mode);
         self.entries.extend(levels.iter().map(|e| Entry::new(e.cost, e.benefit)));
         self.starts.push(self.entries.len());
     }
@@ -98,16 +89,10 @@ impl Problem {
         self.ids.is_empty()
     }
 
-    /// Whether objects may be left out that are pushed without a mode of their own.
+    /// Whether objects may be left out.
     #[must_use]
     pub fn mode(&self) -> Mode {
         self.mode
-    }
-
-    /// Whether the object pushed as number `object` may be left out.
-    #[must_use]
-    pub fn mode_of(&self, object: usize) -> Mode {
-        self.modes[object]
     }
 
     /// The budget, ticks.
@@ -139,7 +124,7 @@ impl Problem {
     pub fn least(&self, object: usize) -> Level {
         let cheapest =
             |levels: &[Entry]| (0..levels.len()).min_by_key(|&l| (levels[l].cost, u64::MAX - levels[l].benefit));
-        match self.modes[object] {
+        match self.mode {
             Mode::AtMostOne => None,
             Mode::ExactlyOne => cheapest(self.levels(object)).map(|l| l as u32),
         }

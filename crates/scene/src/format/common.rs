@@ -55,8 +55,7 @@ pub struct CommonFile {
     /// Weight of the object's picture relative to that of others, 0.001 … 1000. Default 1.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub importance: Option<f64>,
-    /// Whether greedy and marginal policies and `adaptive` may leave the object out of the picture where time is short, at the price of its
-    /// whole benefit. Default: that of `[target]`.
+    /// Whether policies that choose by cost may leave the object out of the picture where not even the coarsest of everything fits. Default: that of `[target]`.
     pub may_vanish: Option<bool>,
     /// Colour as `#rrggbb` (sRGB). Default: by material.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]

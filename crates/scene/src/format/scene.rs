@@ -137,8 +137,7 @@ pub struct TargetFile {
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
-    /// Whether greedy and marginal policies and `adaptive` may leave objects out of the picture where time is short, at the price of their
-    /// whole benefit: for objects without a `may_vanish` of their own. Default false.
+    /// Whether policies that choose by cost may leave objects out of the picture where not even the coarsest of everything fits: for objects without a `may_vanish` of their own. Default false.
     pub may_vanish: Option<bool>,
     /// How much a level's benefit falls with the distance from the middle of the picture, 0 … 1. Default 0. This and the next two are for
     /// policies that choose by cost.
