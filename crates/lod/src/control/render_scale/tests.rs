@@ -121,9 +121,9 @@ fn nothing_is_taken_that_saves_nothing_and_nothing_while_levels_can_be() {
     assert_eq!(Loop::new(dear).play(5.0, 0.0), 1.0);
     let mut law = RenderScale::new((0.35, 1.0));
     let late = ScaledFrame { coarsest_s: 0.1, draw_s: 0.1, spent: false, set_s: PERIOD_S, period_s: PERIOD_S };
-    (0..100).for_each(|_| law.observe(late, |scale| scale * scale));
+    (0..100).for_each(|_| law.observe(late, |rung| rung.scale * rung.scale));
     assert!(!law.is_reduced());
-    (0..100).for_each(|_| law.observe(ScaledFrame { spent: true, ..late }, |scale| scale * scale));
+    (0..100).for_each(|_| law.observe(ScaledFrame { spent: true, ..late }, |rung| rung.scale * rung.scale));
     assert!(law.is_reduced());
 }
 
