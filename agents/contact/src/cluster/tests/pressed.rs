@@ -102,5 +102,6 @@ fn in_random_piles_no_spin_gives_more_than_its_pressure_and_what_slips_gives_all
             }
         });
     }
-    assert!(cut <= 3 && factors < 300 * 12, "{cut} cut, {factors} factors");
+    // 12.7 factors in the mean measured
+    assert!(cut == 0 && factors < 300 * 15, "{cut} cut, {factors} factors");
 }
