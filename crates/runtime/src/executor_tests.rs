@@ -94,6 +94,7 @@ fn spawn(name: &str, agent: impl Agent + 'static, rate_hz: f64, floor: bool) -> 
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution: 0.0,
+        traits: metachron_geometry::ContactTraits::default(),
     });
     let scene = Arc::new(ClusterScene::new(floor.as_slice()).unwrap());
     AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(agent), rate_hz) }
@@ -154,6 +155,7 @@ fn heaped() -> Vec<AgentSpawn> {
         law: MaterialLaw::Corotational,
     };
     let slab = SoftSpec {
+        traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Box { size_m: DVec3::new(0.2, 0.2, 0.05), segments: [6, 6, 2] },
         nodes: None,
         matter,

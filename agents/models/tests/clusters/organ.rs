@@ -30,6 +30,7 @@ fn organ(eps_m: f64) -> SoftBody {
         law: MaterialLaw::Corotational,
     };
     SoftBody::new(SoftSpec {
+        traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Embedded { surface, eps_m, range_m: (FINEST_M, 0.035) },
         nodes: None,
         matter,
@@ -62,7 +63,7 @@ fn pressed(eps_m: f64) -> Pressed {
         placed(tool(&keys, 50.0, vec![]), false),
         placed(RigidBody::new(ball).unwrap(), false),
     ];
-    let slide = JointKind::Prismatic { axis: DVec3::Z, range_m: None };
+    let slide = JointKind::Prismatic { axis: DVec3::Z, range_m: None, motor: None };
     let joint = Joint { anchor_b_m: BALL, ..Joint::new(AgentId(2), None, slide) };
     let mut table = Table::new(bodies).at_rates(60.0, 120.0).jointed([joint]);
     while table.time.as_secs_f64() < 1.4 {

@@ -95,12 +95,7 @@ fn a_ball_is_as_bright_as_lambert_s_law_up_to_its_terminator() {
             appearance: LOOK,
             throws_shadow: true,
         };
-        let actor = Actor {
-            id: AgentId(0),
-            form: Form::Solid(Solid::Ball { radius_m: RADIUS_M }),
-            appearance: LOOK,
-            throws_shadow: true,
-        };
+        let actor = Actor { id: AgentId(0), form: Form::Solid(Solid::Ball { radius_m: RADIUS_M }), appearance: LOOK };
         let mut stage = SceneView::new(vec![actor], vec![far]);
         let body = Body::Rigid(RigidState::default());
         stage.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
