@@ -216,7 +216,7 @@ mod tests {
         let (span, mut held) = (Span::of(&view), LastCut::default());
         let mut levels = Vec::new();
         let mut wish = 1300.0;
-        while wish < 4e5 {
+        while wish < 5.7e5 {
             let at = held.choose(&view, span, wish).resolution;
             // HOLD, and the rounding of one interval in the 45 or more that there are
             assert!((polygons(&view, at) / wish).ln().abs() <= HOLD + 1.0 / 45.0, "{wish}: {at:?}");

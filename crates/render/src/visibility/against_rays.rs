@@ -143,10 +143,10 @@ fn no_object_that_a_ray_sees_is_missed() {
 #[test]
 fn a_wall_on_a_side_of_a_cell_is_seen_from_both_sides() {
     let cell = Cell { low_m: DVec3::ZERO, high_m: DVec3::new(4.0, 4.0, 3.0) };
-    let wall = |x: f64| StaticObject {
+    let wall = |x: f64, half_m: DVec3| StaticObject {
         obstacle: Obstacle {
             name: String::new(),
-            solid: Solid::Box { half_extents_m: DVec3::new(0.05, 2.0, 1.5) },
+            solid: Solid::Box { half_extents_m: half_m },
             position: DVec3::new(x, 2.0, 1.5),
             rotation: glam::DQuat::IDENTITY,
             friction: 0.5,
@@ -156,8 +156,9 @@ fn a_wall_on_a_side_of_a_cell_is_seen_from_both_sides() {
         appearance: Appearance { colour: [200; 3], material: Material::Plastic },
         throws_shadow: false,
     };
-    // one within the sides of the cell, one amid it
-    let mut scene_view = SceneView::new(vec![], vec![wall(0.05), wall(2.0)]);
+    // one within the sides of the cell, and a shelf amid it that touches none of them
+    let walls = vec![wall(0.05, DVec3::new(0.05, 2.0, 1.5)), wall(2.0, DVec3::new(0.05, 1.0, 1.0))];
+    let mut scene_view = SceneView::new(vec![], walls);
     scene_view.set_cells(Cells::new(vec![cell], vec![]).unwrap());
     for (eye, seen) in [(DVec3::new(-3.0, 2.0, 1.5), [true, false]), (DVec3::new(3.5, 2.0, 1.5), [true, true])] {
         scene_view.survey(&Camera::looking(eye, DVec3::new(1.0, 2.0, 1.5), 0.9), SIZE);

@@ -248,7 +248,7 @@ mod tests {
     fn turns(keys: &str) -> Result<Vec<DVec3>, String> {
         let text = format!("format = 1\n[[object]]\nname = \"b\"\ngrid = [3, 3, 3]\nspacing_m = [1, 1, 1]\n{keys}");
         let source = crate::Source::memory("grid", text.as_bytes()).unwrap();
-        let scene = crate::load(&source, &[]).map_err(|error| error.to_string())?;
+        let scene = crate::load(&source, &[]).map_err(|error| format!("{:?}", error.problems))?;
         let of = |member: &Member| match &member.spec {
             Spec::Rigid(body) => body.rotation.to_scaled_axis(),
             _ => DVec3::ZERO,
@@ -267,8 +267,7 @@ mod tests {
         let other = turns(&format!("{cube}scatter_deg = [0, 0, 10]\nscatter_seed = 5")).unwrap();
         assert_ne!(about_z, other);
         assert!(turns(cube).unwrap().iter().all(|turn| *turn == DVec3::ZERO));
-        let rope =
-            "model = \"rope\"\npath_m = [[0, 0, 0], [0.1, 0, 0]]\nradius_m = 0.01\nyoung_pa = 1e5\nscatter_deg = 5";
+        let rope = "model = \"rope\"\npath_m = [[0, 0, 0], [0.1, 0, 0]]\nradius_m = 0.01\nsegments = 4\nyoung_pa = 1e5\nscatter_deg = 5";
         assert!(turns(rope).unwrap_err().contains("scatter_deg"));
     }
 }
