@@ -40,10 +40,10 @@ fn table(args: &CalibrateArgs, gpu: &Gpu) -> anyhow::Result<PriceTable> {
         return Ok(table);
     }
     if args.renew {
-        PriceTable::forget(&adapter);
+        PriceTable::forget_begun(&adapter);
     }
     let measured = || PriceTable::measure(gpu, message).with_context(|| format!("{adapter} could not be measured"));
-    PriceTable::known(&adapter).map_or_else(measured, Ok)
+    PriceTable::known(&adapter).filter(|_| !args.renew).map_or_else(measured, Ok)
 }
 
 fn text(table: &PriceTable) -> String {

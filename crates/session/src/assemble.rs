@@ -125,17 +125,21 @@ pub fn scene_view(scene: &Scene) -> SceneView {
     });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
     scene_view.set_cells(scene.cells.clone());
-    scene_view.set_environment(match scene.environment {
-        EnvironmentKind::Room => Environment::Room,
-        EnvironmentKind::Sky => Environment::Sky,
-        EnvironmentKind::Endoscope => Environment::Endoscope,
-    });
+    scene_view.set_environment(environment(scene.environment));
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
             scene_view.paint(AgentId(id), texture);
         }
     }
     scene_view
+}
+
+const fn environment(kind: EnvironmentKind) -> Environment {
+    match kind {
+        EnvironmentKind::Room => Environment::Room,
+        EnvironmentKind::Sky => Environment::Sky,
+        EnvironmentKind::Endoscope => Environment::Endoscope,
+    }
 }
 
 /// All scenery in the order of its actors.
@@ -161,6 +165,7 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     control.set_sliders(sliders(control.policy().usual_sliders(), target.factors));
     control.set_raise(target.raise);
     control.set_render_scale(target.render_scale);
+    control.set_throws_shadows(environment(scene.environment).throws_shadows());
     if let Some((lag_s, share)) = target.lag {
         control.set_lag(lag_s, share);
     }

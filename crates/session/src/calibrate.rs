@@ -155,12 +155,10 @@ impl PriceTable {
         folder().iter().for_each(|folder| store(folder, self));
     }
 
-    /// Forgets what is known of the adapter of this name, and what was measured of it.
-    pub fn forget(adapter: &str) {
-        for what in [DRAWING, PARTIAL] {
-            // what is not there is forgotten already
-            let _ = folder().map(|folder| std::fs::remove_file(file(&folder, adapter, what)));
-        }
+    /// Forgets what a measurement of the adapter of this name has begun; a table that is known stands until another takes its place.
+    pub fn forget_begun(adapter: &str) {
+        // what is not there is forgotten already
+        let _ = folder().map(|folder| std::fs::remove_file(file(&folder, adapter, PARTIAL)));
     }
 
     /// The table as a file.

@@ -240,7 +240,12 @@ impl PictureControl {
             Policy::Adaptive => (self.adaptive.kappa(), self.adaptive.margin().max(query.margin)),
             _ => (1.0, query.margin),
         };
-        self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, kappa);
+        // what is chosen by size or by the last frame's time leaves nothing out for a cost
+        if self.policy.predicts() {
+            self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, kappa);
+        } else {
+            self.vanish.clear();
+        }
         let query = FrameQuery { out: self.vanish.out(), ..query };
         let mut promise = match self.policy {
             Policy::Adaptive => self.adaptive.choose(&query, &self.groups, levels),

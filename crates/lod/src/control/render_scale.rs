@@ -222,7 +222,27 @@ impl RenderScale {
 
     /// Gives all back, and starts anew: others choose now.
     pub fn release(&mut self) {
-        *self = Self::new(self.bounds());
+        self.bound(self.bounds());
+    }
+
+    /// Starts anew inside other bounds.
+    pub fn bound(&mut self, range: (f64, f64)) {
+        let throws = self.most().shadows;
+        *self = Self::new(range);
+        self.set_throws_shadows(throws);
+    }
+
+    /// Says whether the light throws shadows; where it does not, there are none to take, and one rung for each scale.
+    pub fn set_throws_shadows(&mut self, throws: bool) {
+        if throws != self.most().shadows {
+            let mut rungs = rungs(self.bounds());
+            if !throws {
+                rungs.iter_mut().for_each(|rung| rung.shadows = false);
+                rungs.dedup();
+            }
+            (self.at, self.rungs) = (rungs.len() - 1, rungs);
+            self.disturb();
+        }
     }
 
     /// Whether there is nothing to choose.

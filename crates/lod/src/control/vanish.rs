@@ -50,6 +50,11 @@ impl Vanish {
         }
     }
 
+    /// Leaves nothing out.
+    pub fn clear(&mut self) {
+        self.out.clear();
+    }
+
     /// Which objects are left out, in their order.
     pub fn out(&self) -> &[bool] {
         &self.out

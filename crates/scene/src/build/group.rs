@@ -122,7 +122,10 @@ fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &
             return c.wrong(place, &key, what, expected);
         }
         let scenery = objects.scenery.iter().map(|it| &it.name).zip(&mut owners.scenery);
+        // a pattern that many names match does not mean the group that has it
+        let itself = &files[number].name;
         let groups = files.iter().map(|file| &file.name).zip(&mut owners.groups);
+        let groups = groups.filter(|(name, _)| *name != itself || *name == wanted);
         let mut found = 0;
         for (name, owner) in scenery.chain(groups).filter(|(name, _)| is_meant(name, wanted)) {
             if owner.is_some_and(|other| other != number) {

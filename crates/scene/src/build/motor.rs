@@ -76,6 +76,15 @@ impl MotorKeys {
         {
             c.wrong(place, self.position, "is outside of the joint's range", "expected a position within it");
         }
+        if stiffness.unwrap_or(0.0) == 0.0 && damping == Some(0.0) {
+            c.wrong(
+                place,
+                self.damping,
+                "is zero without a stiffness",
+                "expected more than zero: such a motor does nothing",
+            );
+            return None;
+        }
         let goal = match (stiffness, damping, velocity) {
             (None, None, Some(velocity)) => MotorGoal::Velocity(velocity),
             _ => MotorGoal::Spring {

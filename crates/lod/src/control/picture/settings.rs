@@ -5,7 +5,7 @@
 use super::super::policy::{Law, Policy};
 use super::super::price::{Backdrop, Prices};
 use super::super::quality_boost::QualityBoost;
-use super::super::render_scale::{PictureRung, RenderScale};
+use super::super::render_scale::PictureRung;
 use super::PictureControl;
 use crate::cost::benefit::Sliders;
 use crate::cost::pipeline::Pipeline;
@@ -107,7 +107,15 @@ impl PictureControl {
 
     /// Bounds the fraction of its width and height that a picture is drawn with: least and most, 0.35 … 1. Initially every pixel is drawn.
     pub fn set_render_scale(&mut self, range: (f64, f64)) {
-        self.scale = RenderScale::new(range);
+        self.scale.bound(range);
+    }
+
+    /// Says whether the light throws shadows: only then can they be taken from a picture. Initially it does.
+    pub fn set_throws_shadows(&mut self, throws: bool) {
+        if throws != self.scale.most().shadows {
+            self.scale.set_throws_shadows(throws);
+            self.forget_ladders();
+        }
     }
 
     /// The bounds of that fraction.

@@ -169,6 +169,10 @@ fn shadows_go_when_half_the_width_is_left_and_come_back_first() {
     assert_eq!(from_half, [(0.35, false), (0.4, false), (0.45, false), (0.5, false), (0.5, true), (0.55, true)]);
     assert_eq!(all((0.9, 1.0)), [(0.9, true), (0.95, true), (1.0, true)]);
     assert_eq!(all((0.35, 0.4)), [(0.35, false), (0.4, false), (0.4, true)]);
+    let mut unlit = RenderScale::new((0.35, 1.0));
+    unlit.set_throws_shadows(false);
+    unlit.release();
+    assert_eq!(unlit.rungs, SCALES.map(|scale| PictureRung { scale, shadows: false }));
     // of a frame of 32 ms at half the width 4 ms are shadows: 28 fit
     let mut law = RenderScale::new((0.35, 1.0));
     let frame_s = |rung: PictureRung| 0.026 + 0.008 * rung.scale * rung.scale + if rung.shadows { 0.004 } else { 0.0 };
