@@ -3,9 +3,10 @@
 //! In: a step length and what the agent can see of the others ([`StepContext`]). Out: a new state and what the step took.
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by the suite `metachron_models::conformance`.
 
+use crate::joint::Motor;
 use crate::stepper::ClusterMember;
 use crate::{Law, Link};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
@@ -45,6 +46,12 @@ pub trait Agent: Send {
         false
     }
 
+    /// Moves it elsewhere, or gives it another velocity, between two steps; `false`, and no change, for a model that cannot.
+    fn set_motion(&mut self, motion: &SetMotion) -> bool {
+        let _ = motion;
+        false
+    }
+
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 
@@ -76,6 +83,10 @@ pub struct StepContext<'a> {
     pub neighbours: &'a [Neighbour],
     /// Springs of the user on this agent.
     pub hands: &'a [AnchorSpring],
+    /// Forces of the user on this agent, in the mean of the macro step.
+    pub forces: &'a [AnchorForce],
+    /// Motors that the user has set, of joints whose first body this agent is.
+    pub motors: &'a [SetMotor],
     /// Bilateral couplings with other agents.
     pub links: &'a [Link],
 }
@@ -122,6 +133,49 @@ pub struct AnchorSpring {
     pub damping_n_s_m: f64,
 }
 
+/// A force on a material point of an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AnchorForce {
+    /// The material point that it acts on.
+    pub anchor: Anchor,
+    /// The force, world axes, N.
+    pub force_n: DVec3,
+    /// A torque besides, world axes, N·m: without effect where no block of the body is a spin ([`ClusterMember::turn`]).
+    pub torque_n_m: DVec3,
+}
+
+/// A motor in the place of the one that the scene gives a joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetMotor {
+    /// The joint's number in the scene.
+    pub joint: u32,
+    /// What drives it; `None` for nothing.
+    pub motor: Option<Motor>,
+}
+
+/// Another place or velocity for an agent. What is `None` stays.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SetMotion {
+    /// Where the origin of a rigid body's axes is, or the centre of mass of a body that bends, metres.
+    pub position_m: Option<DVec3>,
+    /// The rotation of a rigid body, from its axes to the world's; by how much a body that bends is turned about its centre of mass.
+    pub rotation: Option<DQuat>,
+    /// The velocity of its centre of mass, m/s: of a body that bends, of all its matter.
+    pub velocity_m_s: Option<DVec3>,
+    /// Its spin about its centre of mass, world axes, rad/s.
+    pub spin_rad_s: Option<DVec3>,
+}
+
+impl SetMotion {
+    /// Whether every number is finite, and the rotation one.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
+        let turns = |q: DQuat| q.is_finite() && q.length_squared() > 0.25;
+        vectors.into_iter().flatten().all(DVec3::is_finite) && self.rotation.is_none_or(turns)
+    }
+}
+
 /// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag what it grasps along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
@@ -134,7 +188,7 @@ impl<'a> StepContext<'a> {
     /// Empty surroundings at `time`, for tests and for agents without neighbours.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
-        Self { me, time, neighbours: &[], hands: &[], links: &[] }
+        Self { me, time, neighbours: &[], hands: &[], forces: &[], motors: &[], links: &[] }
     }
 
     /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.

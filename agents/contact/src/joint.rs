@@ -71,6 +71,23 @@ pub enum JointKind {
     },
 }
 
+impl Joint {
+    /// Whether a motor can drive it: a hinge or a slide.
+    #[must_use]
+    pub const fn takes_motor(&self) -> bool {
+        matches!(self.kind, JointKind::Revolute { .. } | JointKind::Prismatic { .. })
+    }
+
+    /// The same joint with another motor; a joint that takes none stays as it is.
+    #[must_use]
+    pub fn with_motor(mut self, other: Option<Motor>) -> Self {
+        if let JointKind::Revolute { motor, .. } | JointKind::Prismatic { motor, .. } = &mut self.kind {
+            *motor = other;
+        }
+        self
+    }
+}
+
 /// A motor of a joint: of a hinge in radians and newton metres, of a slide in metres and newtons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motor {
@@ -101,7 +118,10 @@ pub enum MotorGoal {
 
 impl Motor {
     /// Whether every number is in its range.
-    fn check(&self) -> Result<(), JointError> {
+    ///
+    /// # Errors
+    /// [`JointError::BadNumber`] with the first that is not.
+    pub fn check(&self) -> Result<(), JointError> {
         if self.max_effort.is_nan() || self.max_effort <= 0.0 {
             let (what, value, wanted) = ("motor's greatest effort", self.max_effort, "above zero");
             return Err(JointError::BadNumber { what, value, wanted });

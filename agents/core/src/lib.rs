@@ -22,6 +22,7 @@
 mod attachment;
 pub mod body;
 mod cluster_state;
+mod contact;
 mod disjoint_sets;
 pub mod gains;
 pub mod id;
@@ -46,6 +47,7 @@ pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
 };
 pub use cluster_state::{ClusterSolves, ClusterState};
+pub use contact::{ContactPartner, ContactState};
 pub use disjoint_sets::DisjointSets;
 pub use id::AgentId;
 pub use inverse_mass::InverseMass;
@@ -56,7 +58,7 @@ pub use parallel::{ParallelFor, PlainLoop};
 pub use recycle::recycled;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use rotation::shortest_turn;
-pub use sensor::{SensorPartner, SensorTouch};
+pub use sensor::SensorTouch;
 pub use snapshot::{HASH_START, Inertia, Snapshot};
 pub use step::{DT_MAX_S, StepError, StepReport, check_span};
 pub use step_doubling::DRIFT_S;

@@ -2,22 +2,13 @@
 //!
 //! In: whether the two touch. Out: counts. Never here: where they touch, forces: there are none.
 
-use crate::{AgentId, SimTime};
-
-/// The other side of a touch that is only sensed; one of the two is a sensor, or both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SensorPartner {
-    /// A static solid, by its number in the scene.
-    Static(u32),
-    /// Another agent.
-    Agent(AgentId),
-}
+use crate::{ContactPartner, SimTime};
 
 /// A pair of which one side only senses. It is published by the agent, of two by that of the lower number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SensorTouch {
     /// The other side.
-    pub with: SensorPartner,
+    pub with: ContactPartner,
     /// Whether the two touch.
     pub touching: bool,
     /// How often they have begun to touch.
@@ -31,7 +22,7 @@ pub struct SensorTouch {
 impl SensorTouch {
     /// A pair that has never touched.
     #[must_use]
-    pub const fn new(with: SensorPartner) -> Self {
+    pub const fn new(with: ContactPartner) -> Self {
         Self { with, touching: false, begins: 0, ends: 0, changed: SimTime::ZERO }
     }
 

@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{AttachmentEvent, Ledger, LocalModel, PairState, SensorTouch};
+use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, SensorTouch};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -48,6 +48,8 @@ pub struct Snapshot {
     pub local_model: LocalModel,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
+    /// What it touches in the cluster that it is stepped in, but for agents of lower numbers: these publish it.
+    pub contacts: Vec<ContactState>,
     /// Its part in a contact cluster; `None` where it steps by itself.
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
@@ -82,6 +84,7 @@ impl Snapshot {
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
         self.drift_m = 0.0;
         self.pairs.clear();
+        self.contacts.clear();
         self.cluster = None;
         self.bonds.clear();
         self.events.clear();

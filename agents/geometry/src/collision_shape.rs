@@ -156,6 +156,27 @@ pub struct PlacedShape<'a> {
 }
 
 impl PlacedShape<'_> {
+    /// The point `place` of its skin, metres, where `outward` points out of it; not a number where the form has no such point.
+    #[must_use]
+    pub fn point(&self, place: &Place, outward: DVec3) -> DVec3 {
+        match (*place, self.view) {
+            (Place::Point(point), _) => point,
+            (Place::Chain { segment, share, radius_m }, ShapePose::Chain { positions, .. }) => {
+                let at = segment as usize;
+                let ends = positions.get(at).zip(positions.get(at + 1));
+                ends.map_or(DVec3::NAN, |(from, to)| from.lerp(*to, share) + outward * radius_m)
+            }
+            (Place::Surface { vertices, shares }, ShapePose::Surface(positions)) => {
+                let corner = |(vertex, share): (u32, f64)| {
+                    positions.get(vertex as usize).map_or(DVec3::NAN, |position| *position * share)
+                };
+                let radius_m = if let ShapeKind::Surface(surface) = &self.form.kind { surface.radius_m } else { 0.0 };
+                vertices.into_iter().zip(shares).map(corner).sum::<DVec3>() + outward * radius_m
+            }
+            _ => DVec3::NAN,
+        }
+    }
+
     /// A box around it, with the thickness of its skin.
     #[must_use]
     pub fn bounds(&self) -> Aabb {

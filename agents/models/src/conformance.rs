@@ -190,7 +190,7 @@ impl Cluster {
 
 impl Run<'_> {
     fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
-        let context = StepContext { me: ME, time: self.time, neighbours: self.neighbours, hands, links: &[] };
+        let context = StepContext { neighbours: self.neighbours, hands, ..StepContext::alone(ME, self.time) };
         match &mut self.cluster {
             Some(cluster) => cluster.step(self.agent.as_mut(), dt, context)?,
             None => self.agent.step(dt, &context).map(drop)?,

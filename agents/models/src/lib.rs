@@ -23,6 +23,7 @@ pub mod conformance;
 mod limits;
 pub mod rigid;
 pub mod rod;
+mod set_motion;
 pub mod soft;
 mod symmetric;
 pub mod synthetic;

@@ -26,7 +26,7 @@ fn tube(segments: usize) -> Tube {
 fn step_tube(c: &mut Criterion) {
     let mut group = c.benchmark_group("rod/step");
     let dt = SimSpan::from_nanos(5_000_000);
-    let context = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    let context = StepContext::alone(AgentId(0), SimTime::ZERO);
     for segments in [16_usize, 64, 256] {
         let mut tube = tube(segments);
         group.throughput(Throughput::Elements(segments as u64));

@@ -11,15 +11,16 @@
 use super::agent_clock::Timeline;
 use super::agent_clock::{AgentClock, LAG_CAP, Start};
 use super::cluster::{ClusterSeat, Leap, Led, Span};
+use super::events::{AgentEvent, EventKind};
 use super::faults::Faults;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::helpers::Helped;
+use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
-use metachron_contact::Link;
-use metachron_contact::{Agent, AnchorSpring};
+use metachron_contact::{Agent, Link, SetMotion};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -39,7 +40,8 @@ pub(super) struct AgentRunner {
     pub writer: SlotWriter<Snapshot>,
     pub observer: Observer,
     pub links: Vec<Link>,
-    pub hands: Vec<AnchorSpring>,
+    /// What users do to it; `None` of an agent to which nothing was ever done.
+    pub loads: Option<Box<Loads>>,
     /// Its place in a contact cluster; `None` of an agent that is no member of any.
     pub cluster: Option<Box<ClusterSeat>>,
     /// The agents it leads.
@@ -128,6 +130,11 @@ impl TurnPeriod {
 impl AgentRunner {
     pub fn id(&self) -> AgentId {
         self.shared.id
+    }
+
+    /// Tells readers of its events what happens to it now.
+    pub fn tell(&self, kind: EventKind) {
+        self.shared.events.push(&AgentEvent { at: self.pace.time(), kind });
     }
 
     /// Whether the agent is parked.
@@ -250,6 +257,7 @@ impl AgentRunner {
         self.show_withheld();
         self.metrics.flush(&self.shared.gauges);
         self.shared.gauges.park(reason);
+        self.tell(EventKind::Parked);
         self.notify_reader();
         if let Some(broad_phase) = &self.peers.broad_phase {
             broad_phase.publish_rest(self.id());
@@ -259,7 +267,7 @@ impl AgentRunner {
 
     /// Returns no open turn if it waits instead, or hands its turns over before it steps.
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<PendingTurn>, Effort), String> {
-        self.take_commands();
+        self.take_commands()?;
         let now = timeline.sim_at(wall);
         let near = self.keeps_common_time(now, self.pace.is_late(timeline, wall));
         let before = self.pace.time();
@@ -290,6 +298,9 @@ impl AgentRunner {
                 (self.step_alone(Span::Wanted(self.pace.wanted()))?, 0)
             }
         };
+        if start.dropped > SimSpan::ZERO {
+            self.tell(EventKind::RateMissed);
+        }
         self.pace.shorten(wanted, dt);
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
         if rests && self.cluster.is_some() {
@@ -329,26 +340,37 @@ impl AgentRunner {
         self.seek_leader().is_some()
     }
 
-    pub fn take_commands(&mut self) {
-        let pending = self.shared.mail.take();
+    /// Obeys the commands that came in.
+    ///
+    /// # Errors
+    /// Where it was moved to what is no state.
+    pub fn take_commands(&mut self) -> Result<(), String> {
+        let mut pending = self.shared.mail.take();
         if let Some(wanted) = pending.set_resolution {
             self.set_resolution(wanted);
         }
         if let Some(dt) = pending.dt {
             self.set_dt(dt);
         }
-        if let Some(hand) = pending.hand {
-            self.hands.clear();
-            self.hands.extend(hand);
+        if pending.has_loads() {
+            self.loads.get_or_insert_default().take(&mut pending, self.pace.time());
         }
         if let Some(pressure_pa) = pending.pressure_pa {
             self.agent.set_pressure_pa(pressure_pa);
         }
+        pending.motion.map_or(Ok(()), |motion| self.set_motion(&motion))
+    }
+
+    /// Moves it, and writes its state anew, so that others find it where it is now.
+    fn set_motion(&mut self, motion: &SetMotion) -> Result<(), String> {
+        if self.agent.set_motion(motion) { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.
     pub fn is_undisturbed(&self, now: SimTime) -> bool {
-        self.hands.is_empty() && !self.shared.sleep.must_stay_awake(self.id(), now)
+        let own = self.pace.time();
+        !self.loads.as_ref().is_some_and(|loads| loads.keep_awake(own))
+            && !self.shared.sleep.must_stay_awake(self.id(), now)
     }
 
     /// Lets its governor answer a turn that took `work_s` seconds of its own.
@@ -396,6 +418,7 @@ impl AgentRunner {
     fn rest_now(&mut self) {
         self.metrics.flush(&self.shared.gauges);
         self.shared.gauges.set_resting(true);
+        self.tell(EventKind::Rests);
         self.notify_reader();
         if let Some(broad_phase) = &self.peers.broad_phase {
             broad_phase.publish_rest(self.id());
@@ -413,6 +436,7 @@ impl AgentRunner {
         self.metrics.restart(timeline.sim_at(wall));
         self.metrics.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.set_resting(false);
+        self.tell(EventKind::Wakes);
         self.notify_reader();
         self.led.each(|seat| seat.resume(timeline, wall));
     }

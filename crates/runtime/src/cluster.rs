@@ -6,6 +6,7 @@
 
 mod attachments;
 mod common_time;
+mod contacts;
 mod membership;
 mod seats;
 #[cfg(test)]
@@ -21,17 +22,18 @@ pub(super) use turn::Leap;
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
 use super::helpers::Helped;
+use super::loads::Loads;
 use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
     StepDoubling,
 };
-use metachron_contact::{Link, Neighbour, StepContext};
+use metachron_contact::{AnchorForce, AnchorSpring, Link, Neighbour, SetMotor, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
-    AgentId, AttachmentEvent, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan,
-    SimTime, Snapshot, StepReport, recycled,
+    AgentId, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets, Grip, PairKind, PairState,
+    SimSpan, SimTime, Snapshot, StepReport, recycled,
 };
 use std::sync::Arc;
 
@@ -48,6 +50,7 @@ pub(super) struct ClusterSeat {
     memory: ContactMemory,
     grips: Vec<Grip>,
     pairs: Vec<PairState>,
+    contacts: Vec<ContactState>,
     /// What happened to attachments, of those that it tells of.
     events: Vec<AttachmentEvent>,
     /// Agents that belong into the same cluster, as it sees them.
@@ -126,6 +129,7 @@ impl ClusterSeat {
             memory: ContactMemory::default(),
             grips: Vec::new(),
             pairs: Vec::new(),
+            contacts: Vec::new(),
             events: Vec::new(),
             bonds: Vec::new(),
             sleepers: Vec::new(),
@@ -148,6 +152,7 @@ impl ClusterSeat {
     pub fn complete(&self, into: &mut Snapshot) {
         into.grips.clone_from(&self.grips);
         into.pairs.clone_from(&self.pairs);
+        into.contacts.clone_from(&self.contacts);
         into.events.clone_from(&self.events);
         into.sensed.clear();
         into.sensed.extend_from_slice(self.memory.sensed());
@@ -222,6 +227,17 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> Option<AgentId> {
     tool.grasp.filter(|grasp| grasp.target == me).map(|_| neighbour.id)
 }
 
+/// What users do to an agent in a step of `dt` from `time`.
+fn prepared(
+    loads: &mut Option<Box<Loads>>,
+    time: SimTime,
+    dt: SimSpan,
+) -> (&[AnchorSpring], &[AnchorForce], &[SetMotor]) {
+    let Some(loads) = loads else { return (&[], &[], &[]) };
+    loads.prepare(time, dt);
+    (loads.springs(), loads.forces(), loads.motors())
+}
+
 impl AgentRunner {
     /// Steps it with all that it leads and that are at its time; an agent that is no member of clusters by itself.
     ///
@@ -236,7 +252,8 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
         self.observe(step, &Membership::default());
         let (me, neighbours) = (self.shared.id, self.observer.neighbours());
-        let context = StepContext { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let (hands, forces, motors) = prepared(&mut self.loads, time, dt);
+        let context = StepContext { me, time, neighbours, hands, forces, motors, links: &self.links };
         let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work);
@@ -270,7 +287,7 @@ impl AgentRunner {
         let all = std::iter::once(&mut *self).chain(led.members_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
         for (actor, parts) in all.zip(parts) {
-            if let Some((participant, pairs)) = actor.participant(time, parts) {
+            if let Some((participant, pairs)) = actor.participant((time, dt), parts) {
                 list.push(participant);
                 sides.push(pairs);
             }
@@ -350,12 +367,17 @@ impl AgentRunner {
         Ok((plan, dt.unwrap_or(self.pace.wanted())))
     }
 
-    /// What it brings into a step from `time`, of which it makes so many parts, and its asynchronous pairs.
-    fn participant(&mut self, time: SimTime, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
+    /// What it brings into a step from a time on, of which it makes so many parts, and its asynchronous pairs.
+    fn participant(
+        &mut self,
+        (time, dt): (SimTime, SimSpan),
+        parts: u32,
+    ) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
-        let Self { agent, observer, hands, links, peers, cluster, .. } = self;
+        let Self { agent, observer, loads, links, peers, cluster, .. } = self;
         let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
-        let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, links };
+        let (hands, forces, motors) = prepared(loads, time, dt);
+        let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, forces, motors, links };
         let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
         let (member, alone_s) = (agent.member()?, self.pace.wanted().as_secs_f64());
         let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };
@@ -458,7 +480,7 @@ impl AgentRunner {
                 (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
                 pair.kind == PairKind::Attachment || seat.memory.near(now).any(|id| id == pair.with)
             });
-            for total in stepper.totals_of(me) {
+            for total in stepper.totals_of(me).iter().filter(|total| total.contacts > 0) {
                 let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
                 let pair = match total.partner {
                     Partner::Agent(with) => Some((with, PairKind::Cluster)),
@@ -472,6 +494,7 @@ impl AgentRunner {
                     seat.note_pair(total, with, kind, dt_s);
                 }
             }
+            seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.events);
             seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;
             done.set(done.get() + seat.work);

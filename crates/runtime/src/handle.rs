@@ -3,8 +3,9 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::cluster::Handover;
+use super::events::{AgentEvent, EventRing};
 use super::histogram::Histogram;
-use super::mailbox::{Command, Mailbox, SendError};
+use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
 use super::sleep::SleepRegistry;
@@ -21,8 +22,11 @@ pub(super) struct Shared {
     pub name: Arc<str>,
     pub model: &'static str,
     pub wanted_hz: f64,
+    /// The joints whose first body it is and that can have a motor.
+    pub motored: Box<[u32]>,
     pub gauges: Metrics,
     pub mail: Mailbox,
+    pub events: EventRing,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
@@ -109,11 +113,27 @@ impl AgentHandle {
     /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
     ///
     /// # Errors
-    /// [`SendError::BadNumber`]: nothing was delivered.
+    /// [`SendError`]: nothing was delivered.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
+        if let Command::Motor(Keyed { key: joint, .. }) = command
+            && !self.shared.motored.contains(&joint)
+        {
+            return Err(SendError::NoMotor { agent: self.id(), joint });
+        }
         self.shared.mail.send(command)?;
         self.shared.sleep.wake(self.shared.id);
         Ok(())
+    }
+
+    /// Begins to keep its events for readers; the number of the next one.
+    pub fn listen(&self) -> u64 {
+        self.shared.events.listen()
+    }
+
+    /// Passes its events from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
+    /// newest [`crate::EVENTS_KEPT`].
+    pub fn events_from(&self, next: u64, take: impl FnMut(AgentEvent)) -> (u64, u64) {
+        self.shared.events.read(next, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.

@@ -3,7 +3,7 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::AnchorSpring;
+use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
 use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
@@ -18,13 +18,43 @@ pub enum Command {
     Retune(Resolution),
     /// Step by this span; clamped to the agent's range.
     SetDt(SimSpan),
-    /// The user spring pulls at the agent until the next such command; `None` releases it.
-    Hand(Option<AnchorSpring>),
+    /// A spring of the user pulls at the agent. A tool is led by the one of the lowest key.
+    Spring(Keyed<AnchorSpring>),
+    /// A force acts on the agent.
+    Force(Keyed<AnchorForce>),
+    /// An impulse, N·s and N·m·s: evenly over the agent's next step. Those at one point add up.
+    Impulse(AnchorForce),
+    /// A motor drives the joint whose number is the key, instead of the motor that the scene gives it; `None` is the scene's again.
+    /// For the joint's first agent.
+    Motor(Keyed<SetMotor>),
+    /// Another place or velocity, before its next step; an agent that cannot take it stays as it is.
+    SetMotion(SetMotion),
     /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
     SetPressure(f64),
     /// Wake up from rest.
     Wake,
 }
+
+/// Something that is done to an agent until it is taken back, or until its time is over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keyed<T> {
+    /// Its name: the newest of a key takes the place of the older. Below [`KEYS`], but for motors.
+    pub key: u32,
+    /// What it is; `None` takes it back.
+    pub what: Option<T>,
+    /// For how long it acts, in the agent's time, from when the agent takes it; `None` until it is taken back.
+    pub lasts: Option<SimSpan>,
+}
+
+impl<T> Keyed<T> {
+    /// Under key 0, until it is taken back.
+    pub const fn first(what: Option<T>) -> Self {
+        Self { key: 0, what, lasts: None }
+    }
+}
+
+/// The most springs, the most forces, and the most points with impulses of one step that an agent takes.
+pub const KEYS: u32 = 8;
 
 /// Reason why a command was not delivered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -33,9 +63,24 @@ pub enum SendError {
     /// There is no such agent.
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
-    /// The command holds a number that is not finite, or a negative stiffness or damping.
-    #[error("command {0:?} was refused: every number must be finite, stiffness and damping not negative")]
-    BadNumber(Command),
+    /// The command holds a number that is not finite or outside its range.
+    #[error(
+        "command {0:?} was refused: every number must be finite, stiffness and damping not negative, a motor's effort above zero"
+    )]
+    BadNumber(Box<Command>),
+    /// A key that is too large, or impulses at too many points before the agent has taken a step.
+    #[error(
+        "command {0:?} was refused: an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points a step; keys are 0 to 7"
+    )]
+    TooMany(Box<Command>),
+    /// There is no joint of that number that can have a motor and whose first agent this is.
+    #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]
+    NoMotor {
+        /// The agent.
+        agent: AgentId,
+        /// The joint's number.
+        joint: u32,
+    },
 }
 
 /// The newest command of each kind, waiting for one agent.
@@ -54,8 +99,14 @@ pub(super) struct PendingCommands {
     pub set_resolution: Option<Resolution>,
     /// The newest requested step length.
     pub dt: Option<SimSpan>,
-    /// The newest state of the user spring.
-    pub hand: Option<Option<AnchorSpring>>,
+    /// The newest of each key.
+    pub springs: Vec<Keyed<AnchorSpring>>,
+    pub forces: Vec<Keyed<AnchorForce>>,
+    pub motors: Vec<Keyed<SetMotor>>,
+    /// One for each point, N·s and N·m·s.
+    pub impulses: Vec<AnchorForce>,
+    /// The newest place and velocity.
+    pub motion: Option<SetMotion>,
     /// The newest requested pressure, Pa.
     pub pressure_pa: Option<f64>,
 }
@@ -64,10 +115,13 @@ impl Mailbox {
     /// Stores `command` in the place of its kind.
     ///
     /// # Errors
-    /// [`SendError::BadNumber`]; nothing is delivered then.
+    /// [`SendError::BadNumber`] and [`SendError::TooMany`]; nothing is delivered then.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
         if !is_sound(&command) {
-            return Err(SendError::BadNumber(command));
+            return Err(SendError::BadNumber(Box::new(command)));
+        }
+        if key(&command).is_some_and(|key| key >= KEYS) {
+            return Err(SendError::TooMany(Box::new(command)));
         }
         if command == Command::Wake {
             return Ok(());
@@ -77,11 +131,16 @@ impl Mailbox {
         match command {
             Command::Retune(resolution) => pending.set_resolution = Some(resolution),
             Command::SetDt(dt) => pending.dt = Some(dt),
-            Command::Hand(pull) => pending.hand = Some(pull),
+            Command::Spring(spring) => renew(&mut pending.springs, spring),
+            Command::Force(force) => renew(&mut pending.forces, force),
+            Command::Motor(motor) => renew(&mut pending.motors, motor),
+            Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany(Box::new(command)))?,
+            Command::SetMotion(motion) => pending.move_by(motion),
             Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
             Command::Wake => {}
         }
         self.full.store(true, Release);
+        drop(pending);
         Ok(())
     }
 
@@ -103,23 +162,83 @@ impl Mailbox {
     }
 }
 
+impl PendingCommands {
+    /// Whether any of them is something that is done to the agent for a while.
+    pub fn has_loads(&self) -> bool {
+        let Self { springs, forces, motors, impulses, .. } = self;
+        !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
+    }
+
+    /// Adds an impulse; `None` where there are too many points.
+    fn add(&mut self, impulse: AnchorForce) -> Option<()> {
+        match self.impulses.iter().position(|mine| mine.anchor == impulse.anchor) {
+            Some(at) => {
+                self.impulses[at].force_n += impulse.force_n;
+                self.impulses[at].torque_n_m += impulse.torque_n_m;
+            }
+            None if self.impulses.len() < KEYS as usize => self.impulses.push(impulse),
+            None => return None,
+        }
+        Some(())
+    }
+
+    /// Takes a place and a velocity: what the new one leaves open stays as the older one wants it.
+    fn move_by(&mut self, new: SetMotion) {
+        let old = self.motion.unwrap_or_default();
+        self.motion = Some(SetMotion {
+            position_m: new.position_m.or(old.position_m),
+            rotation: new.rotation.or(old.rotation),
+            velocity_m_s: new.velocity_m_s.or(old.velocity_m_s),
+            spin_rad_s: new.spin_rad_s.or(old.spin_rad_s),
+        });
+    }
+}
+
+/// Puts `new` in the place of what has its key.
+fn renew<T>(all: &mut Vec<Keyed<T>>, new: Keyed<T>) {
+    match all.iter_mut().find(|old| old.key == new.key) {
+        Some(old) => *old = new,
+        None => all.push(new),
+    }
+}
+
+/// The key of a spring or a force.
+fn key(command: &Command) -> Option<u32> {
+    match command {
+        Command::Spring(spring) => Some(spring.key),
+        Command::Force(force) => Some(force.key),
+        _ => None,
+    }
+}
+
 fn is_sound(command: &Command) -> bool {
+    let force =
+        |force: &AnchorForce| is_finite(force.anchor) && force.force_n.is_finite() && force.torque_n_m.is_finite();
     match command {
         Command::Retune(wanted) => wanted.eps_m.is_finite(),
         Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
-        Command::SetDt(_) | Command::Hand(None) | Command::Wake => true,
-        Command::Hand(Some(pull)) => {
-            let anchor = match pull.anchor {
-                Anchor::Arc(arc_m) => arc_m.is_finite(),
-                Anchor::Local(point) => point.is_finite(),
-                Anchor::Vertex(_) => true,
-            };
+        Command::SetDt(_) | Command::Wake => true,
+        Command::Spring(Keyed { what, .. }) => what.as_ref().is_none_or(|pull| {
             let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
-            anchor
+            is_finite(pull.anchor)
                 && pull.target.is_finite()
                 && pull.target_velocity.is_finite()
                 && springs.iter().all(|k| k.is_finite() && *k >= 0.0)
+        }),
+        Command::Force(Keyed { what, .. }) => what.as_ref().is_none_or(force),
+        Command::Impulse(impulse) => force(impulse),
+        Command::Motor(Keyed { what, .. }) => {
+            what.as_ref().and_then(|set| set.motor).is_none_or(|motor| motor.check().is_ok())
         }
+        Command::SetMotion(motion) => motion.is_sound(),
+    }
+}
+
+fn is_finite(anchor: Anchor) -> bool {
+    match anchor {
+        Anchor::Arc(arc_m) => arc_m.is_finite(),
+        Anchor::Local(point) => point.is_finite(),
+        Anchor::Vertex(_) => true,
     }
 }
 
@@ -143,16 +262,19 @@ mod tests {
         let taken = mail.take();
         assert_eq!((taken.set_resolution.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
         let taken = mail.take();
-        assert_eq!((taken.set_resolution, taken.dt, taken.hand), (None, None, None), "once");
+        assert_eq!((taken.set_resolution, taken.dt), (None, None), "once");
     }
 
     #[test]
     fn a_release_is_a_command_too() {
         let mail = Mailbox::default();
-        mail.send(Command::Hand(Some(pull(DVec3::X)))).unwrap();
-        mail.send(Command::Hand(None)).unwrap();
-        assert_eq!(mail.take().hand, Some(None));
-        assert_eq!(mail.take().hand, None);
+        let spring = |key, what| Command::Spring(Keyed { key, what, lasts: None });
+        mail.send(spring(0, Some(pull(DVec3::X)))).unwrap();
+        mail.send(spring(3, Some(pull(DVec3::Y)))).unwrap();
+        mail.send(spring(0, None)).unwrap();
+        let springs = mail.take().springs;
+        assert_eq!(springs.iter().map(|s| (s.key, s.what.is_some())).collect::<Vec<_>>(), [(0, false), (3, true)]);
+        assert!(mail.take().springs.is_empty());
     }
 
     #[test]
@@ -168,11 +290,27 @@ mod tests {
     #[test]
     fn a_spring_that_is_not_finite_is_refused_when_sent() {
         let mail = Mailbox::default();
-        let bad = Command::Hand(Some(pull(DVec3::NAN)));
+        let bad = Command::Spring(Keyed::first(Some(pull(DVec3::NAN))));
         assert!(matches!(mail.send(bad), Err(SendError::BadNumber(_))));
         let negative = AnchorSpring { stiffness_n_m: -1.0, ..pull(DVec3::X) };
-        assert!(mail.send(Command::Hand(Some(negative))).is_err());
+        assert!(mail.send(Command::Spring(Keyed::first(Some(negative)))).is_err());
         assert!(mail.send(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
-        assert_eq!(mail.take().hand, None);
+        assert!(mail.take().springs.is_empty());
+    }
+
+    #[test]
+    fn impulses_at_a_point_add_up_and_no_more_points_are_taken_than_said() {
+        let mail = Mailbox::default();
+        let at =
+            |x: f64| AnchorForce { anchor: Anchor::Local(DVec3::X * x), force_n: DVec3::Y, torque_n_m: DVec3::ZERO };
+        for _ in 0..2 {
+            (0..KEYS).for_each(|k| mail.send(Command::Impulse(at(f64::from(k)))).unwrap());
+        }
+        assert!(matches!(mail.send(Command::Impulse(at(-1.0))), Err(SendError::TooMany(_))));
+        let taken = mail.take().impulses;
+        assert_eq!(taken.len(), KEYS as usize);
+        assert!(taken.iter().all(|impulse| impulse.force_n == DVec3::Y * 2.0));
+        let ninth = Keyed { key: KEYS, what: Some(at(0.0)), lasts: None };
+        assert!(matches!(mail.send(Command::Force(ninth)), Err(SendError::TooMany(_))));
     }
 }

@@ -24,7 +24,7 @@ impl AgentRunner {
         ]);
         black_box([
             self.links.len(),
-            self.hands.len(),
+            usize::from(self.loads.is_some()),
             self.led.len(),
             self.announced.len(),
             self.observer.neighbours().len(),

@@ -7,6 +7,7 @@ use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::broad_phase::BroadPhase;
 use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
+use super::events::EventRing;
 use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
@@ -275,14 +276,22 @@ fn shared(
         name: std::mem::take(&mut spawn.name).into(),
         model: spawn.agent.model(),
         wanted_hz: spawn.rate_hz,
+        motored: motored(id, spawn),
         gauges: Metrics::default(),
         mail: Mailbox::default(),
+        events: EventRing::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
         handover: moves.then(Handover::default),
         ages: Mutex::new(Histogram::default()),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
+}
+
+/// The joints of which `id` is the first agent and that can have a motor.
+fn motored(id: AgentId, spawn: &AgentSpawn) -> Box<[u32]> {
+    let joints = spawn.scene.joints_of(id);
+    joints.filter(|(_, joint)| joint.takes_motor()).map(|(number, _)| number).collect()
 }
 
 /// What an agent is assembled from.
@@ -320,7 +329,7 @@ fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
         writer,
         observer: peers.observer(id, &links),
         links: spawn.attached,
-        hands: Vec::new(),
+        loads: None,
         cluster,
         led: Led::default(),
         metrics: MetricsWriter::new(),

@@ -222,7 +222,7 @@ impl Pairs {
             state.force_n += impulse.linear.length() / dt_s;
             state.impulse_n_s += impulse.linear.length();
         }
-        for total in stepper.totals_of(place) {
+        for total in stepper.totals_of(place).iter().filter(|total| total.contacts > 0) {
             if let Partner::Agent(with) = total.partner
                 && let Some(state) = states.iter_mut().find(|state| state.with == with)
             {

@@ -41,8 +41,14 @@ impl ClusterStepper {
                 total.add(impulse, -contact.gap_m);
                 if impulse.length() > total.most_n_s {
                     total.most_n_s = impulse.length();
+                    let skin = all[owner.member].member.skin();
+                    total.point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+                    total.normal = contact.normal;
                     total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
                 }
+            } else if contact.gap_m < self.depth_m {
+                // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
+                total_of(&mut self.totals, owner.member, owner.partner);
             }
         }
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
@@ -105,8 +111,20 @@ pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Part
     let order = |total: &PairTotal| (total.member, total.partner);
     let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
         let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
-        let (most_n_s, inverse_mass_per_kg) = (0.0, [0.0; 2]);
-        totals.insert(at, PairTotal { member, partner, impulse_n_s, contacts, depth_m, most_n_s, inverse_mass_per_kg });
+        totals.insert(
+            at,
+            PairTotal {
+                member,
+                partner,
+                impulse_n_s,
+                contacts,
+                depth_m,
+                most_n_s: 0.0,
+                point_m: DVec3::NAN,
+                normal: DVec3::ZERO,
+                inverse_mass_per_kg: [0.0; 2],
+            },
+        );
         at
     });
     &mut totals[at]

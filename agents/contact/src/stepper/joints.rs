@@ -143,6 +143,8 @@ impl Joints {
                 // a body that is not here cannot be held: clusters contain both
                 let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
                 let joint = one.memory.slipped(Partner::Joint(number)).joint(joint);
+                let set = one.context.motors.iter().find(|set| set.joint == number);
+                let joint = set.map_or(joint, |set| joint.with_motor(set.motor));
                 self.hold(step, &Jointed { number, joint: &joint, a, b }, ties);
             }
         }

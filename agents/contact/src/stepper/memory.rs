@@ -6,7 +6,7 @@
 use super::spin_friction::Spin;
 use super::yielding::Slip;
 use glam::DVec3;
-use metachron_core::{AgentId, SensorPartner, SensorTouch, SimSpan, SimTime};
+use metachron_core::{AgentId, ContactPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::TouchKey;
 
 /// A pair that bears less than this share of the most that its places have borne is relieved.
@@ -219,8 +219,8 @@ impl ContactMemory {
     /// Counts touches of which one side only senses: `now` are the partners that touch the body `at` this time, by rising names.
     pub(super) fn sense(&mut self, now: impl Iterator<Item = Partner>, at: SimTime) {
         let with = |partner| match partner {
-            Partner::Agent(id) => Some(SensorPartner::Agent(id)),
-            Partner::Static(number) => Some(SensorPartner::Static(number)),
+            Partner::Agent(id) => Some(ContactPartner::Agent(id)),
+            Partner::Static(number) => Some(ContactPartner::Static(number)),
             _ => None,
         };
         let mut place = 0;

@@ -158,12 +158,16 @@ pub struct PairTotal {
     pub partner: Partner,
     /// The impulse on the participant, world axes, N·s.
     pub impulse_n_s: DVec3,
-    /// Places that bore something, or rows of the link, counted in every fine step.
+    /// Places that bore something, or rows of the link, counted in every fine step; zero for a pair that only touches.
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
     /// The most that one contact gave, N·s; zero for links and in heaps.
     pub most_n_s: f64,
+    /// Where that contact is, metres; not a number for links and in heaps.
+    pub point_m: DVec3,
+    /// Its normal, towards the participant, of length 1; zero for links and in heaps.
+    pub normal: DVec3,
     /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
     pub inverse_mass_per_kg: [f64; 2],
 }
@@ -491,12 +495,12 @@ impl ClusterStepper {
             }
         });
         self.first_failure()?;
-        for (place, (one, state)) in all.iter_mut().zip(&mut self.progress).enumerate() {
+        for (place, (one, state)) in all.iter().zip(&mut self.progress).enumerate() {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
                 state.begun_s = 0.0;
                 state.start(&*one.member);
-                state.push(self.outside.answer(place, one.member, own_s / self.macro_s));
+                self.outside.act(place, one, [own_s, self.macro_s], state);
             }
             state.part += 1;
             state.look(&*one.member);

@@ -1,9 +1,10 @@
 //! What reaches a cluster from outside within a macro step, and what it gives to partners that are stepped elsewhere.
 //!
-//! In: impulses that partners gave before, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
+//! In: impulses that partners gave before, forces of users, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
 use super::memory::Partner;
+use super::progress::Progress;
 use super::ties::{FineStep, RowOwner, Ties};
 use super::{ClusterMember, Participant};
 use crate::cluster::{Hold, JointRow, Side};
@@ -84,20 +85,45 @@ impl Outside {
         self.line_impulses.resize(self.lines.len(), DVec3::ZERO);
     }
 
-    /// The change of a member's velocities by a share of the known impulses on it: A⁻¹ Jᵀ of them; empty where there are none.
-    pub(super) fn answer(&mut self, place: usize, member: &dyn ClusterMember, share: f64) -> &[DVec3] {
+    /// Lets what acts on the participant at `place` act in its own step of `own_s` seconds within a macro step of `macro_s`: the known
+    /// impulses on it and the forces of users, Jᵀ of them. What knows how it answers takes the velocities that they make; what leaves that to
+    /// the cluster takes them as momentum.
+    pub(super) fn act(
+        &mut self,
+        place: usize,
+        one: &Participant<'_>,
+        [own_s, macro_s]: [f64; 2],
+        state: &mut Progress,
+    ) {
         let Self { known, scratch, residual, .. } = self;
+        let (member, forces) = (&*one.member, one.context.forces);
         scratch.clear();
-        if known.iter().any(|known| known.member == place) {
-            scratch.resize(member.free().len(), DVec3::ZERO);
-            for known in known.iter().filter(|known| known.member == place) {
-                for term in known.side.terms() {
-                    scratch[term.block] += term.map.transpose() * (known.impulse * share);
-                }
-            }
-            respond(member, scratch, residual);
+        if forces.is_empty() && !known.iter().any(|known| known.member == place) {
+            return state.push(&[]);
         }
-        scratch
+        scratch.resize(member.free().len(), DVec3::ZERO);
+        let mut give = |side: &Side, impulse: DVec3| {
+            for term in side.terms() {
+                scratch[term.block] += term.map.transpose() * impulse;
+            }
+        };
+        for known in known.iter().filter(|known| known.member == place) {
+            give(&known.side, known.impulse * (own_s / macro_s));
+        }
+        for force in forces {
+            if let Some(point) = member.anchor(force.anchor) {
+                give(&point.side, force.force_n * own_s);
+            }
+            if let Some(turn) = member.turn(force.anchor).filter(|_| force.torque_n_m != DVec3::ZERO) {
+                give(&turn, force.torque_n_m * own_s);
+            }
+        }
+        if member.unanswered().is_empty() {
+            respond(member, scratch, residual);
+            state.push(scratch);
+        } else {
+            state.owe(scratch);
+        }
     }
 
     /// Adds what contacts or rows gave a side of theirs, where it is that of a remote member.

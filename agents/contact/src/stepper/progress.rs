@@ -23,6 +23,8 @@ pub(super) struct Progress {
     pub gain: Vec<DVec3>,
     /// The part of that which known impulses from outside make; empty for none.
     pub pushed: Vec<DVec3>,
+    /// Momentum that acts on it from outside over its step, where it leaves its answer to the cluster, N·s; empty for none.
+    pub owed: Vec<DVec3>,
     /// What the impulses since have changed them by.
     pub given: Vec<DVec3>,
     /// v(p − 1): by which its place has moved so far.
@@ -70,6 +72,7 @@ impl Progress {
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
         self.late.clear();
+        self.owed.clear();
         self.unanswered.clear();
         self.unanswered.resize(member.unanswered().len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
@@ -88,11 +91,19 @@ impl Progress {
         self.touched |= !change.is_empty();
     }
 
+    /// Lets known impulses act on it evenly within its step, whose answer is the cluster's to find.
+    pub fn owe(&mut self, impulses: &[DVec3]) {
+        self.push(&[]);
+        self.owed.extend_from_slice(impulses);
+        self.touched = true;
+    }
+
     /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
-        let Self { share, part, start, gain, given, before, known, seen, unanswered, .. } = self;
+        let Self { share, part, start, gain, given, before, known, seen, unanswered, owed, .. } = self;
         let each = f64::from(*share).recip();
         unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
+        unanswered.iter_mut().zip(&*owed).for_each(|(r, more)| *r += *more * each);
         let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
         known.clear();
         known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));

@@ -39,6 +39,8 @@ pub(super) struct Owner {
     pub key: TouchKey,
     /// Its friction about the normal.
     pub spin: Spin,
+    /// The point of the participant's skin.
+    pub place: Place,
     /// When its sides meet, seconds from the start of the fine step; `None` where they do not rebound, or where that is not decided yet.
     pub meets_s: Option<f64>,
 }
@@ -279,7 +281,15 @@ impl Search {
         let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
         let spin = Spin { radius_m: skin.form.spin_radius_with_m(form), ..Spin::default() };
-        let owner = Owner { member, partner, other: pair.other(), key: TouchKey::default(), spin, meets_s: None };
+        let owner = Owner {
+            member,
+            partner,
+            other: pair.other(),
+            key: TouchKey::default(),
+            spin,
+            place: Place::Point(DVec3::NAN),
+            meets_s: None,
+        };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
 
@@ -322,7 +332,8 @@ impl Search {
         let Found { owner, skins, at: Meeting { after_s, ways }, mut clear_m } = found;
         let swept = after_s > 0.0;
         for touch in touches.iter() {
-            let (owner, facing) = (Owner { key: touch.key, ..owner }, pair.facing(round, touch, ways));
+            let (owner, facing) =
+                (Owner { key: touch.key, place: touch.on_a, ..owner }, pair.facing(round, touch, ways));
             if facing.sides.iter().all(|side| side.terms().is_empty()) {
                 continue;
             }

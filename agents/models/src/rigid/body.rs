@@ -6,9 +6,9 @@ use super::mass_properties::MassDistribution;
 use super::member::Unknowns;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{
     Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, check_span,
 };
@@ -118,6 +118,23 @@ impl Agent for RigidBody {
 
     fn resolution(&self) -> Option<Resolution> {
         None
+    }
+
+    fn set_motion(&mut self, set: &SetMotion) -> bool {
+        let Self { motion, spread, .. } = self;
+        let origin_m = set.position_m.unwrap_or(motion.position - motion.rotation * spread.com);
+        let spin_rad_s = set.spin_rad_s.unwrap_or_else(|| motion.spin(spread));
+        let rotation = set.rotation.map_or(motion.rotation, DQuat::normalize);
+        let velocity = set.velocity_m_s.unwrap_or(motion.velocity);
+        let mut to = Motion { position: origin_m + rotation * spread.com, rotation, velocity, ..*motion };
+        to.set_spin(spread, spin_rad_s);
+        if !to.is_sane(spread) {
+            return false;
+        }
+        *motion = to;
+        (self.at_rest, self.calm_s, self.acceleration) = (false, 0.0, DVec3::ZERO);
+        self.unknowns.start([velocity, spin_rad_s]);
+        true
     }
 
     /// A rigid body has no nodes to redistribute: nothing changes.

@@ -116,6 +116,12 @@ impl Discretization {
         self.length.len()
     }
 
+    /// The length that belongs to each node, metres: half of each segment beside it.
+    pub fn node_lengths_m(&self) -> impl Iterator<Item = f64> + '_ {
+        let of = |segment: Option<usize>| segment.and_then(|k| self.length.get(k)).copied().unwrap_or(0.0);
+        (0..=self.segments()).map(move |node| 0.5 * (of(node.checked_sub(1)) + of(Some(node))))
+    }
+
     /// Total rest length, metres.
     pub fn total_m(&self) -> f64 {
         self.arc_m[self.segments()]

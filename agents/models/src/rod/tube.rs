@@ -18,9 +18,10 @@ use super::step::{Divergence, Setting, Stepper, energy};
 use super::step_doubling::Doubling;
 use super::wall::{Wall, WallLaw};
 use super::{Section, TubeSpec, WallModel};
+use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -387,6 +388,35 @@ impl Agent for Tube {
 
     fn set_pressure_pa(&mut self, pressure_pa: f64) -> bool {
         Self::set_pressure_pa(self, pressure_pa).is_ok()
+    }
+
+    /// A tube of which an end or a part is held stays where it is, and takes velocities.
+    fn set_motion(&mut self, set: &SetMotion) -> bool {
+        let Self { now, matter, division, spec, .. } = self;
+        let whole = WholeMotion::new(set, division.node_lengths_m().zip(now.x.iter().copied()));
+        if whole.shifts() && (matter.held.contains(&true) || !spec.attachments.is_empty()) {
+            return false;
+        }
+        let count = now.q.len();
+        now.x.iter_mut().for_each(|x| *x = whole.place(*x));
+        now.q.iter_mut().for_each(|q| *q = (whole.turn() * *q).normalize());
+        for (slot, u) in now.u.iter_mut().enumerate() {
+            let part = slot / 2;
+            let end = if part == 0 { 0 } else { 1 };
+            let is_end = if slot % 2 == 0 { part == 0 || part == count } else { part == 0 || part + 1 == count };
+            *u = match slot % 2 {
+                0 if is_end && matter.held[end] => DVec3::ZERO,
+                0 => whole.velocity(now.x[part], *u),
+                _ if is_end && matter.clamp[end] => DVec3::ZERO,
+                _ => whole.spin(*u),
+            };
+        }
+        now.strain(matter, division);
+        self.stepper.forget();
+        self.present_velocities();
+        self.rest.wake();
+        self.at_rest = false;
+        true
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -12,9 +12,10 @@ use super::spec::{SoftError, SoftSpec};
 use super::step_doubling::Doubling;
 use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
+use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, StepContext};
+use metachron_contact::{Agent, AnchorSpring, SetMotion, StepContext};
 use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -245,6 +246,21 @@ impl Agent for SoftBody {
 
     fn resolution(&self) -> Option<Resolution> {
         self.present_resolution()
+    }
+
+    /// A body of which parts are held stays where it is, and takes velocities.
+    fn set_motion(&mut self, set: &SetMotion) -> bool {
+        let whole = WholeMotion::new(set, self.mesh.mass_kg.iter().copied().zip(self.positions.iter().copied()));
+        if whole.shifts() && self.mesh.held.contains(&true) {
+            return false;
+        }
+        let Self { positions, velocities, mesh, .. } = self;
+        for ((x, v), held) in positions.iter_mut().zip(&mut *velocities).zip(&mesh.held) {
+            *x = whole.place(*x);
+            *v = if *held { DVec3::ZERO } else { whole.velocity(*x, *v) };
+        }
+        self.woken();
+        true
     }
 
     /// A body with a skin of its own is divided anew; the division of any other is fixed by its scene.

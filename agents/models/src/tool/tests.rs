@@ -68,7 +68,7 @@ impl Stage {
 
     fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let context = StepContext { me: ME, time: self.time, neighbours: &self.neighbours, hands, links: &[] };
+        let context = StepContext { neighbours: &self.neighbours, hands, ..StepContext::alone(ME, self.time) };
         let report = self.tool.step(dt, &context)?;
         self.time += dt;
         Ok(report)

@@ -123,7 +123,7 @@ impl Clocks {
         } = &mut all[me];
         let id = AgentId(me as u32);
         let dt = SimSpan::from_secs_f64(1.0 / *rate_hz).unwrap();
-        let context = StepContext { me: id, time: *time, neighbours: &neighbours, hands, links };
+        let context = StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(id, *time) };
         let mut list: Vec<Participant<'_>> = Vec::with_capacity(8);
         let member = agent.member().unwrap();
         list.push(Participant { id, member, context, laws: &laws, memory, parts: 1, alone_s: dt.as_secs_f64(), grips });

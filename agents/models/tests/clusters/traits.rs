@@ -4,7 +4,7 @@ use crate::bodies::{rigid, solid};
 use crate::joints::{G, state};
 use crate::table::{GRAVITY, Placed, Table, placed, plane};
 use glam::{DQuat, DVec3};
-use metachron_core::{AgentId, SensorPartner, SensorTouch};
+use metachron_core::{AgentId, ContactPartner, SensorTouch};
 use metachron_geometry::{CollisionGroups, CombineRule, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
@@ -142,7 +142,7 @@ fn a_ball_rebounds_by_the_restitution_that_its_pairs_rule_makes() {
 }
 
 /// What a body has sensed of one partner, after some seconds.
-fn sensed(table: &mut Table, body: usize, with: SensorPartner, seconds: f64) -> SensorTouch {
+fn sensed(table: &mut Table, body: usize, with: ContactPartner, seconds: f64) -> SensorTouch {
     table.play(seconds);
     let found: Vec<_> = table.sensed(body).iter().filter(|touch| touch.with == with).collect();
     assert_eq!(found.len(), 1, "{with:?} once: {:?}", table.sensed(body));
@@ -161,12 +161,12 @@ fn a_static_sensor_counts_what_falls_through_it_and_gives_no_force() {
         let model = one.agent.model();
         let mut table = at_rate(Table::among(vec![one], std::slice::from_ref(&gate)), 240.0);
         let start = table.middle(0).0.z;
-        let inside = sensed(&mut table, 0, SensorPartner::Static(0), 0.3);
+        let inside = sensed(&mut table, 0, ContactPartner::Static(0), 0.3);
         assert_eq!((inside.touching, inside.begins, inside.ends), (true, 1, 0), "{model}");
         // its lower side, 2 mm over the origin, falls by 0.402 m
         let meets_s = (2.0 * 0.402 / G).sqrt();
         assert!((inside.changed.as_secs_f64() - meets_s).abs() < 1.1 / 240.0 + 0.003, "{model}: {:?}", inside.changed);
-        let outside = sensed(&mut table, 0, SensorPartner::Static(0), 0.6);
+        let outside = sensed(&mut table, 0, ContactPartner::Static(0), 0.6);
         assert_eq!((outside.touching, outside.begins, outside.ends), (false, 1, 1), "{model}");
         let (fell, free) = (start - table.middle(0).0.z, 0.5 * G * 0.6 * 0.6);
         assert!((fell / free - 1.0).abs() < 0.02, "{model} fell by {fell} m of {free} m");
@@ -180,7 +180,7 @@ fn a_sensor_sees_what_shoots_through_it_within_a_step() {
     let gate = Obstacle { solid, position: DVec3::X, ..floor(traits) };
     let bullet = RigidSpec { velocity: DVec3::X * 300.0, gravity: DVec3::ZERO, ..ball(0.005, DVec3::Y * 0.3) };
     let mut table = Table::among(vec![body(bullet)], &[gate]);
-    let seen = sensed(&mut table, 0, SensorPartner::Static(0), 0.1);
+    let seen = sensed(&mut table, 0, ContactPartner::Static(0), 0.1);
     assert_eq!((seen.touching, seen.begins, seen.ends), (false, 1, 1));
     assert_eq!(state(&table, 0).velocity, DVec3::X * 300.0);
 }
@@ -203,7 +203,7 @@ fn a_body_that_is_a_sensor_tells_of_another_body_each_time_and_neither_is_moved(
     };
     table.bodies[1].hands.push(spring);
     // the period of 1 kg on 40 N/m is 0.993 s: it is in the eye twice in each
-    let seen = sensed(&mut table, 0, SensorPartner::Agent(AgentId(1)), 1.05);
+    let seen = sensed(&mut table, 0, ContactPartner::Agent(AgentId(1)), 1.05);
     assert_eq!((seen.touching, seen.begins, seen.ends), (false, 2, 2));
     assert_eq!(state(&table, 0).velocity, DVec3::ZERO);
     assert!(table.sensed(1).is_empty(), "the agent of lower number tells of it");
@@ -278,6 +278,6 @@ fn a_heap_knows_groups_and_sensors() {
     let heights: Vec<f64> = (0..300).map(|i| state(&table, i).position.z).collect();
     assert!(heights[..295].iter().all(|z| (z - 0.01).abs() < 1e-3), "those of the floor's group lie");
     assert!(heights[295..].iter().all(|z| *z < -0.1), "the others fall through it: {:?}", &heights[295..]);
-    let seen = sensed(&mut table, 0, SensorPartner::Static(1), 0.21);
+    let seen = sensed(&mut table, 0, ContactPartner::Static(1), 0.21);
     assert!(seen.touching && seen.begins == 1, "{seen:?}");
 }

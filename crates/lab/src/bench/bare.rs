@@ -95,7 +95,7 @@ fn run_alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration)
 
 /// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let context = StepContext { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    let context = StepContext::alone(AgentId(0), SimTime::ZERO);
     agent.step(dt, &context)?;
     Ok(())
 }

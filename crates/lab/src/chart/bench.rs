@@ -164,7 +164,7 @@ impl StepHarness {
         let mut all = recycled(std::mem::take(participants));
         for ((id, actor), (role, step_s)) in (0..).map(AgentId).zip(actors.iter_mut()).zip(roles) {
             let Actor { agent, hands, neighbours, memory, grips, .. } = actor;
-            let context = StepContext { me: id, time: *time, neighbours, hands, links: &[] };
+            let context = StepContext { neighbours, hands, ..StepContext::alone(id, *time) };
             let parts = plan.parts_in(role, step_s);
             all.extend(agent.member().map(|member| Participant {
                 id,

@@ -3,6 +3,7 @@
 //! In: an agent's joints and links, its memory of what has torn, what yielded and tore in a step. Out: agents that belong together, entries in the states
 //! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::stepper`]).
 
+use super::super::events::{AgentEvent, EventKind};
 use super::AgentRunner;
 use metachron_contact::stepper::{ClusterStepper, ContactMemory, Partner, Torn, Yielded};
 use metachron_contact::{Law, Link};
@@ -76,6 +77,7 @@ impl AgentRunner {
                 };
                 let with = other.map(|other| ids[other]);
                 seat.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
+                actor.shared.events.push(&AgentEvent { at: actor.pace.time() + dt, kind: EventKind::AttachmentGave });
             }
         });
     }

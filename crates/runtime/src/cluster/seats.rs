@@ -7,6 +7,7 @@
 
 use super::super::agent_clock::Timeline;
 use super::super::agent_runner::AgentRunner;
+use super::super::events::EventKind;
 use super::super::handle::{AgentHandle, Shared};
 use super::membership::Membership;
 use crossbeam::atomic::AtomicCell;
@@ -164,6 +165,7 @@ impl AgentRunner {
     fn admit(&mut self, actor: Box<AgentRunner>) {
         let (me, sleep) = (self.id(), Arc::clone(&self.shared.sleep));
         std::iter::once(actor.id()).chain(actor.led.ids()).for_each(|id| sleep.follow(id, Some(me)));
+        std::iter::once(&*actor).chain(actor.led.all()).for_each(|joining| joining.tell(EventKind::Joined(me)));
         self.led.admit(actor);
     }
 
@@ -199,6 +201,7 @@ impl AgentRunner {
     fn return_turns(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
         self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
+        self.tell(EventKind::Left);
         shared.sleep.follow(id, None);
         self.settle(1.0);
         if let Some(handover) = &shared.handover {

@@ -35,7 +35,7 @@ impl AgentRunner {
         self.led.each(|actor| {
             let caught_up = contained(|| {
                 actor.shared.sleep.clear_wake(actor.id());
-                actor.take_commands();
+                actor.take_commands()?;
                 if actor.pace.time() == time - leap.jumped {
                     actor.pace.drop_time(leap.start.dropped, leap.jumped);
                     actor.pace.follow_clock_offset(clock_offset);

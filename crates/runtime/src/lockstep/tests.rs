@@ -1,7 +1,7 @@
 //! Claims about runs in virtual time; those about turns hold for every executor, which all make the same.
 
 use super::super::testing::{Dummy, Fault};
-use super::super::{AgentState, Command, Demand, Governor, SendError, TurnMeasure, state_hash};
+use super::super::{AgentState, Command, Demand, Governor, Keyed, SendError, TurnMeasure, state_hash};
 use super::*;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
@@ -196,13 +196,13 @@ fn a_user_spring_pulls_until_its_release_and_keeps_the_agent_awake() {
         stiffness_n_m: 1.0,
         damping_n_s_m: 0.0,
     };
-    run.send(AgentId(0), Command::Hand(Some(pull))).unwrap();
+    run.send(AgentId(0), Command::Spring(Keyed::first(Some(pull)))).unwrap();
     run.wait_until(ms(600));
     let pulled = run.agents()[0].latest();
     assert_eq!(run.agents()[0].stats().steps, 126);
     // x' = 1 + 1000 - x over 0.5 s gives 1001 (1 - e^-0.5) = 394; first-order steps of 4 ms: 0.4 % of it
     assert!((pulled.body.probe(0.0).unwrap().0.x - 394.0).abs() < 2.0);
-    run.send(AgentId(0), Command::Hand(None)).unwrap();
+    run.send(AgentId(0), Command::Spring(Keyed::first(None))).unwrap();
     run.wait_until(ms(1600));
     assert_eq!(run.agents()[0].state(), AgentState::Resting);
 }

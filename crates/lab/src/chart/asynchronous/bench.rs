@@ -176,7 +176,7 @@ impl StepHarness {
         let time = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
         let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
-        let context = StepContext { me, time, neighbours: &neighbours, hands, links };
+        let context = StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(me, time) };
         cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, dt)?;
         actor.last_s = dt.as_secs_f64();
         own.clear();

@@ -1,0 +1,36 @@
+//! What touches an agent now, as its state publishes it.
+
+use crate::{AgentId, SimTime};
+use glam::DVec3;
+
+/// The other side of a contact, or of a touch that is only sensed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ContactPartner {
+    /// A static solid, by its number in the scene.
+    Static(u32),
+    /// Another agent.
+    Agent(AgentId),
+}
+
+/// A contact with all its places. It is published by the agent, of two by that of the lower number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactState {
+    /// The other side.
+    pub with: ContactPartner,
+    /// When it began, in the agent's time: the end of its first step.
+    pub since: SimTime,
+    /// Places that bore something in the last step, counted in each of its parts.
+    pub places: u32,
+    /// The place that bore most in it, metres; not a number where that is not known, as in heaps that rapier3d steps.
+    pub point_m: DVec3,
+    /// The normal there, towards the agent, of length 1.
+    pub normal: DVec3,
+    /// The force on the agent, world axes, N: the mean of the last step.
+    pub force_n: DVec3,
+    /// The greatest of these forces since it began, world axes, N.
+    pub greatest_n: DVec3,
+    /// The force of which its events have told last, N.
+    pub told_n: f64,
+    /// The deepest overlap in the last step, metres, ≥ 0.
+    pub depth_m: f64,
+}

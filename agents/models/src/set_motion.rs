@@ -1,0 +1,61 @@
+//! How a body that bends is moved as a whole: turned and shifted about its centre of mass, with the velocities of a rigid body.
+//!
+//! In: where its matter is, where it is to go. Out: a map of points and velocities. Never here: which body may be moved.
+
+use glam::{DQuat, DVec3};
+use metachron_contact::SetMotion;
+
+/// A rigid motion of a body that bends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WholeMotion {
+    centre_m: DVec3,
+    to_m: DVec3,
+    turn: DQuat,
+    /// Velocity of its centre and spin, where they are given.
+    velocity_m_s: Option<DVec3>,
+    spin_rad_s: Option<DVec3>,
+}
+
+impl WholeMotion {
+    /// Moves the body whose masses and points these are.
+    pub fn new(motion: &SetMotion, matter: impl Iterator<Item = (f64, DVec3)>) -> Self {
+        let (mass_kg, moment) = matter.fold((0.0, DVec3::ZERO), |(mass, sum), (m, x)| (mass + m, sum + x * m));
+        let centre_m = moment / mass_kg;
+        Self {
+            centre_m,
+            to_m: motion.position_m.unwrap_or(centre_m),
+            turn: motion.rotation.map_or(DQuat::IDENTITY, DQuat::normalize),
+            velocity_m_s: motion.velocity_m_s,
+            spin_rad_s: motion.spin_rad_s,
+        }
+    }
+
+    /// Whether it moves the body elsewhere.
+    pub fn shifts(&self) -> bool {
+        self.to_m != self.centre_m || self.turn != DQuat::IDENTITY
+    }
+
+    /// Where a point goes.
+    pub fn place(&self, x: DVec3) -> DVec3 {
+        self.to_m + self.turn * (x - self.centre_m)
+    }
+
+    /// How much it turns.
+    pub const fn turn(&self) -> DQuat {
+        self.turn
+    }
+
+    /// The velocity of what is at `x` already: that of a rigid body where one is given, else the one that it had, turned along.
+    pub fn velocity(&self, x: DVec3, had: DVec3) -> DVec3 {
+        if self.velocity_m_s.is_none() && self.spin_rad_s.is_none() {
+            return self.turn * had;
+        }
+        self.velocity_m_s.unwrap_or_default() + self.spin_rad_s.unwrap_or_default().cross(x - self.to_m)
+    }
+
+    /// The spin of a part that had this one.
+    pub fn spin(&self, had: DVec3) -> DVec3 {
+        let is_given = self.velocity_m_s.is_some() || self.spin_rad_s.is_some();
+        if is_given { self.spin_rad_s.unwrap_or_default() } else { self.turn * had }
+    }
+}

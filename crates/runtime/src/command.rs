@@ -1,0 +1,114 @@
+//! Commands as users write them.
+//!
+//! ```
+//! use glam::DVec3;
+//! use metachron_core::Anchor;
+//! use metachron_runtime::Command;
+//!
+//! // two newtons upwards at 0.6 m along a tube, for 50 ms of its time
+//! let lift = Command::force(Anchor::Arc(0.6), DVec3::Z * 2.0).key(1).for_ms(50);
+//! ```
+
+use super::mailbox::{Command, Keyed};
+use glam::{DQuat, DVec3};
+use metachron_contact::joint::Motor;
+use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
+use metachron_core::{Anchor, SimSpan};
+
+impl Command {
+    /// A force of `force_n`, N, world axes, at a material point, under key 0, until it is taken back.
+    #[must_use]
+    pub const fn force(anchor: Anchor, force_n: DVec3) -> Self {
+        Self::Force(Keyed::first(Some(AnchorForce { anchor, force_n, torque_n_m: DVec3::ZERO })))
+    }
+
+    /// A torque of `torque_n_m`, N·m, world axes, at a material point, under key 0, until it is taken back.
+    #[must_use]
+    pub const fn torque(anchor: Anchor, torque_n_m: DVec3) -> Self {
+        Self::Force(Keyed::first(Some(AnchorForce { anchor, force_n: DVec3::ZERO, torque_n_m })))
+    }
+
+    /// An impulse of `impulse_n_s`, N·s, world axes, at a material point.
+    #[must_use]
+    pub const fn impulse(anchor: Anchor, impulse_n_s: DVec3) -> Self {
+        Self::Impulse(AnchorForce { anchor, force_n: impulse_n_s, torque_n_m: DVec3::ZERO })
+    }
+
+    /// A spring of `stiffness_n_m`, N/m, and `damping_n_s_m`, N·s/m, from a point in space to a material point, under key 0, until it is taken
+    /// back. It leads a tool.
+    #[must_use]
+    pub const fn spring(anchor: Anchor, target: DVec3, stiffness_n_m: f64, damping_n_s_m: f64) -> Self {
+        let target_velocity = DVec3::ZERO;
+        Self::Spring(Keyed::first(Some(AnchorSpring {
+            by: None,
+            anchor,
+            target,
+            target_velocity,
+            stiffness_n_m,
+            damping_n_s_m,
+        })))
+    }
+
+    /// A motor for a joint, by its number in the scene, until it is taken back.
+    #[must_use]
+    pub const fn motor(joint: u32, motor: Motor) -> Self {
+        Self::Motor(Keyed { key: joint, what: Some(SetMotor { joint, motor: Some(motor) }), lasts: None })
+    }
+
+    /// To another place: the origin of a rigid body's axes, or the centre of mass of what bends, metres, and by how much it turns.
+    #[must_use]
+    pub fn teleport(position_m: DVec3, rotation: DQuat) -> Self {
+        Self::SetMotion(SetMotion { position_m: Some(position_m), rotation: Some(rotation), ..SetMotion::default() })
+    }
+
+    /// Another velocity, m/s, and spin, rad/s, of all its matter.
+    #[must_use]
+    pub fn velocity(velocity_m_s: DVec3, spin_rad_s: DVec3) -> Self {
+        Self::SetMotion(SetMotion {
+            velocity_m_s: Some(velocity_m_s),
+            spin_rad_s: Some(spin_rad_s),
+            ..SetMotion::default()
+        })
+    }
+
+    /// The same under another key, 0 … 7, of a spring or a force; others have none.
+    #[must_use]
+    pub const fn key(mut self, key: u32) -> Self {
+        match &mut self {
+            Self::Spring(spring) => spring.key = key,
+            Self::Force(force) => force.key = key,
+            _ => {}
+        }
+        self
+    }
+
+    /// The same for this long, in the agent's time, from when the agent takes it; what acts once or for good stays so.
+    #[must_use]
+    pub const fn lasting(mut self, span: SimSpan) -> Self {
+        match &mut self {
+            Self::Spring(spring) => spring.lasts = Some(span),
+            Self::Force(force) => force.lasts = Some(span),
+            Self::Motor(motor) => motor.lasts = Some(span),
+            _ => {}
+        }
+        self
+    }
+
+    /// [`Command::lasting`] in milliseconds.
+    #[must_use]
+    pub const fn for_ms(self, milliseconds: u64) -> Self {
+        self.lasting(SimSpan::from_millis(milliseconds))
+    }
+
+    /// Takes back the spring, the force or the motor of its key.
+    #[must_use]
+    pub const fn taken_back(mut self) -> Self {
+        match &mut self {
+            Self::Spring(spring) => spring.what = None,
+            Self::Force(force) => force.what = None,
+            Self::Motor(motor) => motor.what = None,
+            _ => {}
+        }
+        self
+    }
+}
