@@ -3,7 +3,7 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
-use metachron_core::{AgentId, AttachmentEvent, ClusterState, SensorPartner, SensorTouch};
+use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
@@ -319,8 +319,8 @@ fn event(scene: &Scene, event: &Event) -> EventReport {
 fn sensor(scene: &Scene, sensing: &Sensing) -> SensorReport {
     let SensorTouch { with, touching, begins, ends, changed } = sensing.what;
     let b = match with {
-        SensorPartner::Agent(id) => scene.name_of(id),
-        SensorPartner::Static(number) => scene.obstacles.get(number as usize).map_or("", |solid| solid.name.as_str()),
+        ContactPartner::Agent(id) => scene.name_of(id),
+        ContactPartner::Static(number) => scene.obstacles.get(number as usize).map_or("", |solid| solid.name.as_str()),
     };
     let (a, b) = (scene.name_of(sensing.agent).to_owned(), b.to_owned());
     SensorReport { a, b, touching, begins, ends, changed_s: changed.as_secs_f64() }

@@ -1,6 +1,6 @@
 //! What scenes say about contact and motors: what comes of it in a running world, and what a wrong key is told.
 
-use metachron_core::{Body, RigidState, SensorPartner, SimSpan};
+use metachron_core::{Body, ContactPartner, RigidState, SimSpan};
 use metachron_scene::{SceneError, Source, load};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Scene, World};
@@ -20,7 +20,7 @@ fn after(scene: &Scene, seconds: f64) -> World {
 }
 
 fn ball(world: &World) -> RigidState {
-    let Body::Rigid(state) = world.latest(world.object("ball").unwrap()).body else { panic!("a rigid body") };
+    let Body::Rigid(state) = world.latest(world.object("ball").unwrap()).unwrap().body else { panic!("a rigid body") };
     state
 }
 
@@ -50,9 +50,9 @@ fn a_sensor_is_told_of_in_the_state_of_what_touched_it() {
     let world = after(&scene, 1.0);
     // the lower side of the gate is 0.15 m up, the upper side of the ball at rest 0.2 m
     assert!((ball(&world).position.z - 0.1).abs() < 1e-3);
-    let state = world.latest(world.object("ball").unwrap());
+    let state = world.latest(world.object("ball").unwrap()).unwrap();
     let [touch] = state.sensed.as_slice() else { panic!("{:?}", state.sensed) };
-    assert_eq!((touch.with, touch.touching, touch.ends + 1), (SensorPartner::Static(1), true, touch.begins));
+    assert_eq!((touch.with, touch.touching, touch.ends + 1), (ContactPartner::Static(1), true, touch.begins));
 }
 
 #[test]

@@ -28,11 +28,11 @@ fn a_shaft_in_a_trocar_passes_through_it_while_its_tip_follows_the_script() {
             .unwrap();
     for _ in 0..12 {
         world.advance(SimSpan::from_millis(100));
-        let tool = *world.latest(world.object("grasper").unwrap()).body.tool().unwrap();
+        let tool = *world.latest(world.object("grasper").unwrap()).unwrap().body.tool().unwrap();
         let local = tool.rotation.conjugate() * (pivot - tool.tip);
         assert!(local.distance(DVec3::NEG_Z * tool.tip.distance(pivot)) < 1e-12, "{local}"); // rounding
     }
-    let end = world.latest(world.object("grasper").unwrap());
+    let end = world.latest(world.object("grasper").unwrap()).unwrap();
     assert!(end.body.tool().unwrap().tip.distance(DVec3::new(-0.03, 0.06, 0.15)) < 1e-9);
 }
 

@@ -15,7 +15,7 @@ fn the_finest_organ_is_solved_by_gradients_with_a_rigid_ball_on_it() {
     let scene = load(&source, &finest).unwrap();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(400));
-    let state = |name: &str| world.latest(world.object(name).unwrap());
+    let state = |name: &str| world.latest(world.object(name).unwrap()).unwrap();
     let [organ, marble] = ["organ", "marble"].map(state);
     let leader = organ.cluster.unwrap().leader;
     assert_eq!(marble.cluster.unwrap().leader, leader, "they are one problem");

@@ -38,7 +38,7 @@ fn scene(keys: &str) -> Result<Scene, String> {
 fn played(keys: &str) -> (CurveState, u64) {
     let world = World::start(&scene(keys).unwrap(), ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(500));
-    let pipe = world.latest(world.object("pipe").unwrap());
+    let pipe = world.latest(world.object("pipe").unwrap()).unwrap();
     let Body::Curve(curve) = &pipe.body else { panic!("a tube is a curve") };
     (curve.clone(), world.hash())
 }
@@ -78,7 +78,7 @@ fn pressure_over_time_widens_the_pipe_by_lames_law() {
     let pipe = world.object("pipe").unwrap();
     for (wanted_pa, after_ms) in [(200.0, 150), (400.0, 1350)] {
         world.advance(SimSpan::from_millis(after_ms));
-        let Body::Curve(curve) = &world.latest(pipe).body else { panic!("a tube is a curve") };
+        let Body::Curve(curve) = &world.latest(pipe).unwrap().body else { panic!("a tube is a curve") };
         // the end, which the brick does not touch; a wall of soft tissue follows within milliseconds
         let off = (curve.radii_m[0] - 0.01) / (wanted_pa * per_pa_m) - 1.0;
         assert!(off.abs() < 0.05, "{off} of {wanted_pa} Pa");

@@ -27,9 +27,9 @@ use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy,
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
-use metachron_runtime::{AgentHandle, Command, Machine, Reader, TimelineCommand};
+use metachron_runtime::{AgentHandle, Command, Keyed, Machine, Reader, TimelineCommand};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
-use metachron_world::{Scene, World, machine};
+use metachron_world::{Scene, World, WorldError, machine};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -351,14 +351,14 @@ impl Session {
     }
 
     /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
-    pub fn hand(&self, to: AgentId, pull: Option<AnchorSpring>) -> Result<(), metachron_runtime::SendError> {
-        self.world.send(to, Command::Hand(pull))
+    pub fn hand(&self, to: AgentId, pull: Option<AnchorSpring>) -> Result<(), WorldError> {
+        self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
     /// Sets the pressure of what fills an agent, inside minus outside, Pa; one that nothing fills stays as it is. An agent that does not exist
     /// and a number that is not finite give an error.
-    pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), metachron_runtime::SendError> {
-        self.world.send(of, Command::SetPressure(pressure_pa))
+    pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
+        self.world.command(self.world.object_of(of)?, Command::SetPressure(pressure_pa))
     }
 
     /// Ends the frame that began at `started`.

@@ -12,7 +12,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let world = World::start(&scene, ExecutorKind::Lockstep)?;
     world.advance(SimSpan::from_millis(100));
     ten_steps(&world);
-    println!("the tube is at {:?}", world.latest(world.object("tube")?).body.probe(0.5));
+    println!("the tube is at {:?}", world.latest(world.object("tube")?)?.body.probe(0.5));
     Ok(())
 }
 

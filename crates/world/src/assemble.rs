@@ -24,25 +24,32 @@ pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 ///
 /// # Errors
 /// [`WorldError::Build`] if a model rejects its object.
-pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
+pub(super) fn spawns(
+    scene: &Scene,
+    surroundings: &Arc<ClusterScene>,
+    executor: ExecutorKind,
+    govern: Govern<'_>,
+) -> Result<Vec<AgentSpawn>, WorldError> {
     let mut ties = Ties::of(scene);
-    let surroundings = Arc::new(surroundings(scene)?);
     let all = scene.agents.iter();
     all.map(|member| {
         let spawn = spawn(scene, member, executor, &mut *govern, &mut ties)?;
-        Ok(AgentSpawn { scene: Arc::clone(&surroundings), ..spawn })
+        Ok(AgentSpawn { scene: Arc::clone(surroundings), ..spawn })
     })
     .collect()
 }
 
 /// What all contact clusters of a scene share: its static solids and joints.
-fn surroundings(scene: &Scene) -> Result<ClusterScene, WorldError> {
+///
+/// # Errors
+/// [`WorldError::Build`] for a solid or a joint that cannot be.
+pub(super) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
     let among = among.resting_at(scene.contact_depth_m).map_err(|error| failed(error.to_string()))?;
     let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
     let among = among.with_passages(passages);
-    among.jointed(Arc::clone(&scene.joints)).map_err(|error| failed(error.to_string()))
+    among.jointed(Arc::clone(&scene.joints)).map(Arc::new).map_err(|error| failed(error.to_string()))
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.

@@ -13,7 +13,7 @@
 //! let scene = Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap();
 //! let [world, again] = [0, 1].map(|_| World::start(&scene, ExecutorKind::Lockstep).unwrap());
 //! [&world, &again].into_iter().for_each(|world| world.advance(SimSpan::from_millis(2000)));
-//! let state = world.latest(world.object("ball").unwrap());
+//! let state = world.latest(world.object("ball").unwrap()).unwrap();
 //! let (position, _) = state.body.probe(0.0).unwrap();
 //! assert!((position.z - 0.05).abs() < 1e-3); // the ball rests on the floor
 //! assert_eq!(world.hash(), again.hash()); // the same bits
@@ -22,10 +22,14 @@
 mod assemble;
 mod builder;
 pub mod couplings;
+mod events;
+mod frames;
 mod initial_overlap;
 mod initial_shape;
 pub mod kinds;
+mod object;
 mod overlap;
+mod queries;
 mod scene;
 mod spec;
 mod ties;
@@ -33,11 +37,16 @@ mod world;
 
 pub use assemble::{Govern, machine};
 pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
+pub use events::{Contact, Event, EventFilter, Events, Happening};
+pub use frames::{Frame, Frames};
 pub use initial_overlap::Moved;
+pub use metachron_runtime::Command;
+pub use object::{Object, Touched};
 pub use overlap::Overlap;
+pub use queries::{Cast, ContactNow, Hit};
 pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe,
     RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
 pub use spec::Division;
-pub use world::{Object, World, WorldError};
+pub use world::{World, WorldError};

@@ -6,28 +6,22 @@
 use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
+use super::events::{EventFilter, Events};
+use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use super::object::{Object, WorldTag};
+use glam::DVec3;
+use metachron_contact::stepper::ClusterScene;
+use metachron_core::{AgentId, Anchor, Body, SimSpan, SimTime, Snapshot};
+use metachron_geometry::CollisionShape;
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Command, Lockstep, Pool, Run, RunError, SendError, SystemClock, Threads,
-    Timeline, TimelineCommand, state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads, Timeline,
+    TimelineCommand, state_hash, wait_until,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// An object of a world; valid for the world that named it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Object(AgentId);
-
-impl Object {
-    /// The number of its agent: its place in the scene.
-    #[must_use]
-    pub const fn id(self) -> AgentId {
-        self.0
-    }
-}
-
-/// Why a world could not be started, or has no such object.
+/// Why a world could not be started, or refuses something.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WorldError {
@@ -42,6 +36,33 @@ pub enum WorldError {
     /// The agents could not be started.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// There is no agent of that number.
+    #[error("the world has no agent {}", .0.0)]
+    NoAgent(AgentId),
+    /// The object is another world's.
+    #[error("the object was named by another world")]
+    Foreign,
+    /// The object has no such point.
+    #[error("\"{name}\" has no point {anchor:?}: {wanted}")]
+    NoPoint {
+        /// The object's name.
+        name: String,
+        /// The point asked for.
+        anchor: Anchor,
+        /// Which points it has.
+        wanted: String,
+    },
+    /// A command was refused.
+    #[error("\"{name}\" takes no such command: {reason}")]
+    Refused {
+        /// The object's name.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// A query that asks for nothing that can be found.
+    #[error("{0}")]
+    BadQuery(String),
     /// The world has no moving object of that name.
     #[error("the world has no moving object \"{name}\"; its moving objects are {known}")]
     NoObject {
@@ -61,11 +82,28 @@ pub struct World {
 }
 
 struct Shared {
+    tag: WorldTag,
     state: Mutex<State>,
     agents: Vec<AgentHandle>,
+    /// The contact shape of each agent.
+    forms: Vec<Option<Arc<CollisionShape>>>,
+    /// The static solids and joints.
+    surroundings: Arc<ClusterScene>,
     executor: ExecutorKind,
     /// The clock of executors in real time.
     clock: Arc<SystemClock>,
+}
+
+impl std::fmt::Debug for World {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("World").field("tag", &self.shared.tag).finish_non_exhaustive()
+    }
+}
+
+impl WorldError {
+    pub(super) fn bad_query(reason: &str) -> Self {
+        Self::BadQuery(reason.to_owned())
+    }
 }
 
 /// What makes agents step, or where its time stood when it ended.
@@ -92,7 +130,9 @@ impl World {
     /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
     pub fn start_governed(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Self, WorldError> {
         let executor = assemble::executor(executor, scene.agents.len());
-        let spawns = assemble::spawns(scene, executor, govern)?;
+        let surroundings = assemble::surroundings(scene)?;
+        let spawns = assemble::spawns(scene, &surroundings, executor, govern)?;
+        let forms = spawns.iter().map(|spawn| spawn.agent.form()).collect();
         let clock = Arc::new(SystemClock::new());
         let priority = assemble::priority(scene);
         let mut run: Box<dyn Run> = match executor {
@@ -104,7 +144,8 @@ impl World {
             run.drive(TimelineCommand::Pause);
         }
         let agents = run.agents().to_vec();
-        Ok(Self { shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, clock }) })
+        let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
+        Ok(Self { shared: Arc::new(Shared { tag, state, agents, forms, surroundings, executor, clock }) })
     }
 
     /// The object of that name.
@@ -113,19 +154,76 @@ impl World {
     /// [`WorldError::NoObject`].
     pub fn object(&self, name: &str) -> Result<Object, WorldError> {
         let found = self.shared.agents.iter().find(|agent| agent.name() == name);
-        found.map(|agent| Object(agent.id())).ok_or_else(|| {
+        found.map(|agent| self.shared.tag.object(agent.id())).ok_or_else(|| {
             let known: Vec<_> = self.shared.agents.iter().take(20).map(AgentHandle::name).collect();
             WorldError::NoObject { name: name.to_owned(), known: known.join(", ") }
         })
     }
 
+    /// The objects of these names.
+    ///
+    /// # Errors
+    /// [`WorldError::NoObject`] for the first that there is not.
+    pub fn objects<const N: usize>(&self, names: [&str; N]) -> Result<[Object; N], WorldError> {
+        let all: Vec<_> = names.iter().map(|name| self.object(name)).collect::<Result<_, _>>()?;
+        all.try_into().map_err(|_| WorldError::Foreign)
+    }
+
+    /// The object whose agent has this number: its place in the scene.
+    ///
+    /// # Errors
+    /// [`WorldError::NoAgent`].
+    pub fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {
+        let agent = self.shared.agents.get(id.0 as usize).ok_or(WorldError::NoAgent(id))?;
+        Ok(self.shared.tag.object(agent.id()))
+    }
+
     /// The newest state of an object. Reading never blocks the object.
     ///
-    /// # Panics
-    /// For an object of another world whose number this one does not have.
+    /// # Errors
+    /// [`WorldError::Foreign`].
+    pub fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
+        self.agent(object).map(AgentHandle::latest)
+    }
+
+    /// Sends a command to an object, which obeys at its next step.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`]; [`WorldError::NoPoint`] for a material point that it does not have; [`WorldError::Refused`] for numbers outside
+    /// their range and for a joint that it cannot drive. Nothing was done then.
+    pub fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
+        let agent = self.agent(object)?;
+        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
+        let state = agent.latest();
+        match command {
+            Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => {
+                self.check_point(object, &state, force.anchor)?;
+                if force.torque_n_m != DVec3::ZERO && matches!(state.body, Body::Soft(_)) {
+                    return Err(refused("its vertices do not turn, so a torque has nothing to act on".to_owned()));
+                }
+            }
+            Command::Spring(Keyed { what: Some(spring), .. }) => self.check_point(object, &state, spring.anchor)?,
+            _ => {}
+        }
+        agent.send(command).map_err(|error| refused(error.to_string()))
+    }
+
+    /// Events of its objects from now on.
     #[must_use]
-    pub fn latest(&self, object: Object) -> Arc<Snapshot> {
-        self.shared.agents[object.0.0 as usize].latest()
+    pub fn events(&self, filter: EventFilter) -> Events {
+        Events::new(self.clone(), filter)
+    }
+
+    /// All objects at one moment, so many times a second from now on; time passes meanwhile.
+    #[must_use]
+    pub fn frames(&self, rate_hz: f64) -> Frames {
+        Frames::new(self.clone(), rate_hz)
+    }
+
+    /// All objects now, at one moment.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        Frame::now(self.clone())
     }
 
     /// Simulated time now.
@@ -211,14 +309,6 @@ impl World {
         self.with_run(|run| run.drive(drive));
     }
 
-    /// Sends a command to an agent.
-    ///
-    /// # Errors
-    /// [`SendError`]: nothing was delivered.
-    pub fn send(&self, to: AgentId, command: Command) -> Result<(), SendError> {
-        self.shared.agents.get(to.0 as usize).ok_or(SendError::NoAgent(to))?.send(command)
-    }
-
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
     /// Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
@@ -233,7 +323,45 @@ impl World {
         }
     }
 
-    fn has_stopped(&self) -> bool {
+    pub(super) fn tag(&self) -> WorldTag {
+        self.shared.tag
+    }
+
+    /// The contact shapes of the agents, in the order of their numbers.
+    pub(super) fn forms(&self) -> &[Option<Arc<CollisionShape>>] {
+        &self.shared.forms
+    }
+
+    pub(super) fn surroundings(&self) -> &ClusterScene {
+        &self.shared.surroundings
+    }
+
+    /// The agent of an object.
+    pub(super) fn agent(&self, object: Object) -> Result<&AgentHandle, WorldError> {
+        let agents = &self.shared.agents;
+        agents.get(object.id().0 as usize).filter(|_| object.is_of(self.shared.tag)).ok_or(WorldError::Foreign)
+    }
+
+    fn check_point(&self, object: Object, state: &Snapshot, anchor: Anchor) -> Result<(), WorldError> {
+        state.body.point(anchor).map(drop).ok_or_else(|| self.no_point(object, anchor))
+    }
+
+    /// Why an object has no such point.
+    pub(super) fn no_point(&self, object: Object, anchor: Anchor) -> WorldError {
+        let Ok(agent) = self.agent(object) else { return WorldError::Foreign };
+        let wanted = match &agent.latest().body {
+            Body::Nothing => "it has no matter".to_owned(),
+            Body::Curve(curve) => {
+                let length_m = curve.arc_m.last().copied().unwrap_or_default();
+                format!("it has Arc of 0 to {length_m} m")
+            }
+            Body::Rigid(_) | Body::Tool(_) => "it has Local, metres from its centre of mass in its own axes".to_owned(),
+            Body::Soft(soft) => format!("it has Vertex of 0 to {}", soft.positions.len().saturating_sub(1)),
+        };
+        WorldError::NoPoint { name: agent.name().to_owned(), anchor, wanted }
+    }
+
+    pub(super) fn has_stopped(&self) -> bool {
         matches!(*self.state(), State::Stopped { .. })
     }
 

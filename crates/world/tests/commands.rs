@@ -1,0 +1,190 @@
+//! Commands do what mechanics says they do, for as long as they were sent for, whatever the steps of what obeys them.
+
+use glam::{DQuat, DVec3};
+use metachron_contact::joint::{JointKind, Motor, MotorGoal};
+use metachron_core::{Anchor, Body, RigidState, SimSpan};
+use metachron_geometry::Solid;
+use metachron_world::Command;
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Object, Rigid, Scene, Tube, World, WorldError};
+
+const RATES_HZ: [f64; 3] = [60.0, 240.0, 1000.0];
+const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
+
+/// A world without gravity that holds one body of 0.5 kg.
+fn lone(rigid: Rigid) -> (World, Object) {
+    let scene = Scene::builder().gravity([0.0; 3]).add("body", rigid.mass_kg(0.5)).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let body = world.object("body").unwrap();
+    (world, body)
+}
+
+fn state(world: &World, object: Object) -> RigidState {
+    let Body::Rigid(state) = world.latest(object).unwrap().body else { panic!("a rigid body") };
+    state
+}
+
+#[test]
+fn a_force_and_a_torque_give_what_they_were_sent_for() {
+    for rate_hz in RATES_HZ {
+        let (world, body) = lone(Rigid::ball(0.1).rate_hz(rate_hz));
+        world.command(body, Command::force(CENTRE, DVec3::X * 2.0).for_ms(55)).unwrap();
+        world.command(body, Command::torque(CENTRE, DVec3::Z * 0.01).key(1).for_ms(100)).unwrap();
+        world.advance(SimSpan::from_millis(500));
+        let state = state(&world, body);
+        // v = F t / m, and w = T t / I with I = 2/5 m r²
+        assert!((state.velocity - DVec3::X * 0.22).length() < 1e-9, "{rate_hz} Hz: {}", state.velocity);
+        assert!((state.spin - DVec3::Z * 0.5).length() < 1e-9, "{rate_hz} Hz: {}", state.spin);
+    }
+}
+
+#[test]
+fn an_impulse_beside_the_centre_pushes_and_turns_once() {
+    for rate_hz in RATES_HZ {
+        let (world, body) = lone(Rigid::cuboid([0.1; 3]).rate_hz(rate_hz));
+        let at = DVec3::new(0.0, 0.1, 0.0);
+        world.command(body, Command::impulse(Anchor::Local(at), DVec3::X * 0.05)).unwrap();
+        world.command(body, Command::impulse(Anchor::Local(at), DVec3::X * 0.05)).unwrap();
+        world.advance(SimSpan::from_millis(100));
+        let state = state(&world, body);
+        // J / m, and r × J / I with I = m a²/6 of a cube of edge a
+        assert!((state.velocity - DVec3::X * 0.2).length() < 1e-9, "{rate_hz} Hz: {}", state.velocity);
+        let spin = at.cross(DVec3::X * 0.1) / (0.5 * 0.2 * 0.2 / 6.0);
+        assert!((state.spin - spin).length() < 1e-6, "{rate_hz} Hz: {} instead of {spin}", state.spin);
+    }
+}
+
+#[test]
+fn a_box_is_pushed_along_the_floor_against_its_friction() {
+    // as rough as the floor is by default, so that every rule for pairs gives the same
+    let crate_ = Rigid::cuboid([0.1; 3]).mass_kg(2.0).at([0.0, 0.0, 0.1]).friction(0.5).rate_hz(240.0);
+    let scene = Scene::builder().fixed("floor", Solid::Plane).add("crate", crate_).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let body = world.object("crate").unwrap();
+    world.advance(SimSpan::from_millis(500));
+    world.command(body, Command::force(CENTRE, DVec3::X * 30.0).for_ms(400)).unwrap();
+    let speeds = [450, 200].map(|span_ms| {
+        world.advance(SimSpan::from_millis(span_ms));
+        state(&world, body).velocity.x
+    });
+    let rub_m_s2 = 0.5 * 9.81;
+    let expected = (15.0 - rub_m_s2) * 0.4 - rub_m_s2 * 0.05;
+    // the agent takes the command at its next step
+    assert!((speeds[0] - expected).abs() < 15.0 / 240.0, "{} instead of {expected} m/s", speeds[0]);
+    assert!((speeds[0] - speeds[1] - rub_m_s2 * 0.2).abs() < 0.01 * rub_m_s2, "{speeds:?}");
+}
+
+#[test]
+fn a_force_on_a_tube_gives_it_momentum() {
+    for rate_hz in [60.0, 240.0] {
+        let gut = Tube::along(&[[-0.3, 0.0, 0.0], [0.3, 0.0, 0.0]]).segments(20).density_kg_m3(1000.0).rate_hz(rate_hz);
+        let scene = Scene::builder().gravity([0.0; 3]).add("gut", gut).build().unwrap();
+        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+        let gut = world.object("gut").unwrap();
+        world.command(gut, Command::force(Anchor::Arc(0.37), DVec3::Z * 0.2).for_ms(300)).unwrap();
+        world.advance(SimSpan::from_millis(600));
+        let Body::Curve(curve) = &world.latest(gut).unwrap().body else { panic!("a tube") };
+        // nodes of equal lengths but the two at the ends, and linear elements: the momentum is that of the trapezium
+        let mass_kg = 1000.0 * std::f64::consts::PI * 0.01 * 0.01 * 0.6;
+        let last = curve.velocities.len() - 1;
+        let weight = |k: usize| if k == 0 || k == last { 0.5 } else { 1.0 };
+        let mean_z = (0..=last).map(|k| weight(k) * curve.velocities[k].z).sum::<f64>() / last as f64;
+        assert!((mean_z - 0.06 / mass_kg).abs() < 1e-6, "{rate_hz} Hz: {mean_z} m/s");
+    }
+}
+
+#[test]
+fn a_spring_holds_a_ball_where_its_weight_stretches_it_and_lets_go_when_its_time_is_over() {
+    let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 1.0]);
+    let scene = Scene::builder().add("ball", ball).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let ball = world.object("ball").unwrap();
+    world.command(ball, Command::spring(CENTRE, DVec3::Z, 50.0, 6.0).for_ms(3000)).unwrap();
+    world.advance(SimSpan::from_millis(3000));
+    let held = state(&world, ball);
+    assert!((held.position.z - (1.0 - 0.2 * 9.81 / 50.0)).abs() < 1e-5, "{}", held.position.z);
+    world.advance(SimSpan::from_millis(200));
+    let fallen = state(&world, ball);
+    assert!((fallen.velocity.z + 9.81 * 0.2).abs() < 0.1, "{}", fallen.velocity.z);
+}
+
+#[test]
+fn what_is_moved_goes_on_from_there() {
+    let ball = Rigid::ball(0.05).at([0.0, 0.0, 0.05]);
+    let scene = Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let ball = world.object("ball").unwrap();
+    world.advance(SimSpan::from_millis(2000));
+    assert!(world.latest(ball).unwrap().at_rest);
+    world.command(ball, Command::teleport(DVec3::new(1.0, 2.0, 10.0), DQuat::from_rotation_x(1.0))).unwrap();
+    world.command(ball, Command::velocity(DVec3::X, DVec3::Z)).unwrap();
+    let before = world.time();
+    world.advance(SimSpan::from_millis(500));
+    let (now, t) = (state(&world, ball), world.latest(ball).unwrap().moment().secs_after(before));
+    let expected = DVec3::new(1.0 + t, 2.0, 10.0 - 0.5 * 9.81 * t * t);
+    // a step may begin before the command comes in
+    assert!((now.position - expected).length() < 0.06, "{} instead of {expected}", now.position);
+    assert!((now.spin - DVec3::Z).length() < 1e-9);
+}
+
+#[test]
+fn a_tube_is_moved_as_a_whole_and_one_that_is_held_is_not() {
+    let along = Tube::along(&[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]).segments(8);
+    let scene = Scene::builder().gravity([0.0; 3]).add("free", along.clone());
+    let held = Tube::along(&[[-0.1, 1.0, 0.0], [0.1, 1.0, 0.0]]).segments(8).clamp([true, false]);
+    let scene = scene.add("held", held).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let [free, held] = world.objects(["free", "held"]).unwrap();
+    let at_start = world.latest(held).unwrap();
+    let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    for object in [free, held] {
+        world.command(object, Command::teleport(DVec3::Z * 3.0, turn)).unwrap();
+    }
+    world.advance(SimSpan::from_millis(100));
+    let frame = world.frame();
+    assert!((frame.point(free, Anchor::Arc(0.2)).unwrap() - DVec3::new(0.0, 0.1, 3.0)).length() < 1e-9);
+    let [now, before] = [frame.state(held).unwrap(), &*at_start].map(|state| state.body.probe(1.0).unwrap().0);
+    assert!(now.distance(before) < 1e-9);
+    // no strain came of it
+    assert!(frame.state(free).unwrap().energy_j.abs() < 1e-9);
+}
+
+#[test]
+fn a_motor_turns_its_hinge_as_long_as_it_was_sent_for() {
+    let wheel = Rigid::cuboid([0.2, 0.2, 0.02]).mass_kg(1.0);
+    let hinge = JointKind::Revolute { axis: DVec3::Z, range_rad: None, motor: None };
+    let scene = Scene::builder().gravity([0.0; 3]).add("wheel", wheel).joint("wheel", None, hinge, [0.0; 3]);
+    let scene = scene.build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let wheel = world.object("wheel").unwrap();
+    // b is the world: it turns backwards, so the wheel forwards
+    let motor = Motor { goal: MotorGoal::Velocity(-3.0), max_effort: 0.1 };
+    world.command(wheel, Command::motor(0, motor).for_ms(200)).unwrap();
+    world.advance(SimSpan::from_millis(200));
+    // I = m (a² + a²)/12 with edges of 0.4 m
+    let inertia = 0.32 / 12.0;
+    let spin = state(&world, wheel).spin.z;
+    assert!((spin - 0.1 * 0.2 / inertia).abs() < 0.02, "as its bound allows: {spin}");
+    world.advance(SimSpan::from_millis(500));
+    assert!((state(&world, wheel).spin.z - spin).abs() < 0.02, "it turns on without the motor");
+    world.command(wheel, Command::motor(0, motor)).unwrap();
+    world.advance(SimSpan::from_millis(2000));
+    assert!((state(&world, wheel).spin.z - 3.0).abs() < 1e-6);
+    assert!(matches!(world.command(wheel, Command::motor(1, motor)), Err(WorldError::Refused { .. })));
+}
+
+#[test]
+fn commands_that_cannot_be_say_why_and_do_nothing() {
+    let (world, body) = lone(Rigid::ball(0.1));
+    let (_, foreign) = lone(Rigid::ball(0.1));
+    let push = Command::force(CENTRE, DVec3::X);
+    let message = |object: Object, command: Command| world.command(object, command).unwrap_err().to_string();
+    assert!(message(foreign, push).contains("another world"));
+    assert!(message(body, Command::force(CENTRE, DVec3::NAN)).contains("finite"));
+    assert!(message(body, push.key(8)).contains("keys are 0 to 7"));
+    assert!(message(body, Command::force(Anchor::Arc(0.1), DVec3::X)).contains("Local"));
+    assert!(message(body, Command::spring(CENTRE, DVec3::ZERO, -1.0, 0.0)).contains("negative"));
+    assert!(message(body, Command::teleport(DVec3::INFINITY, DQuat::IDENTITY)).contains("finite"));
+    world.advance(SimSpan::from_millis(100));
+    assert_eq!(state(&world, body).velocity, DVec3::ZERO);
+}
