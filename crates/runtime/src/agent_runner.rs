@@ -256,10 +256,11 @@ impl AgentRunner {
     pub fn park(&mut self, reason: String) {
         self.show_withheld();
         self.metrics.flush(&self.shared.gauges);
+        let left = self.shared.gauges.has_left();
+        self.tell(if left { EventKind::Gone } else { EventKind::Parked });
         self.shared.gauges.park(reason);
-        self.tell(EventKind::Parked);
         self.notify_reader();
-        if let Some(broad_phase) = &self.peers.broad_phase {
+        if let Some(broad_phase) = self.peers.broad_phase.get().filter(|_| !left) {
             broad_phase.publish_rest(self.id());
         }
         self.close();
@@ -285,7 +286,7 @@ impl AgentRunner {
         let time = self.pace.time();
         self.led.members_at(time).for_each(|actor| actor.record_period(timeline, wall));
         let wanted = self.faults.span(self.pace.wanted(), self.id(), self.metrics.turns());
-        let is_met = self.peers.broad_phase.is_some() || !self.links.is_empty();
+        let is_met = self.peers.broad_phase.get().is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.resolution();
         let led = self.led.members_at(time).count() as u32;
@@ -343,9 +344,13 @@ impl AgentRunner {
     /// Obeys the commands that came in.
     ///
     /// # Errors
-    /// Where it was moved to what is no state.
+    /// Where it leaves the run, or was moved to what is no state.
     pub fn take_commands(&mut self) -> Result<(), String> {
         let mut pending = self.shared.mail.take();
+        if pending.leaves {
+            self.vanish();
+            return Err(GONE.to_owned());
+        }
         if let Some(wanted) = pending.set_resolution {
             self.set_resolution(wanted);
         }
@@ -359,6 +364,18 @@ impl AgentRunner {
             self.agent.set_pressure_pa(pressure_pa);
         }
         pending.motion.map_or(Ok(()), |motion| self.set_motion(&motion))
+    }
+
+    /// Publishes that nothing of it is left, where nobody finds it.
+    fn vanish(&mut self) {
+        let time = self.pace.time();
+        let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
+        self.writer.fill(|into| *into = nothing);
+        self.withheld = !self.writer.publish();
+        if let Some(broad_phase) = self.peers.broad_phase.get() {
+            broad_phase.publish_nowhere(self.id(), time);
+        }
+        self.shared.gauges.leave();
     }
 
     /// Moves it, and writes its state anew, so that others find it where it is now.
@@ -420,7 +437,7 @@ impl AgentRunner {
         self.shared.gauges.set_resting(true);
         self.tell(EventKind::Rests);
         self.notify_reader();
-        if let Some(broad_phase) = &self.peers.broad_phase {
+        if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_rest(self.id());
         }
         self.led.each(AgentRunner::rest_now);
@@ -441,6 +458,9 @@ impl AgentRunner {
         self.led.each(|seat| seat.resume(timeline, wall));
     }
 }
+
+/// Why an agent makes no more turns that has left.
+const GONE: &str = "it has left";
 
 /// Runs `part` of a turn; an error or a panic in it is the reason to park.
 pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {

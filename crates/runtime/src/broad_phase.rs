@@ -11,6 +11,7 @@ mod published_bounds;
 
 pub(super) use neighbour_list::NeighbourList;
 
+use glam::DVec3;
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
 use std::sync::OnceLock;
@@ -28,12 +29,12 @@ pub(super) struct PlannedStep {
 /// Shared data by which the agents of a run find each other.
 #[derive(Debug)]
 pub(super) struct BroadPhase {
-    bounds: Vec<PublishedBounds>,
+    bounds: boxcar::Vec<PublishedBounds>,
     /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
     /// Number of entries ever written.
     noted: AtomicU64,
-    calls: Vec<Calls>,
+    calls: boxcar::Vec<Calls>,
 }
 
 /// Agents that have given impulses to one agent, or belong with it, since its last query: a bit each, on pages allocated on first use, since most agents never
@@ -41,7 +42,7 @@ pub(super) struct BroadPhase {
 #[derive(Debug, Default)]
 struct Calls {
     any: AtomicBool,
-    pages: OnceLock<Box<[OnceLock<Page>]>>,
+    pages: boxcar::Vec<OnceLock<Page>>,
 }
 
 /// The bits of some callers.
@@ -53,6 +54,9 @@ const PAGE_WORDS: usize = 16;
 /// Stored log entries: a reader that is further behind checks all agents again.
 const LOG_LENGTH: u64 = 1024;
 
+/// Where agents are that have left, along each axis, metres.
+const NOWHERE_M: f64 = 1e15;
+
 /// Least published speed, m/s: small vibrations need not be logged.
 const SPEED_LEAST_M_S: f64 = 0.0625;
 
@@ -62,12 +66,20 @@ const SPEED_ROOM: f64 = 1.25;
 impl BroadPhase {
     /// The broad phase of that many agents, none of which has published a box.
     pub fn new(agents: usize) -> Self {
-        Self {
-            bounds: std::iter::repeat_with(PublishedBounds::default).take(agents).collect(),
+        let broad_phase = Self {
+            bounds: boxcar::Vec::new(),
             log: zeros(LOG_LENGTH as usize),
             noted: AtomicU64::new(0),
-            calls: std::iter::repeat_with(Calls::default).take(agents).collect(),
-        }
+            calls: boxcar::Vec::new(),
+        };
+        (0..agents).for_each(|_| broad_phase.join());
+        broad_phase
+    }
+
+    /// Makes room for the agent of the next number. Agents join one at a time.
+    pub fn join(&self) {
+        self.bounds.push(PublishedBounds::default());
+        self.calls.push(Calls::default());
     }
 
     /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
@@ -96,13 +108,21 @@ impl BroadPhase {
         }
     }
 
+    /// Publishes that `id` is so far away that nothing comes near it.
+    pub fn publish_nowhere(&self, id: AgentId, time: SimTime) {
+        let Some(published) = self.bounds.get(id.0 as usize) else { return };
+        let nowhere = DVec3::splat(NOWHERE_M);
+        published.write(&MovingBox { low: nowhere, high: nowhere, speed_m_s: 0.0, time });
+    }
+
     /// Notifies `to` that `from` has given an impulse to it, or belongs into one cluster with it: `to` lists `from` at its next turn.
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
-        let pages = self.calls.len().div_ceil(64 * PAGE_WORDS);
-        let pages = calls.pages.get_or_init(|| std::iter::repeat_with(OnceLock::new).take(pages).collect());
-        if let Some(page) = pages.get(word / PAGE_WORDS) {
+        while calls.pages.count() <= word / PAGE_WORDS {
+            calls.pages.push(OnceLock::new());
+        }
+        if let Some(page) = calls.pages.get(word / PAGE_WORDS) {
             page.get_or_init(Box::default)[word % PAGE_WORDS].fetch_or(bit, SeqCst);
             calls.any.store(true, SeqCst);
         }
@@ -114,8 +134,7 @@ impl BroadPhase {
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;
         }
-        let pages = calls.pages.get().into_iter().flat_map(|pages| pages.iter().enumerate());
-        for (page, words) in pages.filter_map(|(at, page)| Some((at, page.get()?))) {
+        for (page, words) in calls.pages.iter().filter_map(|(at, page)| Some((at, page.get()?))) {
             for (word, bits) in words.iter().enumerate() {
                 let mut bits = bits.swap(0, SeqCst);
                 while bits != 0 {

@@ -422,7 +422,7 @@ impl AgentRunner {
         let ClusterSeat { memory, bonds, .. } = &mut **seat;
         bonds.iter().for_each(|id| memory.meet(*id, now));
         // one of shorter steps does not look as far ahead, and has to hear of it before it steps past
-        if let Some(broad_phase) = &peers.broad_phase {
+        if let Some(broad_phase) = peers.broad_phase.get() {
             observer.near().iter().for_each(|id| broad_phase.call(*id, observer.me()));
         }
     }

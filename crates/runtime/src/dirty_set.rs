@@ -8,12 +8,15 @@ use crossbeam::utils::CachePadded;
 use metachron_core::AgentId;
 
 /// One bit per agent. Words are padded: agents of one word mostly share a worker, and workers must not disturb each other.
-#[derive(Debug)]
-pub(super) struct DirtySet(Vec<CachePadded<AtomicU64>>);
+#[derive(Debug, Default)]
+pub(super) struct DirtySet(boxcar::Vec<CachePadded<AtomicU64>>);
 
 impl DirtySet {
-    pub fn new(agents: usize) -> Self {
-        Self(std::iter::repeat_with(CachePadded::default).take(agents.div_ceil(64)).collect())
+    /// Makes room for so many agents.
+    pub fn reach(&self, agents: usize) {
+        while self.0.count() < agents.div_ceil(64) {
+            self.0.push(CachePadded::default());
+        }
     }
 
     /// Reports a new state of `id`; to be called after the state is visible.
@@ -26,7 +29,7 @@ impl DirtySet {
 
     /// Visits the agents with new states, by rising numbers.
     pub fn take(&self, mut visit: impl FnMut(AgentId)) {
-        for (at, word) in self.0.iter().enumerate() {
+        for (at, word) in &self.0 {
             // an idle word is only read; a bit that is set now is found the next time
             if word.load(Ordering::Relaxed) == 0 {
                 continue;
@@ -46,7 +49,8 @@ mod tests {
 
     #[test]
     fn each_mark_is_visited_once() {
-        let set = DirtySet::new(130);
+        let set = DirtySet::default();
+        set.reach(130);
         let visited = || {
             let mut visited = Vec::new();
             set.take(|id| visited.push(id.0));
@@ -61,7 +65,8 @@ mod tests {
 
     #[test]
     fn a_value_stored_before_a_mark_is_visible_with_it() {
-        let (set, value) = (DirtySet::new(1), AtomicU64::new(0));
+        let (set, value) = (DirtySet::default(), AtomicU64::new(0));
+        set.reach(1);
         let last = 100_000;
         std::thread::scope(|scope| {
             scope.spawn(|| {

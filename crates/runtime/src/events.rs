@@ -40,6 +40,8 @@ pub enum EventKind {
     Wakes,
     /// It failed and stands still from now on ([`crate::AgentState`] has the reason).
     Parked,
+    /// It has left the run.
+    Gone,
     /// It steps in the cluster that this agent leads.
     Joined(AgentId),
     /// It makes its own turns again.
@@ -126,6 +128,7 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::Left => (6, None),
         EventKind::AttachmentGave => (7, None),
         EventKind::ContactGrew(contact) => (9, Some(contact)),
+        EventKind::Gone => (10, None),
         EventKind::RateMissed => (8, None),
     };
     words[1] = kind;
@@ -157,6 +160,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         7 => EventKind::AttachmentGave,
         8 => EventKind::RateMissed,
         9 => EventKind::ContactGrew(contact),
+        10 => EventKind::Gone,
         _ => return None,
     };
     Some(AgentEvent { at: SimTime::from_nanos(words[0]), kind })
@@ -179,6 +183,7 @@ mod tests {
             EventKind::Left,
             EventKind::AttachmentGave,
             EventKind::RateMissed,
+            EventKind::Gone,
         ]
     }
 

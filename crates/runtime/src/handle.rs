@@ -2,6 +2,7 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
+use super::agents::Agents;
 use super::cluster::Handover;
 use super::events::{AgentEvent, EventRing};
 use super::histogram::Histogram;
@@ -11,6 +12,7 @@ use super::probe::{Sample, Trace};
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -25,6 +27,8 @@ pub(super) struct Shared {
     /// The joints whose first body it is and that can have a motor.
     pub motored: Box<[u32]>,
     pub gauges: Metrics,
+    /// Its contact shape; `None` where nothing can touch it.
+    pub form: Option<Arc<CollisionShape>>,
     pub mail: Mailbox,
     pub events: EventRing,
     pub slot: Arc<LatestSlot<Snapshot>>,
@@ -102,6 +106,12 @@ impl AgentHandle {
     #[must_use]
     pub fn led_by(&self) -> Option<AgentId> {
         Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
+    }
+
+    /// Its contact shape, which never changes; `None` where nothing can touch it.
+    #[must_use]
+    pub fn form(&self) -> Option<&CollisionShape> {
+        self.shared.form.as_deref()
     }
 
     /// State of its execution.
@@ -192,6 +202,6 @@ impl AgentHandle {
 
 /// Hash of the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
 #[must_use]
-pub fn state_hash(agents: &[AgentHandle]) -> u64 {
+pub fn state_hash(agents: &Agents) -> u64 {
     agents.iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
 }

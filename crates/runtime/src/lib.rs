@@ -27,6 +27,7 @@
 
 mod agent_clock;
 mod agent_runner;
+mod agents;
 mod broad_phase;
 mod clock;
 mod cluster;
@@ -67,6 +68,7 @@ mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
 pub use agent_clock::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
+pub use agents::Agents;
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};
 pub use faults::Faults;
@@ -105,8 +107,15 @@ pub trait Run: Send {
     /// Changes the timeline: pause, run, speed, single step.
     fn drive(&mut self, drive: TimelineCommand);
 
-    /// All agents, in the order of their numbers.
-    fn agents(&self) -> &[AgentHandle];
+    /// All agents that have ever been in the run, in the order of their numbers.
+    fn agents(&self) -> &Agents;
+
+    /// Takes up another agent, under the next number: it begins at the timeline's present. The others step on meanwhile.
+    ///
+    /// # Errors
+    /// [`RunError`] for an agent that cannot run as requested, for one that is tied to others, and where there are too many; nothing was done
+    /// then.
+    fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError>;
 
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
@@ -122,6 +131,6 @@ pub trait Run: Send {
     /// # Errors
     /// [`SendError`]: nothing was delivered.
     fn send(&self, to: AgentId, command: Command) -> Result<(), SendError> {
-        self.agents().get(to.0 as usize).ok_or(SendError::NoAgent(to))?.send(command)
+        self.agents().of(to).ok_or(SendError::NoAgent(to))?.send(command)
     }
 }

@@ -9,14 +9,14 @@ mod cores;
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
+use super::agents::Agents;
 use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::machine::{Machine, duration};
-use super::metrics::AgentStats;
-use super::sleep::SleepRegistry;
-use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
+use super::metrics::{AgentState, AgentStats};
+use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use cores::Cores;
 use metachron_core::AgentId;
 use std::cmp::Reverse;
@@ -33,8 +33,7 @@ pub struct Lockstep {
     /// Due times of the turns of waiting agents, without those that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
-    handles: Vec<AgentHandle>,
-    sleep: Arc<SleepRegistry>,
+    all: Everyone,
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
@@ -80,7 +79,7 @@ impl Lockstep {
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::none())?;
+        let AssembledRun { actors, all } = assemble(spawns, Helpers::none())?;
         let phase = |actor: &Option<Box<AgentRunner>>| match actor {
             None => Phase::Led,
             Some(actor) if actor.is_parked() => Phase::Parked,
@@ -88,10 +87,10 @@ impl Lockstep {
         };
         let entries = actors.into_iter().map(|actor| AgentEntry { phase: phase(&actor), actor, turns: 0 }).collect();
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
-        let (due, batch, unsettled) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default(), Vec::new());
+        let (due, batch, unsettled) = (BinaryHeap::with_capacity(all.handles.len()), CpuBatch::default(), Vec::new());
         let now = Duration::ZERO;
         let jobs = Vec::new();
-        let mut run = Self { machine, timeline, now, entries, due, cores, handles, sleep, batch, unsettled, jobs };
+        let mut run = Self { machine, timeline, now, entries, due, cores, all, batch, unsettled, jobs };
         run.schedule_all();
         Ok(run)
     }
@@ -121,7 +120,7 @@ impl Lockstep {
 
     /// Serves the notified agents: sleepers that are woken, and agents that return from a leader.
     fn wake_sleepers(&mut self) {
-        if !self.sleep.take_notified() {
+        if !self.all.sleep.take_notified() {
             return;
         }
         for agent in 0..self.entries.len() {
@@ -134,7 +133,7 @@ impl Lockstep {
                     entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let returned = self.handles[agent].shared.handover.as_ref().and_then(Handover::take_returned);
+                    let returned = self.all.handles[agent].shared.handover.as_ref().and_then(Handover::take_returned);
                     let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
                     entry.actor = Some(actor);
@@ -201,6 +200,10 @@ impl Lockstep {
             None => entry.phase = Phase::Parked,
         }
         self.count_cpu(agent, started.elapsed());
+        if self.all.handles[agent].state() == AgentState::Gone {
+            self.settle();
+            self.entries[agent].actor = None;
+        }
     }
 
     fn finish(&mut self, agent: usize) {
@@ -252,7 +255,7 @@ impl Lockstep {
     fn end(&mut self) {
         let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
-        close_remaining(&self.handles, &self.timeline, self.now);
+        close_remaining(&self.all.handles, &self.timeline, self.now);
     }
 
     fn settle(&mut self) {
@@ -324,13 +327,22 @@ impl Run for Lockstep {
         self.schedule_all();
     }
 
-    fn agents(&self) -> &[AgentHandle] {
-        &self.handles
+    fn agents(&self) -> &Agents {
+        &self.all.handles
+    }
+
+    fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
+        let actor = self.all.join(spawn, self.sim_now())?;
+        let (agent, handle) = (self.entries.len(), AgentHandle { shared: Arc::clone(&actor.shared) });
+        let phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+        self.entries.push(AgentEntry { actor: Some(actor), phase, turns: 0 });
+        self.schedule(agent);
+        Ok(handle)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
-        self.handles.iter().map(AgentHandle::stats).collect()
+        self.all.handles.iter().map(AgentHandle::stats).collect()
     }
 }
 

@@ -33,6 +33,8 @@ pub enum Command {
     SetPressure(f64),
     /// Wake up from rest.
     Wake,
+    /// Leave the run for good: nothing of it is left but its number.
+    Leave,
 }
 
 /// Something that is done to an agent until it is taken back, or until its time is over.
@@ -107,6 +109,8 @@ pub(super) struct PendingCommands {
     pub impulses: Vec<AnchorForce>,
     /// The newest place and velocity.
     pub motion: Option<SetMotion>,
+    /// It is to leave the run.
+    pub leaves: bool,
     /// The newest requested pressure, Pa.
     pub pressure_pa: Option<f64>,
 }
@@ -137,6 +141,7 @@ impl Mailbox {
             Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany(Box::new(command)))?,
             Command::SetMotion(motion) => pending.move_by(motion),
             Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
+            Command::Leave => pending.leaves = true,
             Command::Wake => {}
         }
         self.full.store(true, Release);
@@ -217,7 +222,7 @@ fn is_sound(command: &Command) -> bool {
     match command {
         Command::Retune(wanted) => wanted.eps_m.is_finite(),
         Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
-        Command::SetDt(_) | Command::Wake => true,
+        Command::SetDt(_) | Command::Wake | Command::Leave => true,
         Command::Spring(Keyed { what, .. }) => what.as_ref().is_none_or(|pull| {
             let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
             is_finite(pull.anchor)

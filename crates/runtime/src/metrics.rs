@@ -19,6 +19,8 @@ pub enum AgentState {
     Resting,
     /// It was parked for this reason; its last snapshot remains.
     Parked(String),
+    /// It was taken out of the run.
+    Gone,
 }
 
 /// Two percentiles and the maximum of a set of times, seconds.
@@ -100,6 +102,7 @@ impl Gauge {
 const RUNNING: u8 = 0;
 const RESTING: u8 = 1;
 const PARKED: u8 = 2;
+const GONE: u8 = 3;
 
 /// The readable side of an agent's metrics.
 #[derive(Debug, Default)]
@@ -124,6 +127,7 @@ impl Metrics {
         match self.state.load(Relaxed) {
             RUNNING => AgentState::Running,
             RESTING => AgentState::Resting,
+            GONE => AgentState::Gone,
             _ => AgentState::Parked(self.reason.get().cloned().unwrap_or_default()),
         }
     }
@@ -140,8 +144,20 @@ impl Metrics {
         self.state.store(if resting { RESTING } else { RUNNING }, Relaxed);
     }
 
+    /// Notes that the agent has left the run for good.
+    pub fn leave(&self) {
+        self.state.store(GONE, Relaxed);
+    }
+
+    pub fn has_left(&self) -> bool {
+        self.state.load(Relaxed) == GONE
+    }
+
     /// Parks the agent for good; the first reason is kept.
     pub fn park(&self, reason: String) {
+        if self.has_left() {
+            return;
+        }
         self.reason.get_or_init(|| reason);
         self.state.store(PARKED, Relaxed);
     }

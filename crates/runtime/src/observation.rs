@@ -14,14 +14,14 @@ use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
 use metachron_core::{AgentId, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-/// Data of all agents of a run, fixed at the start.
+/// Data of all agents that have ever been in a run.
 #[derive(Debug)]
 pub(super) struct Peers {
-    pub all: Vec<Peer>,
-    /// `None` if no two agents could touch: then no agent searches for peers.
-    pub broad_phase: Option<BroadPhase>,
+    pub all: boxcar::Vec<Peer>,
+    /// Empty as long as no two agents could touch: then no agent searches for peers.
+    pub broad_phase: OnceLock<BroadPhase>,
     /// Who helps with the turns of large clusters.
     pub helpers: Helpers,
 }
@@ -29,7 +29,6 @@ pub(super) struct Peers {
 /// Data of one agent for its peers.
 pub(super) struct Peer {
     pub shared: Arc<Shared>,
-    pub form: Option<Arc<CollisionShape>>,
     /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Vec<(AgentId, Law)>,
 }
@@ -76,19 +75,19 @@ impl Peer {
 
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
-        let (Some(mine), Some(theirs)) = (&self.form, &other.form) else { return false };
+        let (Some(mine), Some(theirs)) = (&self.shared.form, &other.shared.form) else { return false };
         mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
     /// The neighbour `other` as seen by this agent.
     fn neighbour(&self, other: &Self) -> Neighbour {
         // a tool needs the form to grasp it, even if it passes through it
-        let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
+        let known = self.touches(other) || self.shared.form.as_deref().is_some_and(is_led);
         Neighbour {
             id: other.shared.id,
             step_s: other.shared.wanted_hz.recip(),
             snapshot: other.shared.slot.latest(),
-            form: if known { other.form.clone() } else { None },
+            form: if known { other.shared.form.clone() } else { None },
             law: self.law(other.shared.id),
             computed_here: computes(self.clock(), other.clock()),
         }
@@ -100,6 +99,24 @@ impl Peers {
         self.all.get(id.0 as usize)
     }
 
+    /// Whether it could ever touch any other.
+    pub fn may_meet(&self, one: &Peer) -> bool {
+        let others = self.all.iter().map(|(_, other)| other);
+        others.filter(|other| other.shared.id != one.shared.id).any(|other| one.touches(other))
+    }
+
+    /// The broad phase of a run in which nothing could touch until now: with the boxes of the states that agents have published.
+    pub fn first_broad_phase(&self) -> BroadPhase {
+        let broad_phase = BroadPhase::new(self.all.count());
+        for (_, peer) in &self.all {
+            let state = peer.shared.slot.latest();
+            state.bounds.iter().for_each(|bounds| {
+                broad_phase.publish(peer.shared.id, bounds, state.moment());
+            });
+        }
+        broad_phase
+    }
+
     /// The neighbour `other` as seen by `me`.
     fn neighbour_of(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
         Some(self.get(me)?.neighbour(self.get(other)?))
@@ -107,9 +124,14 @@ impl Peers {
 
     /// The view of `me`, which is linked to `links`.
     pub fn observer(&self, me: AgentId, links: &[AgentId]) -> Observer {
-        let neighbour_list = self.broad_phase.is_some().then(|| Box::new(NeighbourList::new(me)));
-        let mut observer =
-            Observer { me, neighbours: Vec::new(), sources: Vec::new(), links: 0, neighbour_list, wanted: Vec::new() };
+        let mut observer = Observer {
+            me,
+            neighbours: Vec::new(),
+            sources: Vec::new(),
+            links: 0,
+            neighbour_list: None,
+            wanted: Vec::new(),
+        };
         links.iter().for_each(|id| observer.list(self, *id));
         observer.links = observer.neighbours.len() as u32;
         observer
@@ -134,7 +156,9 @@ impl Observer {
 
     /// Publishes the bounds of the state that this agent has just written to the broad phase.
     pub fn publish(&mut self, peers: &Peers, state: &Snapshot) {
-        if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
+        if let Some(broad_phase) = peers.broad_phase.get() {
+            let me = self.me;
+            let neighbour_list = self.neighbour_list.get_or_insert_with(|| Box::new(NeighbourList::new(me)));
             neighbour_list.publish(broad_phase, state.bounds.as_ref(), state.moment());
         }
     }
@@ -155,7 +179,8 @@ impl Observer {
     /// Updates the neighbours before the `step` of the agent, whose states `writer` writes and which steps as one with `members`.
     pub fn update(&mut self, peers: &Peers, writer: &SlotWriter<Snapshot>, step: PlannedStep, members: &Membership) {
         let me = self.me;
-        if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, &peers.broad_phase) {
+        // before its first publication among others nothing is near it
+        if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, peers.broad_phase.get()) {
             let mine = peers.get(me);
             neighbour_list.update(broad_phase, step, members, |other| {
                 mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b))
@@ -236,7 +261,7 @@ const fn is_led(form: &CollisionShape) -> bool {
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
         // a tool needs the form of what it may grasp, whoever steps both
-        let is_tool = peers.get(me).and_then(|peer| peer.form.as_deref()).is_some_and(is_led);
+        let is_tool = peers.get(me).and_then(|peer| peer.shared.form.as_deref()).is_some_and(is_led);
         let form = neighbour.form.take().filter(|_| is_tool);
         (neighbour.form, neighbour.law) = (form, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {

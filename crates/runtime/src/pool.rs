@@ -13,12 +13,13 @@ mod worker;
 
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
+use super::agents::Agents;
 use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::metrics::AgentStats;
 use super::priority::Priority;
-use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use shared::PoolState;
 use std::num::NonZero;
 use std::sync::Arc;
@@ -33,6 +34,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Agents that share workers.
 pub struct Pool {
     state: Arc<PoolState>,
+    all: Everyone,
     messages: Sender<Message>,
     watch: Option<JoinHandle<()>>,
 }
@@ -56,9 +58,10 @@ impl Pool {
         patience: Duration,
         priority: Priority,
     ) -> Result<Self, RunError> {
-        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::one_per_core(priority))?;
-        let workers = workers.clamp(1, handles.len().max(1));
-        sleep.set_workers(workers);
+        let AssembledRun { actors, all } = assemble(spawns, Helpers::one_per_core(priority))?;
+        let workers = workers.clamp(1, all.handles.len().max(1));
+        all.sleep.set_workers(workers);
+        let (sleep, handles) = (Arc::clone(&all.sleep), all.handles.clone());
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
@@ -69,7 +72,7 @@ impl Pool {
                 state.sleep.stop();
                 no_thread(source)
             })?;
-        Ok(Self { state, messages, watch: Some(watch) })
+        Ok(Self { state, all, messages, watch: Some(watch) })
     }
 
     fn end(&mut self) {
@@ -106,8 +109,15 @@ impl Run for Pool {
         self.state.sleep.unpark_all();
     }
 
-    fn agents(&self) -> &[AgentHandle] {
-        &self.state.handles
+    fn agents(&self) -> &Agents {
+        &self.all.handles
+    }
+
+    fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
+        let actor = self.all.join(spawn, self.sim_now())?;
+        let shared = Arc::clone(&actor.shared);
+        self.state.take_up(actor);
+        Ok(AgentHandle { shared })
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -85,7 +85,7 @@ impl AgentRunner {
         let leader = sleep.leader(self.shared.id);
         let others = newest.touches.iter().filter(|id| sleep.leader(**id) != leader);
         others.for_each(|id| sleep.touch(*id, now));
-        let Some(broad_phase) = &self.peers.broad_phase else { return };
+        let Some(broad_phase) = self.peers.broad_phase.get() else { return };
         for ledger in &newest.given {
             let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);
             if known.as_ref().is_some_and(|(_, revision)| *revision == ledger.revision) {

@@ -4,6 +4,7 @@
 //! Ages are nevertheless counted for every agent in every frame: for an unchanged agent they follow from the times of the frames, and are
 //! counted when it changes. Never here: the use of the states.
 
+use super::agents::Agents;
 use super::handle::AgentHandle;
 use super::metrics::AgentState;
 use metachron_core::{SimTime, Snapshot};
@@ -36,7 +37,7 @@ struct LastReading {
 impl Reader {
     /// A reader of `agents`, the agents of a run in the order of their numbers.
     #[must_use]
-    pub fn new(agents: &[AgentHandle]) -> Self {
+    pub fn new(agents: &Agents) -> Self {
         let newest: Vec<_> = agents.iter().map(AgentHandle::latest).collect();
         let readings =
             newest.iter().map(|state| LastReading { counted: 0, time: state.moment(), rests: false }).collect();
@@ -51,12 +52,7 @@ impl Reader {
 
     /// Reads the states for a frame at `now`; visits the agents whose state or condition has changed since the last frame, in their order,
     /// with the newest state and whether they are running.
-    pub fn read(
-        &mut self,
-        agents: &[AgentHandle],
-        now: SimTime,
-        mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool),
-    ) {
+    pub fn read(&mut self, agents: &Agents, now: SimTime, mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool)) {
         if let Some(first) = agents.first() {
             first.shared.sleep.changed.take(|id| {
                 let at = id.0 as usize;
@@ -75,7 +71,7 @@ impl Reader {
     }
 
     /// Counts all ages that are not counted yet, at the end of a run.
-    pub fn finish(&mut self, agents: &[AgentHandle]) {
+    pub fn finish(&mut self, agents: &Agents) {
         for (at, agent) in agents.iter().enumerate().take(self.readings.len()) {
             self.count(at, agent);
         }
@@ -95,7 +91,7 @@ impl Reader {
     }
 
     /// Counts some of the unchanged agents, so that no agent is behind by more frames than are stored.
-    fn catch_up(&mut self, agents: &[AgentHandle]) {
+    fn catch_up(&mut self, agents: &Agents) {
         let share = agents.len().div_ceil(FRAMES_KEPT);
         let from = (self.read as usize % FRAMES_KEPT) * share;
         for (at, agent) in agents.iter().enumerate().take(self.readings.len()).skip(from).take(share) {

@@ -65,7 +65,8 @@ impl Default for Signal {
 /// The flags of all agents of a run.
 #[derive(Debug)]
 pub(super) struct SleepRegistry {
-    signals: Vec<Signal>,
+    /// Of every agent that has ever been in the run: more may join it.
+    signals: boxcar::Vec<Signal>,
     /// An agent was notified: the lockstep loop serves it.
     notified: AtomicBool,
     stop: AtomicBool,
@@ -79,20 +80,30 @@ pub(super) struct SleepRegistry {
 
 impl SleepRegistry {
     pub fn new(agents: usize) -> Self {
-        let signals = std::iter::repeat_with(Signal::default).take(agents).collect();
-        Self {
-            signals,
+        let registry = Self {
+            signals: boxcar::Vec::new(),
             notified: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             far_behind: AtomicU64::new(0),
             wakeup: OnceLock::new(),
-            changed: DirtySet::new(agents),
+            changed: DirtySet::default(),
+        };
+        (0..agents).for_each(|_| registry.join());
+        registry
+    }
+
+    /// Makes room for the agent of the next number. Agents join one at a time.
+    pub fn join(&self) {
+        self.changed.reach(self.signals.count() + 1);
+        if let Some(wakeup) = self.wakeup.get() {
+            wakeup.reach(self.signals.count() + 1);
         }
+        self.signals.push(Signal::default());
     }
 
     /// From now on notifications go to this many workers of a pool.
     pub fn set_workers(&self, workers: usize) {
-        self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
+        self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.count(), workers));
     }
 
     /// Wake-up of the workers; `None` where every agent has its own thread.
@@ -130,7 +141,7 @@ impl SleepRegistry {
     /// How long the end of a run waits for these agents' turns before they count as hung: a turn of a cluster makes the steps of all its
     /// members.
     pub fn end_patience(&self, missing: impl Iterator<Item = AgentId>) -> Duration {
-        let mut led = vec![0; self.signals.len()];
+        let mut led = vec![0; self.signals.count()];
         (0..).map(AgentId).take(led.len()).for_each(|id| led[self.leader(id).0 as usize] += 1);
         let most = missing.filter_map(|id| led.get(id.0 as usize).copied()).fold(1, u32::max);
         END_PATIENCE * most.min(END_PATIENCE_MAX)
@@ -245,7 +256,7 @@ impl SleepRegistry {
         if let Some(wakeup) = self.wakeup.get() {
             wakeup.wake_all();
         }
-        self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
+        self.signals.iter().filter_map(|(_, signal)| signal.thread.get()).for_each(Thread::unpark);
     }
 
     /// Records at `now` that an agent near peers is far behind, or is still postponed relative to the scene's time.

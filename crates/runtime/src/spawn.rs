@@ -5,6 +5,7 @@
 
 use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
+use super::agents::Agents;
 use super::broad_phase::BroadPhase;
 use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
 use super::events::EventRing;
@@ -23,7 +24,7 @@ use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Description of an agent to be started.
 pub struct AgentSpawn {
@@ -123,6 +124,12 @@ pub enum RunError {
         /// The number of the missing agent.
         link: u32,
     },
+    /// An agent that joins a run has a law, a link or an attachment with another.
+    #[error("agent \"{name}\" joins a run that goes on: it can touch others, and cannot be tied to them")]
+    LateTie {
+        /// The agent's name.
+        name: String,
+    },
     /// Invalid fault rates.
     #[error("agent \"{name}\": jitter {jitter} and loss {loss} must be at least 0 and below 1")]
     BadFaults {
@@ -147,8 +154,15 @@ pub enum RunError {
 pub(super) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<AgentRunner>>>,
-    pub handles: Vec<AgentHandle>,
+    pub all: Everyone,
+}
+
+/// What all agents of a run share, and those that join it.
+#[derive(Debug, Clone)]
+pub(super) struct Everyone {
+    pub handles: Agents,
     pub sleep: Arc<SleepRegistry>,
+    peers: Arc<Peers>,
 }
 
 /// Assembles all agents; `helpers` help with the turns of their large clusters. Each has published its initial state, at simulated time zero.
@@ -167,8 +181,40 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     });
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
-    let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign_leaders(actors), handles, sleep })
+    let handles = peers.all.iter().map(|(_, peer)| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
+    Ok(AssembledRun { actors: assign_leaders(actors), all: Everyone { handles, sleep, peers } })
+}
+
+impl Everyone {
+    /// Takes up an agent that begins at `now`, under the next number; agents join one at a time. It has published its first state.
+    ///
+    /// # Errors
+    /// [`RunError`] for an agent that cannot run as requested, and for one with ties: nothing was done then.
+    pub fn join(&self, spawn: AgentSpawn, now: SimTime) -> Result<Box<AgentRunner>, RunError> {
+        let Self { handles, sleep, peers } = self;
+        let mut spawn = spawn;
+        check(&spawn, handles.len())?;
+        if !(spawn.laws.is_empty() && spawn.attached.is_empty()) {
+            return Err(RunError::LateTie { name: spawn.name });
+        }
+        let id = AgentId(handles.len() as u32);
+        let moves = spawn.agent.member().is_some();
+        let writer = SlotWriter::new(Snapshot::default());
+        let shared = Arc::new(shared(id, &mut spawn, sleep, &writer, moves));
+        sleep.join();
+        if let Some(broad_phase) = peers.broad_phase.get() {
+            broad_phase.join();
+        }
+        peers.all.push(Peer { shared: Arc::clone(&shared), laws: Vec::new() });
+        if peers.broad_phase.get().is_none() && peers.all.get(id.0 as usize).is_some_and(|new| peers.may_meet(new)) {
+            peers.broad_phase.get_or_init(|| peers.first_broad_phase());
+        }
+        let mut actor = actor(id, Seated { spawn, jointed: Vec::new(), writer }, peers);
+        actor.pace = AgentClock::new(now, actor.pace.wanted());
+        actor.publish_initial();
+        handles.push(AgentHandle { shared });
+        Ok(Box::new(actor))
+    }
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -215,20 +261,21 @@ fn peers(
     sleep: &Arc<SleepRegistry>,
     helpers: Helpers,
 ) -> (Peers, Vec<SlotWriter<Snapshot>>) {
-    let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
     let members: Vec<_> = spawns.iter_mut().map(|spawn| spawn.agent.member().is_some()).collect();
-    let any_lead = members.iter().filter(|is_member| **is_member).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
-    for (((spawn, id), form), is_member) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms).zip(members) {
+    for ((spawn, id), is_member) in spawns.iter_mut().zip((0..).map(AgentId)).zip(members) {
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, spawn, sleep, &writer, is_member && any_lead));
+        let shared = Arc::new(shared(id, spawn, sleep, &writer, is_member));
         writers.push(writer);
-        all.push(Peer { shared, form, laws: Vec::new() });
+        all.push(Peer { shared, laws: Vec::new() });
     }
     store_laws(spawns, &mut all);
-    let broad_phase = may_any_touch(&all).then(|| BroadPhase::new(all.len()));
-    (Peers { all, broad_phase, helpers }, writers)
+    let broad_phase = OnceLock::new();
+    if may_any_touch(&all) {
+        broad_phase.get_or_init(|| BroadPhase::new(all.len()));
+    }
+    (Peers { all: all.into_iter().collect(), broad_phase, helpers }, writers)
 }
 
 /// For each agent the joints that hold it to others.
@@ -246,7 +293,7 @@ fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
 
 /// Whether any two agents could touch.
 fn may_any_touch(all: &[Peer]) -> bool {
-    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.form.is_some()).collect();
+    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
@@ -278,6 +325,7 @@ fn shared(
         wanted_hz: spawn.rate_hz,
         motored: motored(id, spawn),
         gauges: Metrics::default(),
+        form: spawn.agent.form(),
         mail: Mailbox::default(),
         events: EventRing::default(),
         slot: writer.slot(),
@@ -370,13 +418,13 @@ mod tests {
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
         let sleep = Arc::new(SleepRegistry::new(spawns.len()));
         let (peers, _) = peers(&mut spawns, &sleep, Helpers::none());
-        (peers.broad_phase.is_some(), peers.all.iter().filter(|peer| peer.shared.handover.is_some()).count())
+        (peers.broad_phase.get().is_some(), peers.all.iter().filter(|(_, peer)| peer.shared.handover.is_some()).count())
     }
 
     #[test]
     fn unneeded_parts_of_a_run_are_not_set_up() {
-        assert_eq!(set_up(vec![ball()]), (false, 0));
-        assert_eq!(set_up(vec![tube()]), (false, 0));
+        assert_eq!(set_up(vec![ball()]), (false, 1));
+        assert_eq!(set_up(vec![tube()]), (false, 1));
         assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 3));
         assert_eq!(set_up(vec![Dummy::new(1.0).at(100.0), ball(), ball()]), (true, 2));
     }

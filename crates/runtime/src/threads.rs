@@ -7,6 +7,7 @@
 use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
+use super::agents::Agents;
 use super::clock::{Clock, wait_until};
 use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
@@ -14,8 +15,7 @@ use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::metrics::AgentStats;
 use super::priority::Priority;
-use super::sleep::SleepRegistry;
-use super::spawn::{AgentSpawn, AssembledRun, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -33,9 +33,10 @@ pub const AUTO_THREADS_MAX: usize = 64;
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
-    sleep: Arc<SleepRegistry>,
-    handles: Vec<AgentHandle>,
+    all: Everyone,
     threads: Vec<Option<JoinHandle<()>>>,
+    /// Where threads report that they have ended.
+    farewells: Sender<AgentId>,
     ended: Receiver<AgentId>,
     priority: Priority,
 }
@@ -50,34 +51,36 @@ impl Threads {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
         }
-        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::one_per_core(priority))?;
+        let AssembledRun { actors, all } = assemble(spawns, Helpers::one_per_core(priority))?;
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
-        let (sender, ended) = channel();
-        let mut run = Self { clock, timeline, sleep, handles, threads: Vec::new(), ended, priority };
+        let (farewells, ended) = channel();
+        let mut run = Self { clock, timeline, all, threads: Vec::new(), farewells, ended, priority };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
-            let shared = Arc::clone(&run.handles[id.0 as usize].shared);
-            let thread = run.spawn(actor, shared, sender.clone())?;
-            run.sleep.set_thread(id, thread.thread().clone());
-            run.threads.push(Some(thread));
+            let shared = Arc::clone(&run.all.handles[id.0 as usize].shared);
+            run.begin(actor, shared)?;
         }
         Ok(run)
     }
 
-    fn spawn(
-        &self,
-        actor: Option<Box<AgentRunner>>,
-        shared: Arc<Shared>,
-        ended: Sender<AgentId>,
-    ) -> Result<JoinHandle<()>, RunError> {
+    /// Gives an agent its thread.
+    fn begin(&mut self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<(), RunError> {
+        let id = shared.id;
+        let thread = self.spawn(actor, shared)?;
+        self.all.sleep.set_thread(id, thread.thread().clone());
+        self.threads.push(Some(thread));
+        Ok(())
+    }
+
+    fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<JoinHandle<()>, RunError> {
         let name = format!("agent:{}", shared.name.replace('\0', ""));
         let stage = AgentThread {
             clock: Arc::clone(&self.clock),
             timeline: Arc::clone(&self.timeline),
             batch: CpuBatch::default(),
         };
-        let farewell = EndNotice { id: shared.id, ended };
+        let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
         let priority = self.priority;
         let body = move || {
@@ -91,22 +94,22 @@ impl Threads {
 
     /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind.
     fn end(&mut self) {
-        self.sleep.stop();
+        self.all.sleep.stop();
         let mut patience = Duration::ZERO;
         while self.threads.iter().any(Option::is_some) {
             let running = (0..).map(AgentId).zip(&self.threads).filter(|(_, thread)| thread.is_some());
-            patience = self.sleep.end_patience(running.map(|(id, _)| id));
+            patience = self.all.sleep.end_patience(running.map(|(id, _)| id));
             let Ok(id) = self.ended.recv_timeout(patience) else { break };
             if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
                 drop(thread.join());
             }
         }
-        for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
+        for (handle, _) in self.all.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
             handle.shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
-        close_remaining(&self.handles, &self.timeline.read(), self.clock.now());
+        close_remaining(&self.all.handles, &self.timeline.read(), self.clock.now());
     }
 }
 
@@ -133,16 +136,27 @@ impl Run for Threads {
 
     fn drive(&mut self, drive: TimelineCommand) {
         self.timeline.drive(self.clock.now(), drive);
-        self.sleep.unpark_all();
+        self.all.sleep.unpark_all();
     }
 
-    fn agents(&self) -> &[AgentHandle] {
-        &self.handles
+    fn agents(&self) -> &Agents {
+        &self.all.handles
+    }
+
+    fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
+        let running = self.threads.iter().flatten().filter(|thread| !thread.is_finished()).count();
+        if running >= THREADS_MAX {
+            return Err(RunError::TooMany { agents: running + 1, most: THREADS_MAX });
+        }
+        let actor = self.all.join(spawn, self.sim_now())?;
+        let shared = Arc::clone(&actor.shared);
+        self.begin(Some(actor), Arc::clone(&shared))?;
+        Ok(AgentHandle { shared })
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
-        self.handles.iter().map(AgentHandle::stats).collect()
+        self.all.handles.iter().map(AgentHandle::stats).collect()
     }
 }
 

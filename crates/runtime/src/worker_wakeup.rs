@@ -21,7 +21,7 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) struct WorkerWakeup {
     /// One bit per agent.
-    marks: Vec<AtomicU64>,
+    marks: boxcar::Vec<AtomicU64>,
     notified: AtomicBool,
     workers: Vec<Parker>,
 }
@@ -36,10 +36,19 @@ struct Parker {
 
 impl WorkerWakeup {
     pub fn new(agents: usize, workers: usize) -> Self {
-        Self {
-            marks: std::iter::repeat_with(AtomicU64::default).take(agents.div_ceil(64)).collect(),
+        let wakeup = Self {
+            marks: boxcar::Vec::new(),
             notified: AtomicBool::new(false),
             workers: std::iter::repeat_with(Parker::default).take(workers).collect(),
+        };
+        wakeup.reach(agents);
+        wakeup
+    }
+
+    /// Makes room for so many agents.
+    pub fn reach(&self, agents: usize) {
+        while self.marks.count() < agents.div_ceil(64) {
+            self.marks.push(AtomicU64::default());
         }
     }
 
@@ -85,7 +94,7 @@ impl WorkerWakeup {
             return 0;
         }
         let mut count = 0;
-        for (at, word) in self.marks.iter().enumerate().filter(|(_, word)| word.load(Relaxed) != 0) {
+        for (at, word) in self.marks.iter().filter(|(_, word)| word.load(Relaxed) != 0) {
             let mut bits = word.swap(0, AcqRel);
             while bits != 0 {
                 visit(AgentId(at as u32 * 64 + bits.trailing_zeros()));

@@ -39,6 +39,22 @@ pub(super) fn spawns(
     .collect()
 }
 
+/// An agent that joins a world that runs.
+///
+/// # Errors
+/// [`WorldError::Build`] if its model rejects it.
+pub(super) fn lone(
+    member: &Member,
+    surroundings: &Arc<ClusterScene>,
+    executor: ExecutorKind,
+) -> Result<AgentSpawn, WorldError> {
+    let failed = |reason: String| WorldError::Build { name: member.name.clone(), reason };
+    let agent = build(member, executor).map_err(|reason| failed(reason.to_string()))?;
+    let alone = AgentSpawn::alone(member.name.clone(), agent, member.pace.rate_hz);
+    let (dt, dt_range) = (member.pace.dt, member.pace.dt_range);
+    Ok(AgentSpawn { dt, dt_range, range: Some(member.simulation), scene: Arc::clone(surroundings), ..alone })
+}
+
 /// What all contact clusters of a scene share: its static solids and joints.
 ///
 /// # Errors

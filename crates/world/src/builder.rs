@@ -452,7 +452,11 @@ const DEFAULT_APPEARANCE: Appearance = Appearance {
     shading: ShadingKind::Any,
 };
 
-fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
+/// The agent of a part.
+///
+/// # Errors
+/// [`SceneBuildError::BadRate`].
+pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
         Part::Tube(tube) => tube.rate_hz,

@@ -31,6 +31,8 @@ pub enum Happening {
     Wakes,
     /// It failed and stands still from now on.
     Failed,
+    /// It was removed.
+    Gone,
     /// It steps in the cluster that this object leads.
     Joined(Object),
     /// It makes its own turns again.
@@ -139,6 +141,8 @@ impl Events {
         let Self { world, filter, next, lost, found, begun } = self;
         found.clear();
         let tag = world.tag();
+        // what joined since is heard from its first drain on
+        next.extend(world.agents().iter().skip(next.len()).map(|agent| agent.listen()));
         for (agent, next) in world.agents().iter().zip(next) {
             let object = tag.object(agent.id());
             let (now, missed) = agent.events_from(*next, |event| {
@@ -192,6 +196,7 @@ fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
         EventKind::ContactEnded(ended) => contact(false, ended),
         EventKind::Wakes => Happening::Wakes,
         EventKind::Parked => Happening::Failed,
+        EventKind::Gone => Happening::Gone,
         EventKind::Joined(leader) => Happening::Joined(tag.object(leader)),
         EventKind::Left => Happening::Left,
         EventKind::AttachmentGave => Happening::AttachmentGave,

@@ -150,8 +150,8 @@ impl World {
                 near.push(Near { what: Touched::Fixed(number), matter: Matter::default() });
             }
         }
-        for (agent, form) in self.agents().iter().zip(self.forms()) {
-            let Some(form) = form else { continue };
+        for agent in self.agents().iter() {
+            let Some(form) = agent.form() else { continue };
             let mut matter = Matter::default();
             let known = matter.bring(&agent.latest().body, 0.0);
             if known && matter.placed(form).is_some_and(|placed| placed.bounds().meets(*within)) {
@@ -220,7 +220,7 @@ impl Probe {
                 world.surroundings().statics().get(number as usize)?.touches(&mine, reach_m, scratch, found);
             }
             Touched::Object(object) => {
-                let form = world.forms().get(object.id().0 as usize)?.as_ref()?;
+                let form = world.agents().of(object.id())?.form()?;
                 touches(&mine, &near.matter.placed(form)?, reach_m, scratch, found);
             }
         }

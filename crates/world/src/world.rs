@@ -6,6 +6,7 @@
 use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
+use super::builder::{Part, SceneBuildError, member};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
@@ -13,10 +14,9 @@ use super::object::{Object, WorldTag};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Body, SimSpan, SimTime, Snapshot};
-use metachron_geometry::CollisionShape;
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads, Timeline,
-    TimelineCommand, state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
+    Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -42,6 +42,24 @@ pub enum WorldError {
     /// The object is another world's.
     #[error("the object was named by another world")]
     Foreign,
+    /// The object was removed.
+    #[error("\"{name}\" has been removed from the world")]
+    Gone {
+        /// The name that it had.
+        name: String,
+    },
+    /// An object of that name is in the world already.
+    #[error("the world has an object \"{name}\" already")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// A world that was stopped takes nothing up.
+    #[error("the world has been stopped")]
+    Stopped,
+    /// An object cannot be built.
+    #[error(transparent)]
+    Part(#[from] SceneBuildError),
     /// The object has no such point.
     #[error("\"{name}\" has no point {anchor:?}: {wanted}")]
     NoPoint {
@@ -84,9 +102,9 @@ pub struct World {
 struct Shared {
     tag: WorldTag,
     state: Mutex<State>,
-    agents: Vec<AgentHandle>,
-    /// The contact shape of each agent.
-    forms: Vec<Option<Arc<CollisionShape>>>,
+    agents: Agents,
+    /// Gravity, m/s²: that of objects that join it.
+    gravity: DVec3,
     /// The static solids and joints.
     surroundings: Arc<ClusterScene>,
     executor: ExecutorKind,
@@ -132,7 +150,6 @@ impl World {
         let executor = assemble::executor(executor, scene.agents.len());
         let surroundings = assemble::surroundings(scene)?;
         let spawns = assemble::spawns(scene, &surroundings, executor, govern)?;
-        let forms = spawns.iter().map(|spawn| spawn.agent.form()).collect();
         let clock = Arc::new(SystemClock::new());
         let priority = assemble::priority(scene);
         let mut run: Box<dyn Run> = match executor {
@@ -143,9 +160,9 @@ impl World {
         if executor != ExecutorKind::Lockstep {
             run.drive(TimelineCommand::Pause);
         }
-        let agents = run.agents().to_vec();
+        let (agents, gravity) = (run.agents().clone(), scene.gravity);
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        Ok(Self { shared: Arc::new(Shared { tag, state, agents, forms, surroundings, executor, clock }) })
+        Ok(Self { shared: Arc::new(Shared { tag, state, agents, gravity, surroundings, executor, clock }) })
     }
 
     /// The object of that name.
@@ -153,7 +170,8 @@ impl World {
     /// # Errors
     /// [`WorldError::NoObject`].
     pub fn object(&self, name: &str) -> Result<Object, WorldError> {
-        let found = self.shared.agents.iter().find(|agent| agent.name() == name);
+        let living = |agent: &&AgentHandle| agent.name() == name && agent.state() != AgentState::Gone;
+        let found = self.shared.agents.iter().find(living);
         found.map(|agent| self.shared.tag.object(agent.id())).ok_or_else(|| {
             let known: Vec<_> = self.shared.agents.iter().take(20).map(AgentHandle::name).collect();
             WorldError::NoObject { name: name.to_owned(), known: known.join(", ") }
@@ -174,7 +192,7 @@ impl World {
     /// # Errors
     /// [`WorldError::NoAgent`].
     pub fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {
-        let agent = self.shared.agents.get(id.0 as usize).ok_or(WorldError::NoAgent(id))?;
+        let agent = self.shared.agents.of(id).ok_or(WorldError::NoAgent(id))?;
         Ok(self.shared.tag.object(agent.id()))
     }
 
@@ -206,6 +224,32 @@ impl World {
             _ => {}
         }
         agent.send(command).map_err(|error| refused(error.to_string()))
+    }
+
+    /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
+    ///
+    /// # Errors
+    /// [`WorldError::SameName`], [`WorldError::Part`], [`WorldError::Build`], [`WorldError::Run`] and [`WorldError::Stopped`]; nothing was done
+    /// then.
+    pub fn add(&self, name: impl Into<String>, part: impl Into<Part>) -> Result<Object, WorldError> {
+        let name = name.into();
+        if self.object(&name).is_ok() {
+            return Err(WorldError::SameName { name });
+        }
+        let id = AgentId(self.shared.agents.len() as u32);
+        let member = member(id, name, part.into(), self.shared.gravity)?;
+        let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
+        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
+        Ok(self.shared.tag.object(run.add(spawn)?.id()))
+    }
+
+    /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
+    /// from then on.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`] and [`WorldError::Gone`].
+    pub fn remove(&self, object: Object) -> Result<(), WorldError> {
+        self.command(object, Command::Leave)
     }
 
     /// Events of its objects from now on.
@@ -267,9 +311,9 @@ impl World {
         self.shared.executor
     }
 
-    /// The running agents, in the order of their numbers.
+    /// All agents that have ever been in the world, in the order of their numbers.
     #[must_use]
-    pub fn agents(&self) -> &[AgentHandle] {
+    pub fn agents(&self) -> &Agents {
         &self.shared.agents
     }
 
@@ -327,19 +371,16 @@ impl World {
         self.shared.tag
     }
 
-    /// The contact shapes of the agents, in the order of their numbers.
-    pub(super) fn forms(&self) -> &[Option<Arc<CollisionShape>>] {
-        &self.shared.forms
-    }
-
     pub(super) fn surroundings(&self) -> &ClusterScene {
         &self.shared.surroundings
     }
 
     /// The agent of an object.
     pub(super) fn agent(&self, object: Object) -> Result<&AgentHandle, WorldError> {
-        let agents = &self.shared.agents;
-        agents.get(object.id().0 as usize).filter(|_| object.is_of(self.shared.tag)).ok_or(WorldError::Foreign)
+        let known = self.shared.agents.of(object.id()).filter(|_| object.is_of(self.shared.tag));
+        let agent = known.ok_or(WorldError::Foreign)?;
+        let left = agent.state() == AgentState::Gone;
+        if left { Err(WorldError::Gone { name: agent.name().to_owned() }) } else { Ok(agent) }
     }
 
     fn check_point(&self, object: Object, state: &Snapshot, anchor: Anchor) -> Result<(), WorldError> {

@@ -7,8 +7,9 @@
 
 use super::super::agent_clock::Timeline;
 use super::super::agent_runner::AgentRunner;
+use super::super::agents::Agents;
 use super::super::events::EventKind;
-use super::super::handle::{AgentHandle, Shared};
+use super::super::handle::Shared;
 use super::membership::Membership;
 use crossbeam::atomic::AtomicCell;
 use metachron_core::{AgentId, DisjointSets, SimTime};
@@ -290,7 +291,7 @@ pub(in super::super) fn return_arrivals(shared: &Shared) {
 }
 
 /// Completes the metrics of those that are among arrivals or have returned when nobody looks any more.
-pub(in super::super) fn close_remaining(handles: &[AgentHandle], timeline: &Timeline, now: Duration) {
+pub(in super::super) fn close_remaining(handles: &Agents, timeline: &Timeline, now: Duration) {
     let handovers = handles.iter().filter_map(|handle| handle.shared.handover.as_ref());
     for handover in handovers {
         let left = handover.clear().into_iter().chain(handover.take_returned());

@@ -31,7 +31,7 @@ fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
 
 fn crowded(spawns: Vec<AgentSpawn>) -> bool {
     let run = assemble(spawns, Helpers::none()).unwrap();
-    run.actors[0].as_ref().unwrap().peers.broad_phase.is_some()
+    run.actors[0].as_ref().unwrap().peers.broad_phase.get().is_some()
 }
 
 #[test]

@@ -7,9 +7,9 @@
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::AgentRunner;
+use super::super::agents::Agents;
 use super::super::clock::Clock;
 use super::super::cluster::Handover;
-use super::super::handle::AgentHandle;
 use super::super::sleep::SleepRegistry;
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
@@ -33,9 +33,9 @@ pub(super) struct PoolState {
     pub clock: Arc<dyn Clock>,
     pub timeline: SharedTimeline,
     pub sleep: Arc<SleepRegistry>,
-    pub handles: Vec<AgentHandle>,
+    pub handles: Agents,
     queues: Vec<CachePadded<WorkerQueue>>,
-    resting: Vec<AtomicCell<Option<Box<AgentRunner>>>>,
+    resting: boxcar::Vec<AtomicCell<Option<Box<AgentRunner>>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
@@ -50,7 +50,7 @@ impl PoolState {
     pub fn new(
         clock: Arc<dyn Clock>,
         sleep: Arc<SleepRegistry>,
-        handles: Vec<AgentHandle>,
+        handles: Agents,
         actors: Vec<Option<Box<AgentRunner>>>,
         workers: usize,
     ) -> Self {
@@ -81,6 +81,16 @@ impl PoolState {
             queue.take(now)
         });
         taken.or_else(|| self.steal_overdue(at, timeline, now))
+    }
+
+    /// Takes up an agent that joins the run, as the next number.
+    pub fn take_up(&self, actor: Box<AgentRunner>) {
+        self.resting.push(AtomicCell::new(None));
+        let (at, now) = (actor.id().0 as usize % self.queues.len(), self.clock.now());
+        if !actor.is_parked() {
+            self.put(at, actor, now);
+        }
+        self.sleep.unpark_all();
     }
 
     /// Adds `actor` to the queue of worker `at`.
@@ -136,7 +146,7 @@ impl PoolState {
 
     /// Visits and removes all resting and queued agents, at the end of a run.
     pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
-        self.resting.iter().filter_map(AtomicCell::take).for_each(&mut visit);
+        self.resting.iter().filter_map(|(_, slot)| slot.take()).for_each(&mut visit);
         self.queues.iter().for_each(|worker| worker.with(|queue| queue.drain().for_each(&mut visit)));
     }
 

@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     fn worker(spawns: Vec<crate::AgentSpawn>, clock: &Arc<ManualClock>) -> Worker {
-        let AssembledRun { actors, handles, sleep } = assemble(spawns, Helpers::none()).unwrap();
+        let AssembledRun { actors, all: Everyone { handles, sleep, .. } } = assemble(spawns, Helpers::none()).unwrap();
         sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));
