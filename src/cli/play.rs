@@ -210,7 +210,7 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
     let stats = &agent.stats;
     let parked_reason = match &stats.state {
         AgentState::Parked(reason) => Some(reason.clone()),
-        AgentState::Running | AgentState::Resting => None,
+        AgentState::Running | AgentState::Resting | AgentState::Gone => None,
     };
     AgentReport {
         name: stats.name.to_string(),
@@ -219,6 +219,7 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
             AgentState::Running => "running",
             AgentState::Resting => "resting",
             AgentState::Parked(_) => "parked",
+            AgentState::Gone => "gone",
         },
         steps: stats.steps,
         rate_hz: stats.mean_hz,

@@ -39,7 +39,7 @@ fn rests(agent: &AgentHandle) -> bool {
 /// Steps, work and CPU seconds of all that may sleep.
 fn spent(run: &dyn Run) -> Vec<(u64, f64, f64)> {
     let of = |agent: &AgentHandle| (agent.steps(), agent.stats().work, agent.cpu_s());
-    run.agents()[AWAKE..].iter().map(of).collect()
+    run.agents().iter().skip(AWAKE).map(of).collect()
 }
 
 /// Goes on frame by frame until `done`; a minute only ends a test that hangs.
@@ -68,13 +68,13 @@ fn a_thousand_that_rest_leave_ten_as_they_are_and_no_frame_reads_them() {
         for _ in 0..64 {
             frame(&mut run);
         }
-        assert!(run.agents()[AWAKE..].iter().all(rests));
+        assert!(run.agents().iter().skip(AWAKE).all(rests));
         let before = spent(&run);
         let reads: Vec<u32> = (0..600).map(|_| frame(&mut run)).collect();
         assert_eq!(spent(&run), before, "no step, no work, no time");
-        let ten = &run.agents()[..AWAKE];
-        let made: Vec<_> = ten.iter().map(|agent| (agent.steps(), agent.stats().work)).collect();
-        (reads, made, state_hash(ten))
+        let ten = || run.agents().iter().take(AWAKE);
+        let made: Vec<_> = ten().map(|agent| (agent.steps(), agent.stats().work)).collect();
+        (reads, made, state_hash(ten()))
     });
     assert!(alone.0.iter().all(|reads| *reads <= 10) && alone.0.iter().sum::<u32>() > 5000);
     assert!(alone == beside);
@@ -89,8 +89,8 @@ fn who_rests_takes_no_step_and_no_time_of_any_thread_until_it_is_woken() {
     ];
     for mut run in runs {
         run.drive(TimelineCommand::Run);
-        play_until(&mut *run, |run| run.agents()[AWAKE..].iter().all(rests));
-        let steps = |run: &dyn Run| run.agents()[..AWAKE].iter().map(AgentHandle::steps).min().unwrap_or(0);
+        play_until(&mut *run, |run| run.agents().iter().skip(AWAKE).all(rests));
+        let steps = |run: &dyn Run| run.agents().iter().take(AWAKE).map(AgentHandle::steps).min().unwrap_or(0);
         // the last turn of each is accounted for by then
         let then = steps(&*run) + 20;
         play_until(&mut *run, |run| steps(run) >= then);

@@ -4,6 +4,7 @@
 
 use super::handle::AgentHandle;
 use metachron_core::AgentId;
+use std::iter::Map;
 use std::ops::Index;
 use std::sync::Arc;
 
@@ -48,7 +49,8 @@ impl Agents {
     }
 
     /// All of them.
-    pub fn iter(&self) -> impl Iterator<Item = &AgentHandle> + Clone {
+    #[must_use]
+    pub fn iter(&self) -> Iter<'_> {
         self.0.iter().map(|(_, agent)| agent)
     }
 
@@ -56,6 +58,18 @@ impl Agents {
     #[must_use]
     pub fn to_vec(&self) -> Vec<AgentHandle> {
         self.iter().cloned().collect()
+    }
+}
+
+/// The agents of a run, one after the other.
+pub type Iter<'a> = Map<boxcar::Iter<'a, AgentHandle>, fn((usize, &'a AgentHandle)) -> &'a AgentHandle>;
+
+impl<'a> IntoIterator for &'a Agents {
+    type Item = &'a AgentHandle;
+    type IntoIter = Iter<'a>;
+
+    fn into_iter(self) -> Iter<'a> {
+        self.iter()
     }
 }
 

@@ -5,8 +5,8 @@
 mod plate;
 
 use super::{
-    AgentHandle, AgentSpawn, AgentState, Lockstep, Machine, ManualClock, Pool, Priority, Run, Threads, TimelineCommand,
-    state_hash,
+    AgentHandle, AgentSpawn, AgentState, Agents, Lockstep, Machine, ManualClock, Pool, Priority, Run, Threads,
+    TimelineCommand, state_hash,
 };
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
@@ -41,7 +41,7 @@ const SLICE: Duration = Duration::from_millis(4);
 impl Executor {
     /// The agents after so many slices, and their states' hash. In real time the clock waits for all of them, so that nobody is late however
     /// busy the machine is.
-    fn play(self, spawns: Vec<AgentSpawn>, slices: u32) -> (Vec<AgentHandle>, u64) {
+    fn play(self, spawns: Vec<AgentSpawn>, slices: u32) -> (Agents, u64) {
         let clock = Arc::new(ManualClock::new());
         let mut run: Box<dyn Run> = match self {
             Self::Lockstep => Box::new(Lockstep::start(spawns, quick_machine()).unwrap()),
@@ -57,7 +57,7 @@ impl Executor {
         } else {
             (0..slices).for_each(|_| pass(&mut *run, &clock));
         }
-        let agents = run.agents().to_vec();
+        let agents = run.agents().clone();
         let hash = state_hash(&agents);
         for stats in run.shutdown() {
             assert_eq!(stats.state, AgentState::Running, "{self:?}: {}", stats.name);
@@ -136,7 +136,7 @@ fn a_plate_of_ones_own_carries_a_ball_and_a_tube_and_feels_their_weight_on_every
             let plate_m = position(&agents[0]).z;
             let felt_n = Plate::felt_n(plate_m, PLATE_KG);
             assert!((felt_n - WEIGHT_N).abs() < 0.01 * WEIGHT_N, "{at}: it feels {felt_n} N");
-            for (agent, radius_m) in agents[1..].iter().zip([0.02, 0.01]) {
+            for (agent, radius_m) in agents.iter().skip(1).zip([0.02, 0.01]) {
                 let depth_m = plate_m + 0.005 + radius_m - position(agent).z;
                 assert!((0.0..1e-4).contains(&depth_m), "{at}: {} is {depth_m} m deep", agent.name());
             }

@@ -2,7 +2,6 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
-use super::agents::Agents;
 use super::cluster::Handover;
 use super::events::{AgentEvent, EventRing};
 use super::histogram::Histogram;
@@ -202,6 +201,6 @@ impl AgentHandle {
 
 /// Hash of the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
 #[must_use]
-pub fn state_hash(agents: &Agents) -> u64 {
-    agents.iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
+pub fn state_hash<'a>(agents: impl IntoIterator<Item = &'a AgentHandle>) -> u64 {
+    agents.into_iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
 }

@@ -185,7 +185,7 @@ fn what_a_joint_held_together_falls_and_parts_once_it_has_torn() {
     let play = |between_n: &str| {
         let world = World::start(&held(&joints(between_n), "").unwrap(), ExecutorKind::Lockstep).unwrap();
         world.advance(SimSpan::from_millis(1000));
-        let states = world.agents()[..2].iter().map(|agent| (agent.latest(), agent.led_by()));
+        let states = world.agents().iter().take(2).map(|agent| (agent.latest(), agent.led_by()));
         (states.collect::<Vec<_>>(), world.hash())
     };
     let (holding, _) = play("10.8");

@@ -27,7 +27,7 @@ use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy,
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
-use metachron_runtime::{AgentHandle, Command, Keyed, Machine, Reader, TimelineCommand};
+use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader, TimelineCommand};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
 use metachron_world::{Scene, World, WorldError, machine};
 use std::sync::Arc;
@@ -228,7 +228,7 @@ impl Session {
 
     /// The agents.
     #[must_use]
-    pub fn agents(&self) -> &[AgentHandle] {
+    pub fn agents(&self) -> &Agents {
         self.world.agents()
     }
 
@@ -413,7 +413,7 @@ impl Session {
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
         self.reader.finish(self.world.agents());
-        let handles = self.world.agents().to_vec();
+        let handles = self.world.agents().clone();
         let clamp = self.clamp();
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());

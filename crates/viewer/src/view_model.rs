@@ -184,6 +184,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
         metachron_runtime::AgentState::Running => AgentState::Running,
         metachron_runtime::AgentState::Resting => AgentState::Resting,
         metachron_runtime::AgentState::Parked(reason) => AgentState::Parked(reason.clone()),
+        metachron_runtime::AgentState::Gone => AgentState::Gone,
     };
 }
 

@@ -45,8 +45,8 @@ fn agents_led_by_a_hung_agent_are_parked_with_it() {
     let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
     let run = pool(spawns, 2, SHORT);
-    eventually("they are one", || run.agents()[1..3].iter().all(|a| a.led_by() == Some(AgentId(0))));
-    eventually("all three are parked", || run.agents()[..3].iter().all(parked));
+    eventually("they are one", || run.agents().iter().skip(1).take(2).all(|a| a.led_by() == Some(AgentId(0))));
+    eventually("all three are parked", || run.agents().iter().take(3).all(parked));
     let before = run.agents()[3].stats().steps;
     eventually("an unrelated agent goes on", || run.agents()[3].stats().steps >= before + 20);
     assert_eq!(run.shutdown()[3].state, AgentState::Running);
@@ -68,7 +68,7 @@ fn an_idle_worker_makes_the_turns_that_a_busy_one_cannot() {
     let mut spawns = vec![hung.at(100.0)];
     spawns.extend((1..8).map(|_| logged().at(100.0)));
     let run = pool(spawns, 2, LONG);
-    eventually("all others go on", || run.agents()[1..].iter().all(|a| a.stats().steps >= 20));
+    eventually("all others go on", || run.agents().iter().skip(1).all(|a| a.stats().steps >= 20));
     drop(run);
     let threads: BTreeSet<_> = log.lock().unwrap().iter().map(|made| made.thread.clone()).collect();
     assert_eq!(threads.into_iter().collect::<Vec<_>>(), ["pool:0", "pool:1"]);

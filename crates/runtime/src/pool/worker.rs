@@ -170,7 +170,7 @@ impl Worker {
 mod tests {
     use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::helpers::Helpers;
-    use super::super::super::spawn::{AssembledRun, assemble};
+    use super::super::super::spawn::{AssembledRun, Everyone, assemble};
     use super::super::super::testing::Dummy;
     use super::super::super::{Clock, ManualClock};
     use super::*;

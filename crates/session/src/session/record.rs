@@ -5,7 +5,7 @@
 use super::super::outcome::{FrameRecord, ProbeOutcome};
 use super::{Chosen, Finished, Session};
 use metachron_lod::control::Shading;
-use metachron_runtime::AgentHandle;
+use metachron_runtime::Agents;
 use metachron_world::{Probe, Scene};
 use std::time::Duration;
 
@@ -60,7 +60,7 @@ impl Session {
 }
 
 /// The position of every probe's point in the final states.
-pub fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
+pub fn probes(scene: &Scene, handles: &Agents) -> Vec<ProbeOutcome> {
     // an agent's watches are its probes with a period, in the scene's order
     let watch = |at: usize| {
         let probe = &scene.probes[at];

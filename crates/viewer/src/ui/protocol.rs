@@ -300,6 +300,8 @@ pub enum AgentState {
     Resting,
     /// Stopped, for this reason.
     Parked(String),
+    /// Removed.
+    Gone,
 }
 
 /// One agent in numbers.

@@ -158,6 +158,7 @@ fn state_text(row: &AgentRow) -> String {
         AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("with {by}")),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
+        AgentState::Gone => "gone".to_owned(),
     }
 }
 
@@ -168,7 +169,7 @@ fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
 fn state_color(state: &AgentState, palette: &Palette) -> Color32 {
     match state {
         AgentState::Running => palette.good,
-        AgentState::Resting => palette.weak,
+        AgentState::Resting | AgentState::Gone => palette.weak,
         AgentState::Parked(_) => palette.bad,
     }
 }

@@ -91,7 +91,7 @@ impl Play {
     /// Goes on until all but the ten sleep, for at least a second.
     fn settle(&mut self) -> Option<()> {
         self.frames_us(60);
-        while self.session.agents()[AWAKE..].iter().any(|agent| agent.state() != AgentState::Resting) {
+        while self.session.agents().iter().skip(AWAKE).any(|agent| agent.state() != AgentState::Resting) {
             self.frames_us(FRAMES);
             (self.session.now().as_secs_f64() < SETTLED_S).then_some(())?;
         }
