@@ -185,7 +185,7 @@ pub fn tool_extrapolation_s(time: SimTime, published: SimTime) -> f64 {
 }
 
 impl<'a> StepContext<'a> {
-    /// Empty surroundings at `time`, for tests and for agents without neighbours.
+    /// The context of a step at `time` without neighbours, springs and links, for tests and for agents that nothing acts on.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
         Self { me, time, neighbours: &[], hands: &[], forces: &[], motors: &[], links: &[] }

@@ -1,6 +1,7 @@
 //! Output streams: data to standard output, messages to standard error.
 
 use super::exit::Exit;
+use anyhow::Context;
 use metachron_runtime::Priority;
 use metachron_scene::SceneError;
 use metachron_world::kinds::{ExecutorKind, PriorityKind};
@@ -12,7 +13,7 @@ pub fn data(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        other => Ok(other?),
+        other => other.context("standard output cannot be written"),
     }
 }
 

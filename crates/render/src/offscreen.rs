@@ -129,10 +129,11 @@ impl Gpu {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// The adapter in one line: name, backend and driver.
+    /// The adapter in one line: name, backend and, where it says one, driver.
     #[must_use]
     pub fn describe(&self) -> String {
-        format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver)
+        let wgpu::AdapterInfo { name, backend, driver, .. } = &self.info;
+        if driver.is_empty() { format!("{name} ({backend})") } else { format!("{name} ({backend}, {driver})") }
     }
 }
 

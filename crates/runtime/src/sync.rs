@@ -1,4 +1,4 @@
-//! Synchronisation primitives under one name, so that those of a model checker can replace them (`models/`).
+//! Synchronisation primitives under one name, so that those of a model checker can replace them (`tests/loom`).
 //!
 //! Out: the standard library's. Never here: what is built of them.
 

@@ -154,6 +154,9 @@ impl<'d, 't> Checker<'d, 't> {
             // a key that is reported wrong, also one that is this key misspelt, is not reported missing as well
             let reported = |key: &str| taken.iter().any(|one| one == key || did_you_mean(one, [key]).is_some());
             if !missing.is_some_and(reported) {
+                // tables within it have keys of their own
+                let is_own = |at| table.keys().any(|key| key.span() == at);
+                let also = if error.span().is_some_and(is_own) { also } else { &[] };
                 self.push(Problem::from_toml(&error, span.clone(), also));
             }
             taken.extend(missing.map(str::to_owned));

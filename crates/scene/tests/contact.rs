@@ -107,6 +107,19 @@ fn a_wrong_key_of_contact_or_of_a_motor_is_told_with_what_was_expected() {
         &["`collides_with` of `ball` names `grond`", "ground"],
     );
     refused("contact = { groups = [] }", "", "", &["`groups` of `ball` is empty"]);
+    refused(
+        "contact = { grid = [2, 1, 1] }",
+        "",
+        "",
+        &[
+            "no key `grid`",
+            "keys of this table: collides_with, friction_rule, groups, restitution_rule, sensor, spin_radius_m\")",
+        ],
+    );
+    let many: Vec<String> = (10..43).map(|i| format!("\"g{i}\"")).collect();
+    let error = read(&format!("contact = {{ groups = [{}] }}", many.join(", ")), "", "").unwrap_err();
+    assert_eq!(error.problems.len(), 1, "the one too many, once: {:?}", error.problems);
+    assert!(error.problems[0].message.contains("`g42`, one group more"));
     refused("contact = { friction_rule = \"sum\" }", "", "", &["sum", "geometric-mean"]);
     refused("contact = { spin_radius_m = -1 }", "", "", &["`spin_radius_m` of `ball` is -1", "0 to 10"]);
     let mesh = "[[object]]\nname = \"sky\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\ncontact = { sensor = true }";

@@ -44,6 +44,7 @@ impl ClusterStepper {
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.ties.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
+            self.spins.clear();
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }

@@ -33,6 +33,11 @@ pub(super) struct Spin {
 }
 
 impl SpinFriction {
+    /// Lets go of the rows of the last solve: nothing is solved.
+    pub fn clear(&mut self) {
+        self.contacts.clear();
+    }
+
     /// Lays out the rows anew for the contacts as they are.
     pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], ties: &mut Ties, h_s: f64) {
         ties.rows.truncate(ties.owners.len());

@@ -1,6 +1,6 @@
 //! Division of a soft body: vertices at rest, their masses, the elements between them, its skin.
 //!
-//! In: a shape and its material. Out: a [`FeMesh`], fixed for the body's life. Never here: where the vertices are now.
+//! In: a shape and its material. Out: a [`FeMesh`], until ε changes or cells are removed. Never here: where the vertices are now.
 
 use super::bar::Bar;
 use super::bending::BendingElement;

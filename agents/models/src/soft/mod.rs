@@ -2,7 +2,7 @@
 //!
 //! In: a [`SoftSpec`]. Out: a [`SoftBody`], an agent. Never here: other agents' states, contact.
 //!
-//! Unknowns of a step are the velocities of the vertices, a slot each. One substep builds and factors A = M + h c M + h² K
+//! Unknowns of a step are the velocities of the vertices, a slot each. One substep builds and factors A = (1 + h c) M + h (h + b) K
 //! (`fe_mesh`, `system`), solves for the velocities, and moves (`step`); in a cluster the body offers this matrix as a member (`member`).
 
 mod anchor_springs;

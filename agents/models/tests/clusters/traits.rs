@@ -237,6 +237,30 @@ fn a_ball_loses_its_spin_by_friction_r_times_its_weight_and_stops() {
 }
 
 #[test]
+fn a_ball_that_rebounds_loses_spin_by_each_blow_and_none_in_flight() {
+    let (radius_m, spin_radius_m, spin, height_m) = (0.05, 0.01, 50.0, 0.1);
+    let traits = ContactTraits { spin_radius_m, ..ContactTraits::default() };
+    let spec = RigidSpec {
+        spin: DVec3::Z * spin,
+        restitution: 1.0,
+        traits,
+        ..ball(radius_m, DVec3::Z * (radius_m + height_m))
+    };
+    let mut table = at_rate(Table::among(vec![body(spec)], &[floor(ContactTraits::default())]), 240.0);
+    let fall_s = (2.0 * height_m / G).sqrt();
+    // a blow of 2 m v has a torque of μ r of it
+    let by_blow = 0.5 * spin_radius_m * 2.0 * G * fall_s / (0.4 * radius_m * radius_m);
+    for blows in 0..3 {
+        // in the middle of the flight before the next blow, and a little later
+        for later_s in [0.0, 0.3 * fall_s] {
+            table.play(2.0 * f64::from(blows) * fall_s + later_s);
+            let (now, wanted) = (state(&table, 0).spin.z, spin - f64::from(blows) * by_blow);
+            assert!((now - wanted).abs() < 1e-3 * by_blow, "{now} rad/s after {blows} blows, {wanted} wanted");
+        }
+    }
+}
+
+#[test]
 fn what_spins_on_a_plate_gives_it_all_the_spin_that_it_loses() {
     let traits = ContactTraits { spin_radius_m: 0.02, ..ContactTraits::default() };
     let disc = Solid::Cylinder { radius_m: 0.1, half_height_m: 0.01 };

@@ -60,7 +60,8 @@ fn text(bytes: &[u8]) -> Result<&[u8], String> {
     match bytes.iter().position(|byte| *byte == 0) {
         None => Ok(bytes),
         Some(at) => Err(format!(
-            "it is neither a .glb file, which begins with `glTF`, nor an STL file of the length that it says, nor an OBJ file, which is text: byte {at} is 0"
+            "it is neither a .glb file, which begins with `glTF`, nor an OBJ file, which is text: byte {at} is 0, nor an STL file: {}",
+            stl::unlike(bytes)
         )),
     }
 }
@@ -68,7 +69,8 @@ fn text(bytes: &[u8]) -> Result<&[u8], String> {
 fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if triangles.is_empty() {
         return Err(
-            "it has no faces: no triangles of a .glb file, no line of an OBJ file that begins with `f`".to_owned()
+            "it has no faces: no triangles of an STL or .glb file, no line of an OBJ file that begins with `f`"
+                .to_owned(),
         );
     }
     if triangles.len() > TRIANGLES_MAX {

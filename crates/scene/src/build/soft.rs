@@ -10,7 +10,7 @@ use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Aabb, Triangles, generate_surface, open_edge};
+use metachron_geometry::{Aabb, Triangles, generate_surface, open_edge, subdivided};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{MaterialLaw, NodeSpacing, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
@@ -23,6 +23,10 @@ pub(super) const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 /// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
 const SKIN_LATTICE_MAX: u64 = 1_000_000;
+/// Most triangles into which a coarse surface is divided, to be as fine as its finest cage; a cage of more has too many vertices.
+const SKIN_TRIANGLES_MAX: usize = 200_000;
+/// The diagonal of a cell, in its edges: no edge of a surface from a file is longer.
+const CELL_DIAGONAL: f64 = 1.732_050_807_568_877_2;
 /// A soft solid from a file is hardly longer than this, metres: a file with no scale that is was drawn in millimetres.
 const LARGE_M: f64 = 10.0;
 const SEGMENTS: Allowed = allowed(1.0..=2047.0, "");
@@ -199,9 +203,11 @@ fn solid_shape(
             c.wrong(place, "eps_m", "is missing", expected);
         }
         let (surface, range_m) = (closed_surface(c, file, context)?, eps_m?);
+        // what is between its points bends with the cage, and would go through what its points alone touch
+        let surface = subdivided(&surface, CELL_DIAGONAL * range_m.0, SKIN_TRIANGLES_MAX);
         return Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m });
     }
-    // the skin of a box or ball with an ε is as fine as its finest cage
+    // so is the skin of a box or ball with an ε as fine as its finest cage
     let fitted = |size: f64| eps_m.map(|range| (size / range.0).ceil().clamp(1.0, 2047.0) as u32);
     let given =
         file.segments.map(|cells| std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i])));

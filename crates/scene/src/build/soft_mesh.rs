@@ -190,7 +190,9 @@ pub(super) fn manifold(mesh: &mesh::Mesh, scale: f64) -> Result<Triangles, Strin
 pub(super) fn one_piece(surface: &Triangles, what: &str) -> Result<(), String> {
     match pieces(surface) {
         0 | 1 => Ok(()),
-        found => Err(format!("it has {found} separate pieces, and a {what} is one: make each an object")),
+        found => Err(format!(
+            "it has {found} separate pieces, and a {what} is one: make each an object, and leave out what is within another"
+        )),
     }
 }
 

@@ -17,6 +17,18 @@ pub(super) fn is_stl(bytes: &[u8]) -> bool {
     is_text || counted(bytes).is_some_and(|count| bytes.len() == HEADER + TRIANGLE * count)
 }
 
+/// Why bytes that are not text are no STL file.
+pub(super) fn unlike(bytes: &[u8]) -> String {
+    let length = bytes.len();
+    match counted(bytes) {
+        None => format!("it has {length} bytes, fewer than the header's {HEADER}"),
+        Some(count) => {
+            let wanted = HEADER + TRIANGLE * count;
+            format!("its header says {count} triangles, which are {wanted} bytes, and it has {length}")
+        }
+    }
+}
+
 /// The number of triangles that the header of a binary file says.
 fn counted(bytes: &[u8]) -> Option<usize> {
     let count = bytes.get(HEADER - 4..HEADER)?;
@@ -52,6 +64,12 @@ mod tests {
     }
 
     const TEXT: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+
+    #[test]
+    fn what_is_cut_short_is_told_by_how_much() {
+        assert_eq!(unlike(&binary(2)[..150]), "its header says 2 triangles, which are 184 bytes, and it has 150");
+        assert_eq!(unlike(&[0; 5]), "it has 5 bytes, fewer than the header's 84");
+    }
 
     #[test]
     fn both_forms_are_read_and_share_points() {
