@@ -10,7 +10,7 @@
 //! let scene = Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).build().unwrap();
 //! let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
 //! world.advance(SimSpan::from_millis(2000));
-//! let state = world.latest(world.object("ball").unwrap());
+//! let state = world.latest(world.object("ball").unwrap()).unwrap();
 //! let (position, _) = state.body.probe(0.0).unwrap();
 //! assert!((position.z - 0.05).abs() < 1e-3); // rests on the floor
 //! ```
@@ -39,7 +39,13 @@ pub use metachron_world as world;
 
 /// What a program that builds and runs a scene needs.
 pub mod prelude {
+    pub use glam::{DQuat, DVec3};
+    pub use metachron_contact::Agent;
+    pub use metachron_contact::joint::{JointKind, Motor, MotorGoal};
     pub use metachron_core::{AgentId, Anchor, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot};
     pub use metachron_geometry::Solid;
-    pub use metachron_world::{Object, Rigid, Scene, Tube, World, WorldError, kinds::ExecutorKind};
+    pub use metachron_world::{
+        Command, Contact, Custom, Event, EventFilter, Happening, Object, Rigid, Scene, Touched, Tube, World,
+        WorldError, kinds::ExecutorKind,
+    };
 }

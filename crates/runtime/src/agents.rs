@@ -49,7 +49,6 @@ impl Agents {
     }
 
     /// All of them.
-    #[must_use]
     pub fn iter(&self) -> Iter<'_> {
         self.0.iter().map(|(_, agent)| agent)
     }

@@ -26,7 +26,7 @@ fn a_soft_cube_of_six_faces_sinks_by_its_weight_and_not_through_the_floor() {
     let scene = load(&Source::open(path.to_str().unwrap()).unwrap(), &[]).unwrap();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(1500));
-    let state = world.latest(world.object("cube").unwrap());
+    let state = world.latest(world.object("cube").unwrap()).unwrap();
     let Body::Soft(soft) = &state.body else { panic!("a soft body") };
     // the points of the file come first, those of the top last among them
     let top_m = soft.positions[4..8].iter().map(|x| 0.25 * x.z).sum::<f64>();

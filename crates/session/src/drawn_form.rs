@@ -18,7 +18,7 @@ pub(super) fn form(spec: &Spec) -> Form {
         Spec::Rigid(body) => Form::Solid(body.solid.clone()),
         Spec::Soft(soft) => soft_form(soft),
         Spec::Tool(_) => Form::Tool(ToolShape::default()),
-        Spec::Synthetic(_) => Form::Unseen,
+        Spec::Synthetic(_) | Spec::Custom(_) => Form::Unseen,
     }
 }
 
@@ -49,7 +49,7 @@ pub(super) fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
                 SoftShape::Rope { segments, .. } => segments * patch::triangles(n),
                 _ => skin.map_or(0, |skin| skin.at(n)),
             },
-            Spec::Tube(_) | Spec::Synthetic(_) => 0,
+            Spec::Tube(_) | Spec::Synthetic(_) | Spec::Custom(_) => 0,
         }
     })
 }

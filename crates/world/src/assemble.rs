@@ -119,6 +119,7 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
         Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
         Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
         Spec::Tool(tool) => Box::new(Tool::new(tool)?),
+        Spec::Custom(custom) => custom.build(member.id),
         Spec::Synthetic(synthetic) => {
             let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
             // lockstep charges declared costs, so no CPU time has to be burnt

@@ -9,6 +9,7 @@ use super::kinds::{
 };
 use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
+use metachron_contact::Agent;
 use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
@@ -84,13 +85,54 @@ struct Joined {
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body or a [`Tube`].
+/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], or an agent of your own ([`Custom`]).
 #[derive(Debug, Clone)]
 pub enum Part {
     /// A rigid body.
     Rigid(Rigid),
     /// A soft tube, cable or rod.
     Tube(Tube),
+    /// An agent of somebody else's.
+    Custom(Custom),
+}
+
+/// An agent of a model of your own ([`Agent`]): it touches others where it is a member of clusters ([`Agent::member`]). A model passes
+/// `metachron_models::conformance` first. It is not drawn.
+#[derive(Clone)]
+pub struct Custom {
+    make: Arc<dyn Fn(AgentId) -> Box<dyn Agent> + Send + Sync>,
+    rate_hz: f64,
+}
+
+impl Custom {
+    /// The agent that `make` makes: a new one for each world that the scene is started as.
+    #[must_use]
+    pub fn new(make: impl Fn(AgentId) -> Box<dyn Agent> + Send + Sync + 'static) -> Self {
+        Self { make: Arc::new(make), rate_hz: RATE_DEFAULT_HZ }
+    }
+
+    /// Steps a simulated second, 1 … 100000.
+    #[must_use]
+    pub fn rate_hz(mut self, rate_hz: f64) -> Self {
+        self.rate_hz = rate_hz;
+        self
+    }
+
+    pub(super) fn build(&self, id: AgentId) -> Box<dyn Agent> {
+        (self.make)(id)
+    }
+}
+
+impl std::fmt::Debug for Custom {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Custom").field("rate_hz", &self.rate_hz).finish_non_exhaustive()
+    }
+}
+
+impl From<Custom> for Part {
+    fn from(custom: Custom) -> Self {
+        Self::Custom(custom)
+    }
 }
 
 /// A rigid body before it is added.
@@ -460,6 +502,7 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
         Part::Tube(tube) => tube.rate_hz,
+        Part::Custom(custom) => custom.rate_hz,
     };
     let dt = SimSpan::from_secs_f64(1.0 / rate_hz).filter(|_| (1.0..=1e5).contains(&rate_hz));
     let Some(dt) = dt else { return Err(SceneBuildError::BadRate { name, rate_hz: rate_hz.to_string() }) };
@@ -473,6 +516,7 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
             let start = spec.resolution;
             (Spec::Tube(spec), start)
         }
+        Part::Custom(custom) => (Spec::Custom(custom), Resolution { eps_m: 1.0, n: 1 }),
     };
     let picture = ResolutionRange { eps_m: (start.eps_m, start.eps_m), n: (1, 5) };
     Ok(Member {

@@ -67,7 +67,7 @@ impl Scene {
                 Spec::Soft(soft) => soft.position += by_m,
                 Spec::Rigid(body) => body.position += by_m,
                 Spec::Tool(tool) => tool.starts_off_m += by_m,
-                Spec::Synthetic(_) => {}
+                Spec::Synthetic(_) | Spec::Custom(_) => {}
             }
             self.moved.push(Moved { object: member.name.clone(), by_m });
         }
@@ -125,7 +125,7 @@ impl Scene {
             Spec::Tube(tube) => [tube.clamp, tube.pin].concat().contains(&true) || !tube.attachments.is_empty(),
             Spec::Soft(soft) => !soft.held.is_empty(),
             Spec::Rigid(_) => false,
-            Spec::Tool(_) | Spec::Synthetic(_) => true,
+            Spec::Tool(_) | Spec::Synthetic(_) | Spec::Custom(_) => true,
         };
         !(jointed || attached || held)
     }

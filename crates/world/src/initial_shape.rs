@@ -128,7 +128,7 @@ pub(super) fn shape(member: &Member) -> Option<StartShape> {
             let tip = key.tip_m + spec.starts_off_m;
             (ShapeKind::Tool(shape), Pose::Tool(tip, spec.start_rotation(), key.jaw), tip - reach, tip + reach)
         }
-        Spec::Synthetic(_) => return None,
+        Spec::Synthetic(_) | Spec::Custom(_) => return None,
     };
     Some(StartShape { id: member.id, form: form(kind), place, low, high })
 }

@@ -3,7 +3,7 @@
 //! In: built in code ([`Scene::builder`]) or by `metachron-scene`. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
-use super::builder::SceneBuilder;
+use super::builder::{Custom, SceneBuilder};
 use super::couplings::{Coupling, Faults};
 use super::initial_overlap::Moved;
 use super::kinds::{
@@ -303,6 +303,8 @@ pub enum Spec {
     Tool(ToolSpec),
     /// Declared cost and error.
     Synthetic(SyntheticSpec),
+    /// A model of somebody else.
+    Custom(Custom),
 }
 
 impl Spec {
@@ -315,6 +317,7 @@ impl Spec {
             Self::Soft(spec) => spec.shape.model(),
             Self::Tool(_) => "tool",
             Self::Synthetic(_) => "synthetic",
+            Self::Custom(_) => "custom",
         }
     }
 }

@@ -28,7 +28,7 @@ impl Spec {
         match self {
             Self::Tube(_) | Self::Synthetic(_) => true,
             Self::Soft(soft) => soft.nodes.is_some() || matches!(soft.shape, SoftShape::Embedded { .. }),
-            Self::Rigid(_) | Self::Tool(_) => false,
+            Self::Rigid(_) | Self::Tool(_) | Self::Custom(_) => false,
         }
     }
 
@@ -46,7 +46,7 @@ impl Spec {
                 | SoftShape::Embedded { .. }
                 | SoftShape::Tetrahedra { .. } => 3.0,
             },
-            Self::Tube(_) | Self::Synthetic(_) | Self::Rigid(_) | Self::Tool(_) => 1.0,
+            Self::Tube(_) | Self::Synthetic(_) | Self::Rigid(_) | Self::Tool(_) | Self::Custom(_) => 1.0,
         }
     }
 
@@ -64,7 +64,7 @@ impl Spec {
             Self::Rigid(spec) => spec.traits,
             Self::Soft(spec) => spec.traits,
             Self::Tool(spec) => spec.traits,
-            Self::Synthetic(_) => ContactTraits::NONE,
+            Self::Synthetic(_) | Self::Custom(_) => ContactTraits::NONE,
         }
     }
 
@@ -74,7 +74,7 @@ impl Spec {
             Self::Tube(tube) => tube.path_m.iter_mut().for_each(|at| *at += by),
             Self::Rigid(body) => body.position += by,
             Self::Soft(soft) => soft.position += by,
-            Self::Tool(_) | Self::Synthetic(_) => {}
+            Self::Tool(_) | Self::Synthetic(_) | Self::Custom(_) => {}
         }
     }
 
@@ -84,7 +84,7 @@ impl Spec {
         match self {
             Self::Tube(tube) => Some(tube.section.mass_per_length_kg_m * path_length_m(tube)),
             Self::Rigid(body) => Some(body.mass_kg),
-            Self::Soft(_) | Self::Tool(_) | Self::Synthetic(_) => None,
+            Self::Soft(_) | Self::Tool(_) | Self::Synthetic(_) | Self::Custom(_) => None,
         }
     }
 
@@ -118,7 +118,9 @@ impl Member {
         match &self.spec {
             Spec::Tube(tube) => Division { elements: self.segments(tube), integrator: Some(tube.integrator) },
             Spec::Soft(soft) => Division { elements: cells(soft).into_iter().max().unwrap_or(0), integrator: None },
-            Spec::Rigid(_) | Spec::Tool(_) | Spec::Synthetic(_) => Division { elements: 0, integrator: None },
+            Spec::Rigid(_) | Spec::Tool(_) | Spec::Synthetic(_) | Spec::Custom(_) => {
+                Division { elements: 0, integrator: None }
+            }
         }
     }
 

@@ -234,7 +234,7 @@ impl<'a> Task<'a> {
 /// Whether settings of an agent may be chosen: a synthetic agent has no answer, and an agent with a tolerance chooses for itself.
 /// A tool follows its script at any step, but the bodies that it grasps and pushes receive its state once per step.
 pub(super) fn is_free(member: &Member) -> bool {
-    member.tolerance_m.is_none() && !matches!(member.spec, Spec::Synthetic(_))
+    member.tolerance_m.is_none() && !matches!(member.spec, Spec::Synthetic(_) | Spec::Custom(_))
 }
 
 /// Points that represent the place of an agent.
@@ -242,7 +242,7 @@ fn points_of(member: &Member) -> Vec<Point> {
     let at: &[f64] = match member.spec {
         Spec::Tube(_) | Spec::Soft(_) => &[0.0, 0.5, 1.0],
         Spec::Rigid(_) => &[0.0],
-        Spec::Tool(_) | Spec::Synthetic(_) => &[],
+        Spec::Tool(_) | Spec::Synthetic(_) | Spec::Custom(_) => &[],
     };
     at.iter().map(|at| Point { agent: member.id, at: *at }).collect()
 }
