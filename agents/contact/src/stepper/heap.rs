@@ -2,16 +2,18 @@
 //!
 //! In: members with the velocities that they would have without contact. Out: those that they have with it, where they are then, what each
 //! pair gave. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
-//! Never here: bodies that bend, rows of springs and joints: these are solved before, as if nothing touched.
+//! Never here: bodies that bend, which touch none of the heap; rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
 use super::between_steps::total_of;
+use super::domain::{Domain, assign};
 use super::progress::Progress;
-use super::{ClusterScene, PairTotal, Participant, Partner, Role};
+use super::search::Search;
+use super::{ClusterReport, ClusterScene, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, StepError};
 use metachron_geometry::narrow_phase::StaticSolid;
-use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose, Solid, SolidShape};
+use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
     CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
     SpringCoefficients,
@@ -36,10 +38,12 @@ const FORESEEN_RADII: f64 = 2.0;
 /// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
 const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 300.0, damping_ratio: 10.0 };
 
-/// The heap of a cluster, if it is one.
+/// The heap of a cluster, if it has one.
 #[derive(Default)]
 pub(super) struct Heap {
     world: Option<Box<World>>,
+    /// Of each member; without meaning where there is no heap.
+    domains: Vec<Domain>,
 }
 
 /// What a step of a heap was.
@@ -75,6 +79,8 @@ struct Given {
 #[derive(Debug, Clone, Copy)]
 struct Known {
     id: AgentId,
+    /// Its place among the members of the step.
+    member: usize,
     handle: RigidBodyHandle,
     mass_kg: f64,
     inertia: DMat3,
@@ -91,28 +97,66 @@ struct Placed<'a> {
     rotation: DQuat,
 }
 
+impl HeapReport {
+    /// Adds it to that of the fine step whose problem has been solved.
+    pub fn add_to(self, report: &mut ClusterReport) {
+        report.heap_contacts = self.contacts as u32;
+        report.contacts += report.heap_contacts;
+        report.depth_m = report.depth_m.max(self.depth_m);
+    }
+}
+
 impl Heap {
-    /// Whether the cluster is one.
+    /// Whether the cluster has one.
     pub fn is_on(&self) -> bool {
         self.world.is_some()
     }
 
-    /// Makes these members a heap if they touch in so many places.
-    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], contacts: usize) {
-        if contacts > CONTACTS_MIN && fits(scene, all) {
-            let middle = all.iter().filter_map(placed).map(|body| body.centre_m).sum::<DVec3>() / all.len() as f64;
-            self.world = Some(Box::new(World::new(scene, middle)));
+    /// The domain of each member.
+    pub fn domains(&self) -> &[Domain] {
+        &self.domains
+    }
+
+    /// Makes a heap of the members that can be one, if they touch in so many places and nothing else touches them.
+    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
+        if search.owners.len() <= CONTACTS_MIN {
+            return;
+        }
+        assign(scene, all, &mut self.domains);
+        let is_heap = |member: usize| self.domains[member] == Domain::Heap;
+        let within = search.owners.iter().filter(|owner| owner.both().all(is_heap)).count();
+        if within > CONTACTS_MIN && !self.is_touched(search) {
+            let centres = || all.iter().filter_map(placed).map(|body| body.centre_m);
+            let middle_m = centres().sum::<DVec3>() / centres().count() as f64;
+            self.world = Some(Box::new(World::new(scene, middle_m)));
         }
     }
 
-    /// Goes on with these members as a heap where they still are one, and ends it where not; whether it goes on.
+    /// Goes on with the heap where it still is one; whether it goes on.
     pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
-        self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT && fits(scene, all));
+        self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT);
+        if self.is_on() {
+            assign(scene, all, &mut self.domains);
+            self.world = self.world.take().filter(|_| self.domains.contains(&Domain::Heap));
+        }
         self.is_on()
     }
 
-    /// Steps the members by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it. What
-    /// pairs gave is added to `totals`.
+    /// Ends the heap if one of the other members touches it.
+    pub fn end_if_touched(&mut self, search: &Search) {
+        if self.is_touched(search) {
+            self.world = None;
+        }
+    }
+
+    /// Whether a member of the heap and one of the problem touch.
+    fn is_touched(&self, search: &Search) -> bool {
+        let domains = &self.domains;
+        search.owners.iter().any(|owner| owner.other.is_some_and(|other| domains[owner.member] != domains[other]))
+    }
+
+    /// Steps the members of the heap by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
+    /// What pairs gave is added to `totals`.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where rapier3d has no finite answer.
@@ -123,8 +167,8 @@ impl Heap {
         h_s: f64,
         totals: &mut Vec<PairTotal>,
     ) -> Result<HeapReport, StepError> {
-        let Some(world) = &mut self.world else { return Ok(HeapReport::default()) };
-        world.take(all, progress, h_s);
+        let Self { world: Some(world), domains } = self else { return Ok(HeapReport::default()) };
+        world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
         let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);
         world.physics.integration_parameters.dt = (h_s / steps) as f32;
@@ -140,7 +184,8 @@ impl Heap {
             let what = "the heap has no finite answer".to_owned();
             return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
         }
-        for (known, state) in world.bodies.iter().zip(progress).filter(|(known, _)| known.touched) {
+        for known in world.bodies.iter().filter(|known| known.touched) {
+            let state = &mut progress[known.member];
             let body = &world.physics.bodies[known.handle];
             state.before.copy_from_slice(&[body.linvel().as_dvec3(), body.angvel().as_dvec3()]);
             state.hold();
@@ -159,7 +204,8 @@ impl Heap {
     /// Moves members, whose steps have ended, to where rapier3d has them.
     pub fn place(&self, all: &mut [Participant<'_>]) {
         let Some(world) = &self.world else { return };
-        for (known, one) in world.bodies.iter().zip(all).filter(|(known, _)| known.touched) {
+        for known in world.bodies.iter().filter(|known| known.touched) {
+            let one = &mut all[known.member];
             let Some(Placed { shape, centre_m, rotation, .. }) = placed(one) else { continue };
             let pose = world.physics.bodies[known.handle].position();
             let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
@@ -170,25 +216,6 @@ impl Heap {
             one.member.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]);
         }
     }
-}
-
-/// Whether rapier3d can step these members: rigid bodies of which none passes through another or through a static solid but by its groups,
-/// with the usual rules for pairs and without friction about normals.
-fn fits(scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
-    let has = |id: AgentId| all.binary_search_by_key(&id, |one| one.id).is_ok();
-    let is_rigid = |one: &Participant<'_>| one.member.role() == Role::Rigid && !one.member.is_remote();
-    let is_free = |one: &Participant<'_>| !one.laws.iter().any(|(other, _)| has(*other));
-    let is_usual = |one: &Participant<'_>| one.member.skin().is_some_and(|skin| rubs_as_usual(skin.form));
-    all.iter().all(|one| is_rigid(one) && is_free(one) && is_usual(one) && placed(one).is_some())
-        && scene.statics().iter().all(|solid| rubs_as_usual(&solid.form))
-        && scene.stops_all_of(has)
-}
-
-/// Whether a skin leaves to rapier3d nothing that it has not: other rules than the usual ones, which in rapier3d come after all others, and
-/// friction about normals.
-fn rubs_as_usual(form: &CollisionShape) -> bool {
-    let ContactTraits { friction_rule, restitution_rule, spin_radius_m, .. } = form.traits;
-    friction_rule.is_none() && restitution_rule.is_none() && spin_radius_m == 0.0
 }
 
 impl World {
@@ -211,19 +238,20 @@ impl World {
         Self { physics, origin_m, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
     }
 
-    /// Takes up the members as they are, and what changes their velocities in the step.
-    fn take(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
+    /// Takes up the members of the heap as they are, and what changes their velocities in the step.
+    fn take(&mut self, all: &[Participant<'_>], domains: &[Domain], progress: &[Progress], h_s: f64) {
         let Self { physics, bodies, origin_m, .. } = self;
         bodies.retain(|known| {
-            let stays = all.binary_search_by_key(&known.id, |one| one.id).is_ok();
+            let at = all.binary_search_by_key(&known.id, |one| one.id);
+            let stays = at.is_ok_and(|at| domains[at] == Domain::Heap);
             if !stays {
                 physics.remove_body(known.handle);
             }
             stays
         });
         let mut smallest_m = f64::INFINITY;
-        for (one, state) in all.iter().zip(progress) {
-            let Some(body) = placed(one) else { continue };
+        for (member, (one, state)) in all.iter().zip(progress).enumerate() {
+            let Some(body) = placed(one).filter(|_| domains[member] == Domain::Heap) else { continue };
             smallest_m = smallest_m.min(body.shape.radius_m);
             let at = match bodies.binary_search_by_key(&one.id, |known| known.id) {
                 Ok(at) => at,
@@ -232,7 +260,7 @@ impl World {
                     at
                 }
             };
-            bodies[at].touched = false;
+            (bodies[at].member, bodies[at].touched) = (member, false);
             let known = bodies[at];
             let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
             let now = [&state.start[0], &state.start[1]].map(|v| v.as_vec3());
@@ -258,10 +286,10 @@ impl World {
 
     /// How far bodies go in `h_s` seconds, in halves of their radii.
     fn way(&self, progress: &[Progress], h_s: f64) -> f64 {
-        let ways =
-            self.bodies.iter().zip(progress).map(|(known, state)| {
-                state.start[0].length().max(state.before[0].length()) * h_s / (0.5 * known.radius_m)
-            });
+        let ways = self.bodies.iter().map(|known| {
+            let state = &progress[known.member];
+            state.start[0].length().max(state.before[0].length()) * h_s / (0.5 * known.radius_m)
+        });
         ways.fold(0.0, f64::max)
     }
 
@@ -308,8 +336,10 @@ impl World {
                 }
             }
         }
-        // bodies are in the order of the members
-        touched.iter().for_each(|&member| self.bodies[member].touched = true);
+        for &member in &touched {
+            let at = self.bodies.binary_search_by_key(&member, |known| known.member);
+            at.into_iter().for_each(|at| self.bodies[at].touched = true);
+        }
         (self.touched, self.given) = (touched, given);
         report
     }
@@ -378,7 +408,7 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
         .gyroscopic_forces_enabled(false);
     let collider = skin(body.shape.shape.clone(), body.form).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
-    Known { id: one.id, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
+    Known { id: one.id, member: 0, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
 }
 
 /// A static solid; its form is always one.

@@ -6,7 +6,7 @@
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close, which of them rebound, and when; or that the members are a heap, which rapier3d steps
+//! search    places that may close, which of them rebound, and when; which members are a heap, that rapier3d steps
 //! tie       springs, links, joints
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! divide    where the solution strains a member too far, all begins again in shorter steps
@@ -17,6 +17,7 @@
 mod arms;
 mod between_steps;
 mod blows;
+mod domain;
 mod doubling;
 mod foresight;
 mod heap;
@@ -131,6 +132,8 @@ pub struct ClusterReport {
     pub fine_steps: u32,
     /// Contacts of the last fine step, those that bear nothing included.
     pub contacts: u32,
+    /// Those of them that are a heap's, which rapier3d has; all others are the problem's.
+    pub heap_contacts: u32,
     /// Factors of the coupled matrix in all fine steps.
     pub factors: u32,
     /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
@@ -329,17 +332,15 @@ impl ClusterStepper {
         self.yielding.begin();
         self.outside.begin();
         report.fine_steps = parts;
-        report.depth_m = 0.0;
+        (report.depth_m, report.heap_contacts) = (0.0, 0);
         self.fine_s = h_s;
         for fine in 0..parts {
             self.outside.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
-            let is_heap = self.find(scene, all, h_s);
+            self.find(scene, all, h_s);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            if !is_heap {
-                self.rebounds.foresee(all, &mut self.search, &self.ties, &self.progress);
-            }
+            self.rebounds.foresee(all, &mut self.search, &self.ties, &self.progress);
             if self.divide_blows(all) {
                 return Ok(false);
             }
@@ -348,35 +349,35 @@ impl ClusterStepper {
                 return Ok(false);
             }
             self.remember(all, h_s, fine + 1 == parts, dt);
-            if is_heap {
-                self.step_heap(all, h_s, report)?;
-            }
+            self.step_heap(all, h_s, report)?;
             self.end(all, h_s, threads)?;
             self.heap.place(all);
         }
         Ok(true)
     }
 
-    /// Finds where members may touch; whether they are a heap, whose contacts are not the problem's.
-    fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) -> bool {
+    /// Finds where members may touch, but for those that are a heap: their contacts are not the problem's.
+    fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
         let Self { search, heap, progress, rebounds, .. } = self;
+        let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
         rebounds.begin(self.macro_s, h_s, all.len());
-        if !heap.is_on() || !heap.go_on(scene, all) {
-            search.find(scene, all, progress, h_s);
-            heap.begin(scene, all, search.contacts.len());
+        if heap.go_on(scene, all) {
+            search.find(&round, heap.domains());
+            heap.end_if_touched(search);
         }
-        if heap.is_on() {
-            search.find_near(all, progress, h_s);
+        if !heap.is_on() {
+            search.find(&round, &[]);
+            heap.begin(scene, all, search);
+            if heap.is_on() {
+                search.find(&round, heap.domains());
+            }
         }
-        search.sense(&Round { scene, all, progress, h_s, judge: Judge::Foreseen });
-        heap.is_on()
+        search.sense(&round);
     }
 
     /// Steps a heap from the velocities that its members have without contact.
     fn step_heap(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        let found = self.heap.step(all, &mut self.progress, h_s, &mut self.totals)?;
-        report.contacts = found.contacts as u32;
-        report.depth_m = report.depth_m.max(found.depth_m);
+        self.heap.step(all, &mut self.progress, h_s, &mut self.totals)?.add_to(report);
         Ok(())
     }
 

@@ -123,10 +123,10 @@ impl ClusterScene {
         self.apart.binary_search(&pair).is_ok()
     }
 
-    /// Whether none of the bodies that `has` knows passes through another of them or through a static solid.
-    pub(super) fn stops_all_of(&self, has: impl Fn(AgentId) -> bool) -> bool {
-        let apart = self.apart.iter().any(|pair| pair.iter().all(|id| has(*id)));
-        !(apart || self.passages.iter().any(|passage| has(passage.body)))
+    /// The bodies that pass through a static solid or through one that `has` knows.
+    pub(super) fn passing(&self, has: impl Fn(AgentId) -> bool) -> impl Iterator<Item = AgentId> {
+        let apart = self.apart.iter().filter(move |pair| pair.iter().all(|id| has(*id)));
+        apart.flatten().copied().chain(self.passages.iter().map(|passage| passage.body))
     }
 
     /// Whether one of the static solids only senses.

@@ -7,6 +7,7 @@ mod boxes;
 mod sense;
 mod sweep;
 
+use super::domain::Domain;
 use super::memory::Partner;
 use super::remote;
 use super::scene::{ClusterScene, Passage};
@@ -137,6 +138,8 @@ pub(super) struct Search {
     /// Pairs that touch and of which one side only senses, by rising names.
     pub sensed: Vec<Sensed>,
     point: sense::Point,
+    /// Members that rapier3d steps have no contacts but with the others; empty where there are none.
+    domains: Vec<Domain>,
     /// What was looked at in this fine step, by rising names once it is sorted.
     looks: Vec<Look>,
     /// How many contacts were found before the solve.
@@ -186,17 +189,20 @@ pub(super) enum Judge {
 }
 
 impl Search {
-    /// Finds all places of a fine step of `h_s` seconds.
-    pub fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
-        self.find_near(all, progress, h_s);
+    /// Finds all places of a fine step, but for those of a heap among itself and with static solids; `domains` is empty where there is none.
+    pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
+        self.find_near(round);
+        self.domains.clear();
+        self.domains.extend_from_slice(domains);
         let near = std::mem::take(&mut self.near);
-        self.find_all(&Round { scene, all, progress, h_s, judge: Judge::Foreseen }, &near);
+        self.find_all(round, &near);
         self.near = near;
         self.sort();
     }
 
     /// Finds pairs that are near each other, and no places.
-    pub fn find_near(&mut self, all: &[Participant<'_>], progress: &[Progress], h_s: f64) {
+    fn find_near(&mut self, round: &Round<'_, '_>) {
+        let Round { all, progress, h_s, .. } = *round;
         self.contacts.clear();
         self.owners.clear();
         self.near.clear();
@@ -215,6 +221,9 @@ impl Search {
     /// whether there are any; contacts are then in a new order.
     pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
         let Round { all, h_s, .. } = *round;
+        if (0..all.len()).all(|member| self.is_heap(member)) {
+            return false;
+        }
         self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
@@ -231,11 +240,17 @@ impl Search {
     fn find_all(&mut self, round: &Round<'_, '_>, pairs: &[[usize; 2]]) {
         let Round { scene, all, .. } = *round;
         for &[a, b] in pairs {
-            if all[a].may_touch(&all[b]) && !scene.lets_through([all[a].id, all[b].id]) {
+            if !(self.is_heap(a) && self.is_heap(b))
+                && all[a].may_touch(&all[b])
+                && !scene.lets_through([all[a].id, all[b].id])
+            {
                 self.find_of(round, Pair { member: a, against: Against::Member(b) });
             }
         }
         for (member, one) in all.iter().enumerate() {
+            if self.is_heap(member) {
+                continue;
+            }
             if one.member.rest_shape().is_some() {
                 self.find_of(round, Pair { member, against: Against::Own });
             }
@@ -249,6 +264,10 @@ impl Search {
                 self.find_of(round, Pair { member, against: Against::Static { number, solid } });
             }
         }
+    }
+
+    fn is_heap(&self, member: usize) -> bool {
+        self.domains.get(member) == Some(&Domain::Heap)
     }
 
     /// Places of a pair.

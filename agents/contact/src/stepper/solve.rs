@@ -65,7 +65,6 @@ impl ClusterStepper {
                 progress,
                 depth_m,
                 rebounds,
-                heap,
                 ..
             } = &mut *self;
             let solution = solver.solution();
@@ -84,7 +83,7 @@ impl ClusterStepper {
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
-            let passed = round < ROUNDS_MAX && !heap.is_on() && search.add_passed(&look);
+            let passed = round < ROUNDS_MAX && search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
             let holds = miss_m < joint_miss_m(*depth_m);
