@@ -12,6 +12,10 @@ use metachron_geometry::{Cells, Exposure, Portal, Region};
 /// An eye nearer than this to the plane of a portal is in it, metres.
 const IN_PLANE_M: f64 = 1e-6;
 
+/// Least sine of the angle under which an edge of an opening is seen, or the opening from an edge, that it bounds a view: rounding turns the
+/// plane through a shorter edge, by up to a billionth at this length, and then hides what is seen.
+const EDGE_MIN: f64 = 1e-6;
+
 /// Most clipped views of one eye: the ways through a maze of rooms grow without end. Past it every region is reached with the whole view.
 const VIEWS_MAX: usize = 4096;
 
@@ -112,14 +116,31 @@ impl Reach {
         if self.polygon.len() < 3 {
             return None;
         }
+        Some(self.planes_through(view))
+    }
+
+    /// The planes through the eye and the edges of the clipped opening; those of the view before it where too few are certain.
+    fn planes_through(&mut self, view: ClippedView) -> Planes {
         let middle: DVec3 = self.polygon.iter().sum();
         let first = self.planes.len();
-        for k in 0..self.polygon.len() {
+        for (k, &corner) in self.polygon.iter().enumerate() {
             let next = self.polygon[(k + 1) % self.polygon.len()];
-            let Some(normal) = self.polygon[k].cross(next).try_normalize() else { continue };
-            self.planes.push(if normal.dot(middle) < 0.0 { -normal } else { normal });
+            let normal = corner.cross(next);
+            let edge = normal.length();
+            let inwards = normal.dot(middle);
+            // also where it is not a number
+            let bounds =
+                edge > EDGE_MIN * corner.length() * next.length() && inwards.abs() > EDGE_MIN * edge * middle.length();
+            if bounds {
+                self.planes.push(normal * (inwards.signum() / edge));
+            }
         }
-        Some((first as u32, (self.planes.len() - first) as u32))
+        let count = self.planes.len() - first;
+        if count < 3 {
+            self.planes.truncate(first);
+            return view.planes;
+        }
+        (first as u32, count as u32)
     }
 
     /// Whether any view reaches a region.
@@ -207,5 +228,49 @@ fn clip(polygon: &[DVec3], plane: DVec3, into: &mut Vec<DVec3>) {
         if (here >= 0.0) != (there >= 0.0) {
             into.push(*corner + (next - *corner) * (here / (here - there)));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bounds_tree::Random;
+    use super::super::view::{Camera, Size};
+    use super::*;
+    use metachron_geometry::Cell;
+
+    /// Two rooms with an opening of 1 m² between them, whose upper right corner is cut off by an edge of this length.
+    fn rooms(edge_m: f64) -> Cells {
+        let cell = |x: f64| Cell { low_m: DVec3::new(x, -2.0, -2.0), high_m: DVec3::new(x + 4.0, 2.0, 2.0) };
+        let cut = edge_m * std::f64::consts::FRAC_1_SQRT_2;
+        let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5 - cut), (0.5 - cut, 0.5), (-0.5, 0.5)];
+        let corners_m = corners.iter().map(|(y, z)| DVec3::new(0.0, *y, *z)).collect();
+        let between = [Region::Cell(0), Region::Cell(1)];
+        Cells::new(vec![cell(-4.0), cell(0.0)], vec![Portal { corners_m, between }]).unwrap()
+    }
+
+    #[test]
+    fn no_length_of_an_edge_hides_what_is_seen_through_the_opening() {
+        let mut random = Random(1991);
+        let size = Size { width: 160, height: 90 };
+        let mut reach = Reach::default();
+        let (mut seen, mut hidden) = (0, 0);
+        for at in 0..4000 {
+            let cells = rooms(10.0_f64.powi(-4 - at % 13));
+            let eye = DVec3::new(-3.9, -1.9, -1.9) + DVec3::new(3.5, 3.8, 3.8) * random.point();
+            let ball = DVec3::new(0.2, -1.9, -1.9) + DVec3::splat(3.7) * random.point();
+            let camera = Camera::looking(eye, ball, 0.9);
+            reach.find(&cells, &camera.frustum(size));
+            let radius_m = 1e-3;
+            let bounds = BoundingBox::around(ball, DVec3::splat(radius_m));
+            let object = Bounded { bounds, ball: (ball, radius_m), exposure: cells.exposure(bounds.low, bounds.high) };
+            let crossing = eye + (ball - eye) * (-eye.x / (ball.x - eye.x));
+            let from_rim = 0.5 - crossing.y.abs().max(crossing.z.abs());
+            let sees = reach.sees(&cells, &object);
+            // an edge is a tenth of a millimetre at most
+            assert!(sees || from_rim < 2e-4, "{ball} from {eye}: {from_rim} m from the rim");
+            assert!(!sees || from_rim > -0.1, "{ball} from {eye}: {from_rim} m from the rim");
+            (seen, hidden) = (seen + u32::from(sees), hidden + u32::from(!sees));
+        }
+        assert!(seen > 200 && hidden > 200, "{seen} {hidden}");
     }
 }
