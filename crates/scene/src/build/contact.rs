@@ -10,14 +10,19 @@ use std::collections::BTreeSet;
 /// Most collision groups of a scene: a bit each.
 const GROUPS_MAX: usize = 32;
 
-/// The names of the collision groups of a scene; the place of a name is that of its bit.
+/// The names of the collision groups of a scene.
 #[derive(Debug, Default)]
-pub(super) struct GroupNames(Vec<String>);
+pub(super) struct GroupNames {
+    /// The place of a name is that of its bit.
+    bits: Vec<String>,
+    /// Those for which there is none; they are reported.
+    refused: BTreeSet<String>,
+}
 
 impl GroupNames {
     /// The groups that any of these objects is in.
     pub(super) fn of<'a>(c: &mut Checker<'_, '_>, objects: impl Iterator<Item = (&'a Place, &'a ContactFile)>) -> Self {
-        let mut names = BTreeSet::new();
+        let (mut names, mut refused) = (BTreeSet::new(), BTreeSet::new());
         for (place, file) in objects {
             let place = place.table("contact");
             for (at, name) in file.groups.iter().flatten().enumerate() {
@@ -25,13 +30,13 @@ impl GroupNames {
                     c.wrong(&place, &format!("groups.{at}"), "has a name without characters", "expected a name");
                 } else if names.len() < GROUPS_MAX || names.contains(name) {
                     names.insert(name.clone());
-                } else {
+                } else if refused.insert(name.clone()) {
                     let what = format_args!("names `{name}`, one group more than a scene can have");
                     c.wrong(&place, &format!("groups.{at}"), what, format!("expected at most {GROUPS_MAX} groups"));
                 }
             }
         }
-        Self(names.into_iter().collect())
+        Self { bits: names.into_iter().collect(), refused }
     }
 
     /// The bits of some groups; all where no list is given.
@@ -39,10 +44,11 @@ impl GroupNames {
         let Some(given) = given else { return u32::MAX };
         let mut bits = 0;
         for (at, name) in given.iter().enumerate() {
-            match self.0.iter().position(|one| one == name) {
+            match self.bits.iter().position(|one| one == name) {
                 Some(bit) => bits |= 1 << bit,
+                None if self.refused.contains(name) => {}
                 None => {
-                    c.reference(place, &format!("{key}.{at}"), name, self.0.iter().map(String::as_str));
+                    c.reference(place, &format!("{key}.{at}"), name, self.bits.iter().map(String::as_str));
                 }
             }
         }
