@@ -198,7 +198,7 @@ fn a_small_static_sensor_is_sensed_from_within_a_large_body() {
         let mut table = at_rate(Table::among(vec![body(large)], &[probe]), 240.0);
         let inside = sensed(&mut table, 0, SensorPartner::Static(0), 1.0);
         assert_eq!((inside.touching, inside.begins, inside.ends), (true, 1, 0));
-        let beyond = sensed(&mut table, 0, SensorPartner::Static(0), 0.5);
+        let beyond = sensed(&mut table, 0, SensorPartner::Static(0), 1.5);
         assert_eq!((beyond.touching, beyond.begins, beyond.ends), (false, 1, 1));
     }
 }

@@ -59,7 +59,8 @@ fn a_row_that_is_pressed_gives_no_more_than_its_own_bounds_allow() {
             let mut solver = Solver::new(Settings { convex_only, ..Settings::default() });
             let after = case.with(|problem| solver.solve(problem).unwrap().velocities(0)[SPIN].z);
             let given = inertia * (spin - after);
-            assert!((given - wanted).abs() < 1e-3 * pressed, "{own}, convex only: {convex_only}: {given} of {wanted}");
+            // the contact gives way by v_s, and presses by that much less
+            assert!((given - wanted).abs() < 1e-2 * pressed, "{own}, convex only: {convex_only}: {given} of {wanted}");
         }
     }
 }
