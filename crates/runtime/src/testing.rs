@@ -10,8 +10,8 @@ use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{
-    AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot,
-    StepError, StepReport,
+    AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
+    StepReport,
 };
 use metachron_core::{Impulse, Site};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
