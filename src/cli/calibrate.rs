@@ -8,7 +8,7 @@ use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message};
-use metachron_lod::control::{Shading, Stages};
+use metachron_lod::control::{AREAS_PX, Prices, Shading, Stages};
 use metachron_render::Gpu;
 use metachron_session::calibrate::PriceTable;
 use std::fmt::Write;
@@ -36,7 +36,7 @@ fn table(args: &CalibrateArgs, gpu: &Gpu) -> anyhow::Result<PriceTable> {
         let bad = |why: String| BadInput(format!("{}: {why}", path.display()));
         let text = std::fs::read(path).map_err(|why| bad(why.to_string()))?;
         let table = PriceTable::import(&text, &adapter).map_err(|why| bad(why.to_string()))?;
-        table.store();
+        table.store().with_context(|| format!("{} is read, but it cannot be stored", path.display()))?;
         return Ok(table);
     }
     if args.renew {
@@ -45,6 +45,9 @@ fn table(args: &CalibrateArgs, gpu: &Gpu) -> anyhow::Result<PriceTable> {
     let measured = || PriceTable::measure(gpu, message).with_context(|| format!("{adapter} could not be measured"));
     PriceTable::known(&adapter).filter(|_| !args.renew).map_or_else(measured, Ok)
 }
+
+/// Names of the shadings that are priced.
+const SHADINGS: [&str; Shading::ALL.len()] = ["flat", "gouraud", "per-pixel", "textured"];
 
 fn text(table: &PriceTable) -> String {
     let PriceTable { adapter, prices, misses } = table;
@@ -62,12 +65,13 @@ fn text(table: &PriceTable) -> String {
         "pixel ns",
         "beside %"
     );
-    for (name, shading) in ["flat", "gouraud", "per-pixel", "textured"].into_iter().zip(Shading::ALL) {
+    for (name, shading) in SHADINGS.into_iter().zip(Shading::ALL) {
         let Stages { setup, polygon, vertex, pixel, serial } = prices.of(shading);
         let (setup_us, beside) = (1e6 * setup, 100.0 * (1.0 - serial));
         let [polygon, vertex, pixel] = [polygon, vertex, pixel].map(|seconds| 1e9 * seconds);
         let _ = writeln!(text, "{name:<10} {setup_us:>10.2} {polygon:>12.1} {vertex:>10.1} {pixel:>9.2} {beside:>9.0}");
     }
+    text += &areas(prices);
     let _ = writeln!(
         text,
         "half of the pictures measured take within {:.0} % of what these prices predict, 19 of 20 within {:.0} %",
@@ -75,4 +79,43 @@ fn text(table: &PriceTable) -> String {
         100.0 * misses.most
     );
     text
+}
+
+/// The prices of triangles by the pixels that they cover.
+fn areas(prices: &Prices) -> String {
+    let Some(areas) = prices.areas else {
+        return "triangles have no prices by the pixels that they cover\n".to_owned();
+    };
+    let mut text =
+        format!("{:<10} {:>10}   a triangle, ns, by the pixels that it covers:\n{:21}", "by area", "object µs", "");
+    AREAS_PX.iter().for_each(|area| {
+        let _ = write!(text, " {area:>8.0}");
+    });
+    text.push('\n');
+    for (name, of) in SHADINGS.into_iter().zip(areas) {
+        let _ = write!(text, "{name:<10} {:>10.2}", 1e6 * of.setup);
+        of.polygon.iter().for_each(|price| {
+            let _ = write!(text, " {:>8.1}", 1e9 * price);
+        });
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_lod::control::{Areas, Misses};
+
+    #[test]
+    fn prices_by_area_are_shown_where_they_are_known() {
+        let of = |areas| {
+            let prices = Prices { areas, ..Prices::default() };
+            text(&PriceTable { adapter: "one".to_owned(), prices, misses: Misses::default() })
+        };
+        let known = of(Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-9 * area) }; 4]));
+        let line = "textured         2.00      1.0      4.0     16.0     64.0    256.0   1024.0   4096.0";
+        assert!(known.contains(line), "{known}");
+        assert!(of(None).contains("no prices by the pixels"), "{}", of(None));
+    }
 }

@@ -269,7 +269,7 @@ fn clusters(scene: &Scene, outcome: &Outcome) -> Vec<ClusterRow> {
             id: name(at),
             members,
             h_ms: state.step_s * 1e3,
-            slack: 1.0 - led(leader).map(|(at, _)| outcome.agents[at].stats.work_s).sum::<f64>() / state.step_s,
+            slack: 1.0 - outcome.agents[at].stats.turn_s / state.step_s,
             steps: led(leader).map(|(_, part)| part.parts).collect(),
             contacts: solves.contacts,
             problems: solves.problems,

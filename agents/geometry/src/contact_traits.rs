@@ -1,4 +1,4 @@
-//! How a skin takes part in contact beside its friction and restitution: whom it meets, how a pair shares its coefficients, whether it only
+//! How a skin takes part in contact beside its friction and restitution: what it collides with, how a pair shares its coefficients, whether it only
 //! senses.
 //!
 //! In: what a scene says of an object. Out: the same of a pair. Never here: where skins touch, impulses.
@@ -7,9 +7,9 @@
 /// What a skin says about its contacts, the same for bodies and static solids.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactTraits {
-    /// Whom it meets.
+    /// What it collides with.
     pub groups: CollisionGroups,
-    /// Whether it only senses: it is told of what touches it, and no force acts.
+    /// Whether it only senses: what touches it is reported, and no force acts.
     pub is_sensor: bool,
     /// How a pair with it shares frictions; `None` leaves that to the other side.
     pub friction_rule: Option<CombineRule>,
@@ -112,7 +112,7 @@ mod tests {
         assert!(tool.meet(tissue) && tissue.meet(tool), "the tool names the tissue, which collides with all");
         assert!(!tool.meet(tool), "tools pass through each other");
         assert!(tissue.meet(tissue) && anyone.meet(tissue) && anyone.meet(tool));
-        assert!(!of(0b10, 0).meet(tool) && !of(0b10, 0).meet(anyone), "what collides with no group meets nobody");
+        assert!(!of(0b10, 0).meet(tool) && !of(0b10, 0).meet(anyone), "what collides with no group meets nothing");
     }
 
     #[test]

@@ -12,6 +12,10 @@ use metachron_geometry::{Cells, Exposure, Portal, Region};
 /// An eye nearer than this to the plane of a portal is in it, metres.
 const IN_PLANE_M: f64 = 1e-6;
 
+/// Least sine of the angle under which an edge of an opening is seen, or the opening from an edge, that it bounds a view: rounding turns the
+/// plane through a shorter edge, by up to a billionth at this length, and then hides what is seen.
+const EDGE_MIN: f64 = 1e-6;
+
 /// Most clipped views of one eye: the ways through a maze of rooms grow without end. Past it every region is reached with the whole view.
 const VIEWS_MAX: usize = 4096;
 
@@ -112,14 +116,31 @@ impl Reach {
         if self.polygon.len() < 3 {
             return None;
         }
+        Some(self.planes_through(view))
+    }
+
+    /// The planes through the eye and the edges of the clipped opening; those of the view before it where too few are certain.
+    fn planes_through(&mut self, view: ClippedView) -> Planes {
         let middle: DVec3 = self.polygon.iter().sum();
         let first = self.planes.len();
-        for k in 0..self.polygon.len() {
+        for (k, &corner) in self.polygon.iter().enumerate() {
             let next = self.polygon[(k + 1) % self.polygon.len()];
-            let Some(normal) = self.polygon[k].cross(next).try_normalize() else { continue };
-            self.planes.push(if normal.dot(middle) < 0.0 { -normal } else { normal });
+            let normal = corner.cross(next);
+            let edge = normal.length();
+            let inwards = normal.dot(middle);
+            // also where it is not a number
+            let bounds =
+                edge > EDGE_MIN * corner.length() * next.length() && inwards.abs() > EDGE_MIN * edge * middle.length();
+            if bounds {
+                self.planes.push(normal * (inwards.signum() / edge));
+            }
         }
-        Some((first as u32, (self.planes.len() - first) as u32))
+        let count = self.planes.len() - first;
+        if count < 3 {
+            self.planes.truncate(first);
+            return view.planes;
+        }
+        (first as u32, count as u32)
     }
 
     /// Whether any view reaches a region.
@@ -206,6 +227,32 @@ fn clip(polygon: &[DVec3], plane: DVec3, into: &mut Vec<DVec3>) {
         }
         if (here >= 0.0) != (there >= 0.0) {
             into.push(*corner + (next - *corner) * (here / (here - there)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bounds_tree::Random;
+    use super::*;
+
+    #[test]
+    fn no_length_of_an_edge_hides_what_is_seen_through_the_opening() {
+        let mut random = Random(1991);
+        for at in 0..4000 {
+            let eye = DVec3::new(-4.0, -2.0, -2.0) + DVec3::new(3.5, 4.0, 4.0) * random.point();
+            // an opening of 1 m² of which a view has cut a corner off, by an edge of 1e-16 to 1e-4 m
+            let cut = 10.0_f64.powi(-4 - at % 13);
+            let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5 - cut), (0.5 - cut, 0.5), (-0.5, 0.5)];
+            let polygon = corners.iter().map(|(y, z)| DVec3::new(0.0, *y, *z) - eye).collect();
+            let mut reach = Reach { polygon, ..Reach::default() };
+            let planes = reach.planes_through(ClippedView { region: Region::Outside, planes: WHOLE });
+            assert!(planes.1 >= 4, "four edges are long: {planes:?}");
+            let through = (DVec3::new(0.0, -0.499, -0.499) + DVec3::new(0.0, 0.998, 0.998) * random.point()) - eye;
+            let hides = reach.planes_of(planes).iter().find(|plane| through.dot(**plane) < 0.0);
+            assert_eq!(hides, None, "{through} from {eye}, an edge of {cut} m");
+            let beside = DVec3::new(0.0, 0.501, random.next() - 0.5) - eye;
+            assert!(reach.planes_of(planes).iter().any(|plane| beside.dot(*plane) < 0.0), "{beside} from {eye}");
         }
     }
 }

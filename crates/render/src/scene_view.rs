@@ -152,6 +152,8 @@ pub struct SceneView {
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
     pub(super) survey: Survey,
+    /// How many of the last actors are drawn in place of groups of others.
+    pub(super) impostors: usize,
     /// Results of the last survey, and the camera and picture size of that survey.
     pub(super) found: Vec<Visibility>,
     /// The actors that the last survey updated.
@@ -249,6 +251,11 @@ impl SceneView {
         let models = models.0.into_iter().map(|(model, _)| model).collect();
         let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
         Self { tracks, statics, picture, ..Self::default() }
+    }
+
+    /// Says how many of the last actors are drawn in place of groups of others: they are not counted as objects.
+    pub fn set_impostors(&mut self, count: usize) {
+        self.impostors = count;
     }
 
     /// Chooses what lights the scene from the next picture on.

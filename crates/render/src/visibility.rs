@@ -35,7 +35,7 @@ pub struct Visibility {
     pub radius_m: f64,
 }
 
-/// How many actors a view may show, by three tests of which each is stricter than the one before.
+/// How many actors a view may show, without impostors, by tests of which the second is stricter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VisibleCounts {
     /// Those with a part in a cell that the eye reaches through portals, or in no cell and in the frustum (eye-to-cell visibility).
@@ -52,23 +52,28 @@ pub(super) struct Survey {
     items: Vec<Bounded>,
     tree: BoundsTree,
     reach: Reach,
-    /// The items that the last camera may see.
+    /// The items that the last camera may see, and those with a part in a region that it reaches.
     in_sight: Vec<bool>,
+    in_reach: Vec<bool>,
+    /// The cells that it reaches.
+    cells_reached: Vec<Cell>,
     counts: VisibleCounts,
 }
 
 impl Survey {
     /// Updates the bounds of the actors that were posed again.
     fn refit(&mut self, tracks: &[Track], statics: &[StaticShape]) {
-        let Self { cells, items, tree, in_sight, .. } = self;
+        let Self { cells, items, tree, in_sight, in_reach, .. } = self;
         let count = tracks.len() + statics.len();
         if tree.len() != count {
             items.clear();
             items.extend(tracks.iter().map(|track| bounded(&track.bounds, cells)));
             items.extend(statics.iter().map(|prop| bounded(&prop.bounds(), cells)));
             tree.build(items.iter().map(|item| item.bounds));
-            in_sight.clear();
-            in_sight.resize(count, false);
+            for found in [in_sight, in_reach] {
+                found.clear();
+                found.resize(count, false);
+            }
             return;
         }
         for (at, track) in tracks.iter().enumerate().filter(|(_, track)| track.fresh) {
@@ -79,29 +84,41 @@ impl Survey {
 
     /// Finds the items that the camera may see.
     fn look(&mut self, frustum: &Frustum) {
-        let Self { cells, items, tree, reach, in_sight, .. } = self;
+        let Self { cells, items, tree, reach, in_sight, in_reach, cells_reached, .. } = self;
         reach.find(cells, frustum);
         in_sight.fill(false);
         tree.find(|bounds| reach.may_show(bounds), |item| in_sight[item] = reach.sees(cells, &items[item]));
+        let reached = cells.all().iter().enumerate().filter(|(number, _)| reach.is_reached(Region::Cell(*number)));
+        cells_reached.clear();
+        cells_reached.extend(reached.map(|(_, cell)| *cell));
+        let outside = reach.is_reached(Region::Outside);
+        for ((found, item), seen) in in_reach.iter_mut().zip(items.iter()).zip(in_sight.iter()) {
+            *found = match item.exposure {
+                Exposure::Outside => *seen,
+                exposure => outside && exposure == Exposure::Partly,
+            };
+        }
+        tree.find(
+            |bounds| is_within(cells_reached, bounds),
+            |item| in_reach[item] |= items[item].exposure != Exposure::Outside,
+        );
     }
 
     /// Tests an item again that moved while the camera did not.
     fn look_at(&mut self, item: usize) {
-        self.in_sight[item] = self.reach.sees(&self.cells, &self.items[item]);
-    }
-
-    /// Whether an item has a part in a region that is reached.
-    fn is_potentially_visible(&self, item: usize) -> bool {
         let Bounded { bounds, exposure, .. } = self.items[item];
-        let is_in = |(number, cell): (usize, &Cell)| {
-            cell.overlaps(bounds.low, bounds.high) && self.reach.is_reached(Region::Cell(number))
-        };
-        match exposure {
+        self.in_sight[item] = self.reach.sees(&self.cells, &self.items[item]);
+        self.in_reach[item] = match exposure {
             Exposure::Outside => self.in_sight[item],
             Exposure::Partly if self.reach.is_reached(Region::Outside) => true,
-            _ => self.cells.all().iter().enumerate().any(is_in),
-        }
+            _ => is_within(&self.cells_reached, &bounds),
+        };
     }
+}
+
+/// Whether a box has a part in any of these cells.
+fn is_within(cells: &[Cell], bounds: &BoundingBox) -> bool {
+    cells.iter().any(|cell| cell.overlaps(bounds.low, bounds.high))
 }
 
 /// What is tested of an object with these bounds; one without a size is nowhere.
@@ -171,17 +188,13 @@ impl SceneView {
     }
 
     fn count(&mut self) {
-        let drawn = |track: &&(usize, &Track)| !is_unseen(track.1);
-        let all = self.tracks.iter().enumerate();
-        let count = |of: &dyn Fn(usize, &Track) -> bool| {
-            all.clone().filter(|track| drawn(&track)).filter(|(at, track)| of(*at, track)).count() as u64
-        };
-        let visible = count(&|_, track| track.seen);
-        let potentially_visible = match self.survey.cells.all().is_empty() {
-            true => visible,
-            false => count(&|at, _| self.survey.is_potentially_visible(at)),
-        };
-        self.survey.counts = VisibleCounts { potentially_visible, visible };
+        let objects = self.tracks.len().saturating_sub(self.impostors);
+        let mut counts = VisibleCounts::default();
+        for (track, in_reach) in self.tracks[..objects].iter().zip(&self.survey.in_reach) {
+            counts.visible += u64::from(track.seen);
+            counts.potentially_visible += u64::from(*in_reach && !is_unseen(track));
+        }
+        self.survey.counts = counts;
     }
 
     /// The indices of the actors that the last [`SceneView::survey`] updated, ascending.

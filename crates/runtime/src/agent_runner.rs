@@ -172,13 +172,14 @@ impl AgentRunner {
         }
     }
 
-    /// Ends the turn that began: it took `work_s` seconds of the caller, those it leads included, and it is wall time `wall`.
-    pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
-        let work_s = self.cluster.as_ref().map_or(work_s, |seat| seat.helped().core_s(work_s));
+    /// Ends the turn that began: it took `turn_s` seconds of the caller, those it leads included, and it is wall time `wall`.
+    pub fn finish(&mut self, timeline: &Timeline, wall: Duration, turn_s: f64) -> Next {
+        let work_s = self.cluster.as_ref().map_or(turn_s, |seat| seat.helped().core_s(turn_s));
         // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
         let work_s = self.share_work(work_s);
+        self.metrics.time_turn(&self.shared.gauges, turn_s);
         let mut published = self.record_step(&open, now, work_s);
         published &= self.conclude_led(timeline, wall);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {

@@ -183,6 +183,7 @@ impl AgentHandle {
             resolution: newest.resolution,
             nodes: newest.nodes,
             work_s: gauges.work_s.get(),
+            turn_s: gauges.turn_s.get(),
             work: gauges.work.get(),
             cpu_s: self.cpu_s(),
             age: self.ages().spread(),

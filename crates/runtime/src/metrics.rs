@@ -57,8 +57,11 @@ pub struct AgentStats {
     pub resolution: Option<Resolution>,
     /// Number of nodes that its newest state was solved at; `None` for a model without nodes.
     pub nodes: Option<u32>,
-    /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
+    /// Its share of the time that cores take for a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
     pub work_s: f64,
+    /// Wall time of the turns that it makes, with all agents that it leads, seconds, smoothed: less than cores take for them where threads
+    /// help; 0 before it has made one.
+    pub turn_s: f64,
     /// Work of its steps so far, in its model's unit.
     pub work: f64,
     /// CPU time of its turns so far, seconds; measured, in lockstep too.
@@ -116,6 +119,7 @@ pub(super) struct Metrics {
     pub rate_hz: Gauge,
     pub mean_hz: Gauge,
     pub work_s: Gauge,
+    pub turn_s: Gauge,
     pub work: Gauge,
     late: [Gauge; 3],
     state: AtomicU8,
@@ -188,6 +192,7 @@ pub(super) struct MetricsWriter {
     misses: u64,
     late: Histogram,
     work_s: Option<f64>,
+    turn_s: Option<f64>,
     window: (SimTime, u64),
     first_window: bool,
 }
@@ -203,14 +208,23 @@ pub(super) struct Entry {
     pub late: Duration,
     /// Whether it was published after the end of its step.
     pub missed: bool,
-    /// Its duration, seconds.
+    /// The time that cores took for it, seconds.
     pub work_s: f64,
 }
 
 impl MetricsWriter {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
-        Self { turns: 0, steps: 0, misses: 0, late: Histogram::default(), work_s: None, window, first_window: true }
+        Self {
+            turns: 0,
+            steps: 0,
+            misses: 0,
+            late: Histogram::default(),
+            work_s: None,
+            turn_s: None,
+            window,
+            first_window: true,
+        }
     }
 
     /// Turns recorded so far.
@@ -229,8 +243,7 @@ impl MetricsWriter {
         self.steps += u64::from(entry.steps);
         self.misses += u64::from(entry.missed);
         self.late.record(entry.late);
-        let work_s = self.work_s.map_or(entry.work_s, |old| old + SMOOTHING * (entry.work_s - old));
-        self.work_s = Some(work_s);
+        let work_s = smoothed(&mut self.work_s, entry.work_s);
         gauges.steps.store(self.steps, Relaxed);
         gauges.misses.store(self.misses, Relaxed);
         gauges.work_s.set(work_s);
@@ -239,6 +252,11 @@ impl MetricsWriter {
         let lived = pace.scene_time().max(entry.now).since(SimTime::ZERO + pace.rested());
         gauges.mean_hz.set(self.steps as f64 / lived.as_secs_f64());
         self.count_rate(gauges, entry.now);
+    }
+
+    /// Records the wall time of a turn that the agent made, those it leads included.
+    pub fn time_turn(&mut self, gauges: &Metrics, turn_s: f64) {
+        gauges.turn_s.set(smoothed(&mut self.turn_s, turn_s));
     }
 
     /// Publishes the values of the pace.
@@ -271,6 +289,10 @@ impl MetricsWriter {
             self.flush(gauges);
         }
     }
+}
+
+fn smoothed(held: &mut Option<f64>, new: f64) -> f64 {
+    *held.insert(held.map_or(new, |old| old + SMOOTHING * (new - old)))
 }
 
 #[cfg(test)]

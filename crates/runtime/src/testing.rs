@@ -6,12 +6,12 @@ use super::spawn::AgentSpawn;
 use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::asynchronous::{GivenAt, Ledgers};
-use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::cluster::Side;
+use metachron_contact::stepper::{ClusterMember, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{
-    AgentId, Anchor, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot,
-    StepError, StepReport,
+    AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
+    StepReport,
 };
 use metachron_core::{Impulse, Site};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
@@ -328,18 +328,6 @@ impl ClusterMember for Dummy {
         self.fail(h_s)
     }
 
-    fn blocks(&self) -> &[Block] {
-        &[]
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &[]
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &[]
-    }
-
     fn skin(&self) -> Option<PlacedShape<'_>> {
         let view = ShapePose::Solid { position: DVec3::Z * self.z, rotation: DQuat::IDENTITY };
         Some(PlacedShape { form: self.form.as_deref()?, view })
@@ -347,10 +335,6 @@ impl ClusterMember for Dummy {
 
     fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
         Side::FIXED
-    }
-
-    fn anchor(&self, _anchor: Anchor) -> Option<MaterialPoint> {
-        None
     }
 
     fn spares(&self, _other: AgentId) -> bool {
@@ -390,8 +374,6 @@ impl ClusterMember for Dummy {
     fn is_calm(&self) -> bool {
         self.rest_from.is_some_and(|from| self.steps >= from)
     }
-
-    fn rest(&mut self) {}
 
     fn work(&self) -> f64 {
         self.work

@@ -43,6 +43,16 @@ fn objects_of_groups_that_do_not_collide_pass_through_each_other() {
 }
 
 #[test]
+fn a_group_more_than_a_scene_can_have_is_reported_once() {
+    let names = (0..33).map(|k| format!("\"g{k:02}\"")).collect::<Vec<_>>().join(", ");
+    let contact = format!("contact = {{ groups = [{names}], collides_with = [\"g32\"] }}");
+    let error = read(&contact, "contact = { groups = [\"g32\"] }", "").unwrap_err();
+    let said: Vec<_> = error.problems.iter().map(|problem| problem.message.as_str()).collect();
+    assert_eq!(said, ["`groups` of `ball` names `g32`, one group more than a scene can have"]);
+    refused("contact = { groups = [\"balls\"], collides_with = [\"bals\"] }", "", "", &["did you mean `balls`?"]);
+}
+
+#[test]
 fn a_sensor_is_told_of_in_the_state_of_what_touched_it() {
     let gate = "[[object]]\nname = \"gate\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [1, 1, 0.05]\nposition_m = [0, 0, 0.2]\nfixed = true\ncontact = { sensor = true }";
     let scene = read("", "", gate).unwrap();

@@ -11,8 +11,8 @@ use glam::DVec3;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, RateControl,
-    RateDemand, RateLimits, Sliders, Stages, Value,
+    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices,
+    RateControl, RateDemand, RateLimits, Stages, Value,
 };
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
@@ -124,6 +124,7 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         throws_shadow: !scene.walls.contains(&at),
     });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
+    scene_view.set_impostors(scene.groups.len());
     scene_view.set_cells(scene.cells.clone());
     scene_view.set_environment(environment(scene.environment));
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
@@ -162,7 +163,8 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
     let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
     control.set_value(value(target.value));
-    control.set_sliders(sliders(control.policy().usual_sliders(), target.factors));
+    let Factors { focus, motion, hysteresis } = target.factors;
+    control.set_sliders(GivenSliders { focus, motion, hysteresis, ..GivenSliders::default() });
     control.set_raise(target.raise);
     control.set_render_scale(target.render_scale);
     control.set_throws_shadows(environment(scene.environment).throws_shadows());
@@ -174,16 +176,6 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
         control.set_margin(margin);
     }
     control
-}
-
-/// Sliders with the factors that the scene gives.
-fn sliders(usual: Sliders, given: Factors) -> Sliders {
-    Sliders {
-        focus: given.focus.unwrap_or(usual.focus),
-        motion: given.motion.unwrap_or(usual.motion),
-        hysteresis: given.hysteresis.unwrap_or(usual.hysteresis),
-        ..usual
-    }
 }
 
 /// Control's type for a policy; scenes and control use the same names.

@@ -59,7 +59,7 @@ pub struct PriceTable {
 }
 
 /// Why a file is no table of prices for this adapter.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
     /// It is not what [`PriceTable::export`] writes.
@@ -83,9 +83,33 @@ pub enum ImportError {
         /// The adapter here.
         expected: String,
     },
-    /// A price cannot be.
-    #[error("a price is negative or no number")]
-    BadPrice,
+    /// A number of the table cannot be.
+    #[error("`{place}` is {found}, expected {expected}")]
+    BadNumber {
+        /// Where it stands in the file.
+        place: String,
+        /// The number there.
+        found: f64,
+        /// What may stand there.
+        expected: &'static str,
+    },
+}
+
+/// Why something could not be stored in this user's cache.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The user has no cache.
+    #[error("there is no folder for a cache: none of XDG_CACHE_HOME, HOME and LOCALAPPDATA is set")]
+    NoFolder,
+    /// The file could not be written.
+    #[error("{path} cannot be written: {why}")]
+    NotWritten {
+        /// The file.
+        path: String,
+        /// The system's reason.
+        why: std::io::Error,
+    },
 }
 
 /// Why prices could not be measured.
@@ -121,7 +145,7 @@ impl PriceTable {
     }
 
     /// Measures an adapter and stores the table. If a slow adapter leaves too few measurements for prices, the next call goes on from
-    /// them; measurements that no prices fit are forgotten. `report` receives a line before.
+    /// them; measurements that no prices fit are forgotten. `report` receives a line before, and one if the table could not be stored.
     ///
     /// # Errors
     /// [`CalibrateError`]; no table is stored then.
@@ -141,18 +165,25 @@ impl PriceTable {
                 forget();
                 return Err(CalibrateError::NoFit);
             }
-            folder.iter().for_each(|folder| store_partial(folder, &adapter, &pictures));
+            if let Err(why) = store_partial(folder.as_deref(), &adapter, &pictures) {
+                report(&format!("what was measured cannot be kept for the next run: {why}"));
+            }
             return Err(CalibrateError::Unfinished(100.0 * left));
         };
         forget();
         let table = Self { misses: prices.misses(&pictures), prices, adapter };
-        table.store();
+        if let Err(why) = table.store() {
+            report(&format!("the prices cannot be kept, the next run measures anew: {why}"));
+        }
         Ok(table)
     }
 
-    /// Stores the table in this user's cache; if that fails the adapter is measured again in the next run.
-    pub fn store(&self) {
-        folder().iter().for_each(|folder| store(folder, self));
+    /// Stores the table in this user's cache.
+    ///
+    /// # Errors
+    /// [`StoreError`]: the adapter is measured again in the next run.
+    pub fn store(&self) -> Result<(), StoreError> {
+        store(folder().as_deref(), self)
     }
 
     /// Forgets what a measurement of the adapter of this name has begun; a table that is known stands until another takes its place.
@@ -182,7 +213,7 @@ impl PriceTable {
         if cached.adapter != adapter {
             return Err(ImportError::Adapter { found: cached.adapter, expected: adapter.to_owned() });
         }
-        cached.table().ok_or(ImportError::BadPrice)
+        cached.table()
     }
 }
 
@@ -218,8 +249,9 @@ fn read(folder: &Path, adapter: &str) -> Option<PriceTable> {
     PriceTable::import(&std::fs::read(file(folder, adapter, DRAWING)).ok()?, adapter).ok()
 }
 
-fn store(folder: &Path, table: &PriceTable) {
-    write(&file(folder, &table.adapter, DRAWING), &CachedPrices::of(table));
+fn store(folder: Option<&Path>, table: &PriceTable) -> Result<(), StoreError> {
+    let folder = folder.ok_or(StoreError::NoFolder)?;
+    write(&file(folder, &table.adapter, DRAWING), &CachedPrices::of(table))
 }
 
 impl CachedPrices {
@@ -232,17 +264,48 @@ impl CachedPrices {
         Self { version: VERSION, adapter, misses, frame_s, pixel_s, enlarge_s, shading, areas }
     }
 
-    /// The table; `None` with a price that cannot be.
-    fn table(self) -> Option<PriceTable> {
+    /// The table, unless a number of it cannot be.
+    fn table(self) -> Result<PriceTable, ImportError> {
+        self.check()?;
         let Self { frame_s, pixel_s, enlarge_s, misses: [half, most], .. } = self;
-        let all = [frame_s, pixel_s, enlarge_s, half, most].into_iter().chain(self.shading.into_iter().flatten());
-        let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
         let stages =
             |[setup, polygon, vertex, pixel, serial]: [f64; 5]| Stages { setup, polygon, vertex, pixel, serial };
         let areas = self.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
-        let sound = sound && areas.iter().flatten().all(Areas::is_sound);
         let prices = Prices { frame_s, pixel_s, enlarge_s, shading: self.shading.map(stages), areas };
-        sound.then_some(PriceTable { adapter: self.adapter, prices, misses: Misses { half, most } })
+        Ok(PriceTable { adapter: self.adapter, prices, misses: Misses { half, most } })
+    }
+
+    /// Finds the first number that cannot be.
+    fn check(&self) -> Result<(), ImportError> {
+        let bad = |place: String, found: f64, expected| Err(ImportError::BadNumber { place, found, expected });
+        let not_negative = |place: String, found: f64| match found.is_finite() && found >= 0.0 {
+            true => Ok(()),
+            false => bad(place, found, "a finite number of at least 0"),
+        };
+        for (name, price) in [("frame_s", self.frame_s), ("pixel_s", self.pixel_s), ("enlarge_s", self.enlarge_s)] {
+            not_negative(name.to_owned(), price)?;
+        }
+        for (k, miss) in self.misses.into_iter().enumerate() {
+            not_negative(format!("misses[{k}]"), miss)?;
+        }
+        for (at, stages) in self.shading.iter().enumerate() {
+            for (k, number) in stages.iter().enumerate() {
+                not_negative(format!("shading[{at}][{k}]"), *number)?;
+            }
+            if stages[4] > 1.0 {
+                return bad(format!("shading[{at}][4]"), stages[4], "a part, 0 to 1");
+            }
+        }
+        for (at, (setup, polygon)) in self.areas.iter().flatten().enumerate() {
+            not_negative(format!("areas[{at}][0]"), *setup)?;
+            for (k, price) in polygon.iter().enumerate() {
+                not_negative(format!("areas[{at}][1][{k}]"), *price)?;
+                if k > 0 && *price < polygon[k - 1] {
+                    return bad(format!("areas[{at}][1][{k}]"), *price, "no less than for the smaller area before it");
+                }
+            }
+        }
+        Ok(())
     }
 }
 
@@ -260,29 +323,43 @@ fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
     partial.pictures.into_iter().map_while(picture).filter(|_| ours).collect()
 }
 
-fn store_partial(folder: &Path, adapter: &str, pictures: &[Measured]) {
+fn store_partial(folder: Option<&Path>, adapter: &str, pictures: &[Measured]) -> Result<(), StoreError> {
     let row = |p: &Measured| {
         let Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds } = *p;
         [picture_px, enlarged_px, objects, polygons, pixels, f64::from(shading as u8), seconds]
     };
     let pictures = pictures.iter().map(row).collect();
-    write(
-        &file(folder, adapter, PARTIAL),
-        &PartialBenchmark { version: VERSION, adapter: adapter.to_owned(), pictures },
-    );
+    let partial = PartialBenchmark { version: VERSION, adapter: adapter.to_owned(), pictures };
+    write(&file(folder.ok_or(StoreError::NoFolder)?, adapter, PARTIAL), &partial)
 }
 
 /// Writes a file atomically, so that no reader sees half of it.
-fn write(path: &Path, what: &impl Serialize) {
-    let (Some(folder), Ok(text)) = (path.parent(), serde_json::to_vec_pretty(what)) else { return };
+fn write(path: &Path, what: &impl Serialize) -> Result<(), StoreError> {
     let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
-    let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&unfinished, text));
-    let _ = written.and_then(|()| std::fs::rename(&unfinished, path));
+    let written = || {
+        let text = serde_json::to_vec_pretty(what)?;
+        path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        std::fs::write(&unfinished, text)?;
+        std::fs::rename(&unfinished, path)
+    };
+    written().map_err(|why| StoreError::NotWritten { path: path.display().to_string(), why })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_that_cannot_be_stored_says_where_and_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let occupied = folder.path().join("file");
+        std::fs::write(&occupied, "").unwrap();
+        let table = PriceTable { adapter: "one".to_owned(), prices: Prices::default(), misses: Misses::default() };
+        let failed = |folder| store(folder, &table).unwrap_err().to_string();
+        assert!(failed(None).contains("HOME"));
+        let said = failed(Some(&occupied.join("cache")));
+        assert!(said.contains(&occupied.display().to_string()) && said.contains("cannot be written"), "{said}");
+    }
 
     #[test]
     fn a_partial_benchmark_is_continued() {
@@ -298,11 +375,11 @@ mod tests {
         };
         let pictures = [at(1e-3), Measured { shading: Shading::Textured, objects: 0.0, ..at(2e-3) }];
         assert_eq!(read_partial(folder.path(), "one"), []);
-        store_partial(folder.path(), "one", &pictures);
+        store_partial(Some(folder.path()), "one", &pictures).unwrap();
         assert_eq!(read_partial(folder.path(), "one"), pictures);
         assert_eq!(read_partial(folder.path(), "two"), []);
         // pictures after an invalid one are measured anew
-        store_partial(folder.path(), "one", &[at(1e-3), at(-1.0), at(3e-3)]);
+        store_partial(Some(folder.path()), "one", &[at(1e-3), at(-1.0), at(3e-3)]).unwrap();
         assert_eq!(read_partial(folder.path(), "one"), [at(1e-3)]);
         std::fs::write(file(folder.path(), "one", PARTIAL), "{").unwrap();
         assert_eq!(read_partial(folder.path(), "one"), []);
@@ -316,7 +393,7 @@ mod tests {
         prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
         let table = PriceTable { adapter: "one".to_owned(), prices, misses: Misses { half: 0.03, most: 0.2 } };
         let stored = |table: &PriceTable| {
-            store(folder.path(), table);
+            store(Some(folder.path()), table).unwrap();
             read(folder.path(), "one")
         };
         assert_eq!(read(folder.path(), "one"), None);
@@ -337,15 +414,30 @@ mod tests {
 
     #[test]
     fn a_table_is_taken_on_its_own_adapter_and_by_its_own_version_alone() {
-        let prices = Prices::default();
+        let mut prices = Prices::default();
+        prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
         let table = PriceTable { adapter: "one".to_owned(), prices, misses: Misses::default() };
         let text = table.export();
-        assert_eq!(PriceTable::import(text.as_bytes(), "one"), Ok(table));
+        assert_eq!(PriceTable::import(text.as_bytes(), "one"), Ok(table.clone()));
         let refused = |text: &str, adapter: &str| PriceTable::import(text.as_bytes(), adapter).unwrap_err().to_string();
         assert!(refused(&text, "two").contains("of the adapter `one`, pictures are drawn by `two`"));
         let older = text.replace(&format!("\"version\": {VERSION}"), "\"version\": 3");
         assert!(refused(&older, "one").contains("version 3"), "{}", refused(&older, "one"));
-        assert!(refused(&text.replace("0.0014", "-0.0014"), "one").contains("negative"));
+        let with = |change: &dyn Fn(&mut Prices)| {
+            let mut table = table.clone();
+            change(&mut table.prices);
+            refused(&table.export(), "one")
+        };
+        let least = "expected a finite number of at least 0";
+        assert_eq!(with(&|prices| prices.frame_s = -0.0014), format!("`frame_s` is -0.0014, {least}"));
+        assert_eq!(with(&|prices| prices.shading[2].pixel = -1.0), format!("`shading[2][3]` is -1, {least}"));
+        assert_eq!(with(&|prices| prices.shading[0].serial = 1.5), "`shading[0][4]` is 1.5, expected a part, 0 to 1");
+        let first = |prices: &mut Prices, of: fn(&mut Areas)| prices.areas.iter_mut().flatten().take(1).for_each(of);
+        assert_eq!(with(&|prices| first(prices, |a| a.setup = -1.0)), format!("`areas[0][0]` is -1, {least}"));
+        let falling = with(&|prices| first(prices, |a| a.polygon[3] = 0.0));
+        assert_eq!(falling, "`areas[0][1][3]` is 0, expected no less than for the smaller area before it");
+        // no number is written as null, and read at its line
+        assert!(with(&|prices| prices.pixel_s = f64::NAN).contains("invalid type: null, expected f64 at line"));
         for text in ["", "[]", "{}", &text[..text.len() / 2]] {
             assert!(refused(text, "one").contains("expected a table of prices"), "{text}");
         }

@@ -45,7 +45,7 @@ impl Drawing {
 
 /// Size and style of the pictures of a run.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct PictureFormat {
+pub struct PictureFormat {
     /// Size in pixels.
     pub size: Size,
     /// How they are drawn.
@@ -144,24 +144,41 @@ pub(super) fn frame_seen_by(
     drawing: &mut Drawing,
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
+    #[cfg(feature = "picture")]
+    if let Drawing::Every(screen) = drawing {
+        return draw_frame(session, camera, format, screen, skip);
+    }
     let PictureFormat { size, style } = format;
     let started = session.now();
     session.compose(camera, size, style, None);
-    let (draw, gpu) = match drawing {
-        #[cfg(feature = "picture")]
-        Drawing::Every(screen) => {
-            let composed = session.now();
-            screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
-            session.choose_next_frame(camera, size);
-            let gpu = screen.wait().map_err(SessionError::Draw)?;
-            (session.now().saturating_sub(composed), gpu)
-        }
-        _ => {
-            session.choose_next_frame(camera, size);
-            (session.spend_declared(size), None)
-        }
-    };
+    session.choose_next_frame(camera, size);
+    let draw = session.spend_declared(size);
     let work = session.now().saturating_sub(started);
+    Ok(session.finish(started, Finished { work, draw, gpu: None, skip }))
+}
+
+/// Gathers, chooses and draws a frame on `screen`, chooses the next one meanwhile, and updates the controller, unless it must not learn
+/// from this frame (`skip`).
+///
+/// # Errors
+/// [`SessionError::Draw`] where the adapter fails.
+#[cfg(feature = "picture")]
+pub fn draw_frame(
+    session: &mut Session,
+    camera: &Camera,
+    format: PictureFormat,
+    screen: &mut Offscreen,
+    skip: bool,
+) -> Result<FrameRecord, SessionError> {
+    let PictureFormat { size, style } = format;
+    let started = session.now();
+    session.compose(camera, size, style, None);
+    let composed = session.now();
+    screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
+    session.choose_next_frame(camera, size);
+    let gpu = screen.wait().map_err(SessionError::Draw)?;
+    let done = session.now();
+    let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
     Ok(session.finish(started, Finished { work, draw, gpu, skip }))
 }
 

@@ -50,7 +50,9 @@ pub use event_record::{Event, Sensing};
 pub use experiment::{Design, Experiment, ExperimentResult, experiment};
 #[cfg(feature = "picture")]
 pub use fly_through::FlyThrough;
-pub use headless::{Drawing, End, Headless, play_headless};
+#[cfg(feature = "picture")]
+pub use headless::draw_frame;
+pub use headless::{Drawing, End, Headless, PictureFormat, play_headless};
 pub use integrator_cost::solve_prices;
 pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 pub use parameter_sweep::{Played, Point, apply, method_of, play_points, setting_of};

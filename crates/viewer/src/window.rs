@@ -169,7 +169,7 @@ impl<'a> WindowSimulation<'a> {
     fn reset(&mut self) {
         let policy = self.session.policy_name();
         let control = self.session.control();
-        let (hz, law, sliders) = (control.target_hz(), control.law(), control.sliders());
+        let (hz, law, sliders) = (control.target_hz(), control.law(), control.given_sliders());
         self.restart(self.session.scene().clone());
         self.session.set_policy(policy);
         let control = self.session.control();
@@ -356,7 +356,10 @@ impl Simulation for WindowSimulation<'_> {
             Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
             Action::Policy(name) => self.session.set_policy(&name),
             Action::Law(law) => self.session.control().set_law(view_model::control_law(law)),
-            Action::Sliders(sliders) => self.session.control().set_sliders(sliders),
+            Action::Sliders(sliders) => {
+                let control = self.session.control();
+                control.set_sliders(control.given_sliders().moved(control.sliders(), sliders));
+            }
             Action::Freeze(frozen) => self.session.control().freeze(frozen),
             Action::Tune => self.tune(),
             Action::StopTuning => self.stop_tuning(),

@@ -231,7 +231,7 @@ impl Rigid {
         self
     }
 
-    /// What it says about its contacts: whom it meets, rules of pairs, whether it only senses.
+    /// What it says about its contacts: what it collides with, rules of pairs, whether it only senses.
     #[must_use]
     pub const fn contact(mut self, traits: ContactTraits) -> Self {
         self.spec.traits = traits;

@@ -54,7 +54,7 @@ pub trait Response: fmt::Debug + Sync {
 pub struct Member<'a> {
     /// The lower half of A = M + h C + h² S: symmetric and positive definite; kg, or kg m² for spins.
     pub blocks: &'a [Block],
-    /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that moves as it is told.
+    /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that is led.
     pub free: &'a [DVec3],
     /// The momentum that those velocities do not answer yet, A (v − v̂) of the velocity v that the body would have: kg m/s. Empty for none;
     /// what is given is solved for together with the contacts.
@@ -95,7 +95,7 @@ pub struct Contact {
     pub owed_slip_m: DVec3,
     /// The impulse of the last step, world axes, N·s; zero where there is none.
     pub warm_n_s: DVec3,
-    /// The load that its compliance is for where that is more, N·s (eq. 5): the most that it has lately borne; 0 for a new contact.
+    /// The load that its compliance is for where that is more, N·s (eq. 5): the most that it has carried lately; 0 for a new contact.
     pub load_n_s: f64,
 }
 

@@ -77,6 +77,9 @@ struct PressedRow {
     row: usize,
     contact: usize,
     reach_m: f64,
+    /// The bounds of its own.
+    low: f64,
+    high: f64,
 }
 
 impl Row {
@@ -201,10 +204,11 @@ impl Rows {
             self.push(Row::of_contact(contact, problem), &contact.sides, offsets);
         }
         for joint in problem.rows {
-            if let Some(Pressed { contact, reach_m }) = joint.pressed {
-                self.pressed.push(PressedRow { row: self.rows.len(), contact, reach_m });
+            let row = Row::of_joint(joint, problem.h_s);
+            if let (Some(Pressed { contact, reach_m }), Law::Between { low, high }) = (joint.pressed, row.law) {
+                self.pressed.push(PressedRow { row: self.rows.len(), contact, reach_m, low, high });
             }
-            self.push(Row::of_joint(joint, problem.h_s), &joint.sides, offsets);
+            self.push(row, &joint.sides, offsets);
         }
         for k in 0..self.rows.len() {
             let moving = self.velocity(k, free) - self.rows[k].surface;
@@ -233,12 +237,13 @@ impl Rows {
         self.rows.push(Row { start, end: self.terms.len(), ..row });
     }
 
-    /// Bounds rows by what presses their contacts in these impulses.
+    /// Bounds rows by what presses their contacts in these impulses, and by their own bounds.
     pub fn press(&mut self, impulses: &[DVec3]) {
-        for &PressedRow { row, contact, reach_m } in &self.pressed {
-            if let Law::Between { low, high } = &mut self.rows[row].law {
-                let most = reach_m * impulses[contact].x.max(0.0);
-                (*low, *high) = (-most, most);
+        for &PressedRow { row, contact, reach_m, low, high } in &self.pressed {
+            // one that nothing answers is idle
+            if let Law::Between { low: least, high: most } = &mut self.rows[row].law {
+                let pressed = reach_m * impulses[contact].x.max(0.0);
+                (*least, *most) = (low.max(-pressed), high.min(pressed));
             }
         }
     }

@@ -29,8 +29,10 @@ pub trait ClusterMember: Send {
     fn begin(&mut self, h_s: f64) -> Result<(), StepError>;
 
     /// The lower half of A = M + h C + h² K of the step begun: symmetric and positive definite, kg or kg·m². Blocks that never move
-    /// stand for themselves, and no side refers to them.
-    fn blocks(&self) -> &[Block];
+    /// stand for themselves, and no side refers to them. None of a body that is led.
+    fn blocks(&self) -> &[Block] {
+        &[]
+    }
 
     /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
     /// gradients solve the whole cluster.
@@ -40,7 +42,9 @@ pub trait ClusterMember: Send {
 
     /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`] says what it lacks it is
     /// near that: places are foreseen by it, and into how many parts the step is divided is seen by the solution.
-    fn free(&self) -> &[DVec3];
+    fn free(&self) -> &[DVec3] {
+        &[]
+    }
 
     /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.
     /// Empty for none.
@@ -49,7 +53,9 @@ pub trait ClusterMember: Send {
     }
 
     /// The velocity of each block now.
-    fn velocities(&self) -> &[DVec3];
+    fn velocities(&self) -> &[DVec3] {
+        &[]
+    }
 
     /// Hears before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
     fn leave(&mut self, unanswered: &[DVec3]) {
@@ -91,7 +97,10 @@ pub trait ClusterMember: Send {
     }
 
     /// The material point `anchor`; `None` for one that the body does not have.
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint>;
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let _ = anchor;
+        None
+    }
 
     /// How the matter at the material point `anchor` turns with the body's blocks; `None` where no block is a spin there.
     fn turn(&self, anchor: Anchor) -> Option<Side> {
@@ -192,11 +201,13 @@ pub trait ClusterMember: Send {
         let _ = number;
     }
 
-    /// Whether it has been still long enough to rest, as far as it can tell by itself.
-    fn is_calm(&self) -> bool;
+    /// Whether it has been still long enough to rest, as far as it can tell by itself; never of a body that does not rest.
+    fn is_calm(&self) -> bool {
+        false
+    }
 
     /// Stops it: it rests until something wakes it.
-    fn rest(&mut self);
+    fn rest(&mut self) {}
 
     /// The cost of the step begun, in the unit of [`metachron_core::StepReport::work`].
     fn work(&self) -> f64 {
@@ -207,7 +218,7 @@ pub trait ClusterMember: Send {
 /// How a member takes part in its cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
-    /// Moves as it is told; whatever it touches gives way. It has no blocks.
+    /// Moves as it is led; whatever it touches gives way. It has no blocks.
     Kinematic,
     /// Moves as a whole: its steps cost next to nothing, so it takes the shortest of its cluster.
     Rigid,

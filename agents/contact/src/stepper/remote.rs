@@ -343,8 +343,6 @@ impl ClusterMember for RemoteMember {
         true
     }
 
-    fn rest(&mut self) {}
-
     fn work(&self) -> f64 {
         0.0
     }

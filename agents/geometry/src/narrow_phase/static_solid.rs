@@ -91,6 +91,13 @@ impl StaticSolid {
         self.rotation
     }
 
+    /// Its shape where it is.
+    #[must_use]
+    pub const fn placed(&self) -> PlacedShape<'_> {
+        let view = ShapePose::Solid { position: self.position, rotation: self.rotation };
+        PlacedShape { form: &self.form, view }
+    }
+
     /// The box around it; that of a plane has no bounds.
     #[must_use]
     pub const fn bounds(&self) -> Aabb {
@@ -120,10 +127,7 @@ impl StaticSolid {
                 self.touch_slab(body, reach_m, scratch, into);
                 finish(into);
             }
-            None => {
-                let view = ShapePose::Solid { position: self.position, rotation: self.rotation };
-                touches(body, &PlacedShape { form: &self.form, view }, reach_m, scratch, into);
-            }
+            None => touches(body, &self.placed(), reach_m, scratch, into),
         }
     }
 

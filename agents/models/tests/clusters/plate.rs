@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::stepper::{ClusterMember, Role};
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Anchor, Body, Bounds, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport};
+use metachron_core::{Body, Bounds, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use std::sync::Arc;
 
@@ -87,10 +87,6 @@ impl ClusterMember for Plate {
         Side::node(0, 0)
     }
 
-    fn anchor(&self, _anchor: Anchor) -> Option<MaterialPoint> {
-        None
-    }
-
     fn keep(&mut self) {
         self.kept = (self.velocity[0], self.start);
     }
@@ -110,12 +106,6 @@ impl ClusterMember for Plate {
         self.place = self.start;
         Ok(())
     }
-
-    fn is_calm(&self) -> bool {
-        false
-    }
-
-    fn rest(&mut self) {}
 }
 
 impl Agent for Plate {

@@ -3,7 +3,7 @@
 use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed, spring};
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::{Block, Side};
+use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState};
@@ -192,18 +192,6 @@ impl ClusterMember for Pusher {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &[]
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &[]
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &[]
-    }
-
     fn skin(&self) -> Option<PlacedShape<'_>> {
         let view = ShapePose::Solid { position: self.place, rotation: DQuat::IDENTITY };
         Some(PlacedShape { form: &self.form, view })
@@ -240,12 +228,6 @@ impl ClusterMember for Pusher {
     fn go_back(&mut self) {
         self.place = self.kept;
     }
-
-    fn is_calm(&self) -> bool {
-        false
-    }
-
-    fn rest(&mut self) {}
 }
 
 impl Agent for Pusher {

@@ -186,6 +186,24 @@ fn a_sensor_sees_what_shoots_through_it_within_a_step() {
 }
 
 #[test]
+fn a_small_static_sensor_is_sensed_from_within_a_large_body() {
+    let traits = ContactTraits { is_sensor: true, ..ContactTraits::default() };
+    let small = Solid::Box { half_extents_m: DVec3::splat(0.01) };
+    // a hull whose origin is beside it
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|at| DVec3::X + at * 0.01);
+    let hull = Solid::Hull { points_m: corners.into() };
+    for (solid, position) in [(small, DVec3::ZERO), (hull, -DVec3::X)] {
+        let probe = Obstacle { solid, position, ..floor(traits) };
+        let large = RigidSpec { velocity: DVec3::X, gravity: DVec3::ZERO, ..ball(0.3, -DVec3::X) };
+        let mut table = at_rate(Table::among(vec![body(large)], &[probe]), 240.0);
+        let inside = sensed(&mut table, 0, SensorPartner::Static(0), 1.0);
+        assert_eq!((inside.touching, inside.begins, inside.ends), (true, 1, 0));
+        let beyond = sensed(&mut table, 0, SensorPartner::Static(0), 1.5);
+        assert_eq!((beyond.touching, beyond.begins, beyond.ends), (false, 1, 1));
+    }
+}
+
+#[test]
 fn a_body_that_is_a_sensor_tells_of_another_body_each_time_and_neither_is_moved() {
     let traits = ContactTraits { is_sensor: true, ..ContactTraits::default() };
     let eye = RigidSpec { traits, gravity: DVec3::ZERO, ..ball(0.1, DVec3::ZERO) };

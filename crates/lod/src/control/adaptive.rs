@@ -108,7 +108,9 @@ impl AdaptiveChoice {
         self.law.finished(frame, TICKS * work_s);
         let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
         let spent_s = plan.predicted / TICKS - fixed_s;
+        let in_time = work_s <= (1.0 - self.margin()) * target_s;
         self.status = match () {
+            () if !plan.feasible && in_time && others_s > 0.0 => Status::Reserved,
             () if !plan.feasible => Status::Clamped(Bound::Coarsest),
             () if missing.abs() > ON_TARGET => Status::Moving,
             () if plan.lambda == 0.0 => Status::Clamped(Bound::Finest),

@@ -89,10 +89,11 @@ impl Forest {
     /// Benefits include hysteresis by the cut of the frame before.
     fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors, last: &BTreeMap<AgentId, Level>) -> Self {
         let entries = |at: usize, rungs: &[Rung], weight: f64| {
-            let before = last.get(&query.views[at].view.id).copied().flatten();
-            let stays = |level| before.is_none_or(|before| before == level);
+            // what was open, or in a closed group, was drawn by none of its own; what is new has nothing to stay with
+            let before = last.get(&query.views[at].view.id);
+            let stays = |level| before.is_none_or(|before| *before == level);
             let entry = |(level, rung): (u32, &Rung)| {
-                query.entry(if stays(level) { weight } else { (1.0 - CHANGED) * weight }, rung)
+                query.entry(if stays(Some(level)) { weight } else { (1.0 - CHANGED) * weight }, rung)
             };
             (0..).zip(rungs).map(entry).collect()
         };
@@ -244,6 +245,31 @@ mod tests {
         // that would take most of the time has none
         assert!(least[0] > 0.8 && least[1] > 0.6 && least[2] > 0.5, "{least:?}");
         assert!(inner > 0 && outer > 0, "finer impostors are drawn: {inner} {outer}");
+    }
+
+    #[test]
+    fn impostors_of_an_open_group_count_less_than_what_is_drawn() {
+        let (views, sliders) = (rows(), Sliders::default());
+        let (mut ladders, mut groups) = (Ladders::default(), Groups::default());
+        ladders.update(&views, false, &Prices::default(), &sliders);
+        groups.update(&views);
+        let query = query(&views, &ladders, &sliders, 100e-6);
+        let mut hierarchy = Hierarchy::default();
+        let mut levels: Vec<_> = views.iter().map(|seen| unseen(&seen.view)).collect();
+        hierarchy.choose(Policy::Hierarchical, &query, &groups, &mut levels);
+        let of = |last| Forest::of(&query, &groups, &hierarchy.impostors, last);
+        let (now, fresh) = (of(&hierarchy.last), of(&BTreeMap::new()));
+        let mut open = 0;
+        for (at, object) in now.objects.iter().enumerate().filter_map(|(node, object)| Some((node, (*object)?))) {
+            let drawn = hierarchy.last[&views[object].view.id];
+            open += usize::from(drawn.is_none() && views[object].view.is_group());
+            for (level, (entry, full)) in (0..).zip(now.nodes[at].impostors.iter().zip(&fresh.nodes[at].impostors)) {
+                let wanted = if drawn == Some(level) { 1.0 } else { 1.0 - CHANGED };
+                let counts = entry.benefit as f64 / full.benefit as f64;
+                assert!((counts - wanted).abs() < 1e-3, "object {object}, level {level}: {counts}");
+            }
+        }
+        assert!(open > 0, "{:?}", hierarchy.last);
     }
 
     /// The default policy after sixty frames; its value in the unit of the others.

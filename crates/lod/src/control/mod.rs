@@ -32,7 +32,7 @@ mod tolerance;
 mod vanish;
 mod view;
 
-pub use crate::cost::benefit::Sliders;
+pub use crate::cost::benefit::{GivenSliders, Sliders};
 pub use crate::cost::stages::Stages;
 pub use crate::cost::value::Value;
 pub use area::{AREAS_PX, Areas};

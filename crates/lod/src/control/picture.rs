@@ -27,7 +27,7 @@ use super::status::Status;
 use super::vanish::Vanish;
 use super::view::ObjectView;
 use crate::adaptive::DEFAULT_MARGIN;
-use crate::cost::benefit::Sliders;
+use crate::cost::benefit::GivenSliders;
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
 use ahead::Ahead;
@@ -52,8 +52,8 @@ pub struct PictureControl {
     target_hz: f64,
     /// The fraction of a frame to be left free, if the user sets one.
     margin: Option<f64>,
-    /// How much each factor counts in a benefit, if scene or user say.
-    sliders: Option<Sliders>,
+    /// How much a factor counts in a benefit, where scene or user say.
+    sliders: GivenSliders,
     value: Value,
     prices: Prices,
     backdrop: Backdrop,
@@ -100,7 +100,7 @@ impl PictureControl {
             policy,
             target_hz,
             margin: None,
-            sliders: None,
+            sliders: GivenSliders::default(),
             value: Value::Plain,
             prices: Prices::default(),
             backdrop: Backdrop::default(),
@@ -143,10 +143,12 @@ impl PictureControl {
         let overhead_s = work_s - drawn_s;
         self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
         let target_s = self.target_s();
+        // by the prices that the frame was drawn with: its scale and shadows may change now
+        let (backdrop_s, objects_s) =
+            (self.picture_prices().backdrop_s(self.backdrop), self.drawn_s(&self.plan.levels));
         self.observe_scale(work_s, drawn_s);
         if self.policy.predicts() {
-            let priced_s = self.prices.backdrop_s(self.backdrop) + self.drawn_s(&self.plan.levels);
-            self.logic.observe(frame.beside.as_secs_f64(), priced_s, drawn_s);
+            self.logic.observe(frame.beside.as_secs_f64(), backdrop_s + objects_s, drawn_s);
         }
         if !steers(&self.views) {
             return;
@@ -157,7 +159,7 @@ impl PictureControl {
             Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
-                let drawn_s = (drawn_s - self.picture_prices().backdrop_s(self.backdrop)).max(0.0);
+                let drawn_s = (drawn_s - backdrop_s).max(0.0);
                 self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
             }
             _ => {}

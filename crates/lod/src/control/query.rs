@@ -36,7 +36,7 @@ pub(super) struct FrameQuery<'a> {
     pub margin: f64,
     /// Time that is spent whatever is chosen, seconds, ≥ 0.
     pub fixed_s: f64,
-    /// Whether Robin Hood shares once more what nobody took.
+    /// Whether Robin Hood shares once more what no object took.
     pub spend_rest: bool,
     /// Which objects are left out of this frame; empty for none.
     pub out: &'a [bool],

@@ -21,6 +21,8 @@ pub enum Status {
     Clamped(Bound),
     /// Everything is at its coarsest, and the work is on target because the picture is drawn with fewer pixels.
     Reduced,
+    /// Everything is at its coarsest and frames are in time, but they take some of the time that is reserved for others.
+    Reserved,
     /// There is time left, but the next finer level would be late.
     BetweenLevels,
     /// Nothing in view can be drawn in more than one way.
@@ -62,6 +64,9 @@ impl fmt::Display for Status {
             Self::Clamped(Bound::Finest) => "at its finest: ε may not be finer, and there is time left",
             Self::Clamped(Bound::Coarsest) => "at its coarsest: ε may not be coarser, and frames still take too long",
             Self::Reduced => "at its coarsest, and on target with fewer pixels",
+            Self::Reserved => {
+                "at its coarsest: frames are in time, but take some of the time that is reserved for agents"
+            }
             Self::BetweenLevels => "between levels: there is time left, but the next finer level would be late",
             Self::Fixed => "fixed: nothing in view has a range to choose from",
             Self::Full => "full detail: the frame time is ignored",

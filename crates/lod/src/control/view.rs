@@ -103,7 +103,8 @@ const SPEED_HALF_PX_S: f64 = 600.0;
 
 impl ObjectView {
     /// Whether the object is a group.
-    pub(super) fn is_group(&self) -> bool {
+    #[must_use]
+    pub fn is_group(&self) -> bool {
         matches!(self.kind, Kind::Group { .. })
     }
 

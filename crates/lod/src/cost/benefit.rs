@@ -69,6 +69,67 @@ impl Default for Sliders {
     }
 }
 
+/// Sliders that scene or user has set; the others follow the policy.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GivenSliders {
+    /// [`Sliders::size`], if set.
+    pub size: Option<f64>,
+    /// [`Sliders::accuracy`], if set.
+    pub accuracy: Option<f64>,
+    /// [`Sliders::importance`], if set.
+    pub importance: Option<f64>,
+    /// [`Sliders::focus`], if set.
+    pub focus: Option<f64>,
+    /// [`Sliders::motion`], if set.
+    pub motion: Option<f64>,
+    /// [`Sliders::hysteresis`], if set.
+    pub hysteresis: Option<f64>,
+}
+
+impl GivenSliders {
+    /// All sliders, those that are not set from `usual`.
+    #[must_use]
+    pub fn over(self, usual: Sliders) -> Sliders {
+        Sliders {
+            size: self.size.unwrap_or(usual.size),
+            accuracy: self.accuracy.unwrap_or(usual.accuracy),
+            importance: self.importance.unwrap_or(usual.importance),
+            focus: self.focus.unwrap_or(usual.focus),
+            motion: self.motion.unwrap_or(usual.motion),
+            hysteresis: self.hysteresis.unwrap_or(usual.hysteresis),
+        }
+    }
+
+    /// The same after sliders that stood at `from` were moved to `to`: those that moved are set as well.
+    #[must_use]
+    pub fn moved(self, from: Sliders, to: Sliders) -> Self {
+        let set = |given: Option<f64>, from: f64, to: f64| if from == to { given } else { Some(to) };
+        Self {
+            size: set(self.size, from.size, to.size),
+            accuracy: set(self.accuracy, from.accuracy, to.accuracy),
+            importance: set(self.importance, from.importance, to.importance),
+            focus: set(self.focus, from.focus, to.focus),
+            motion: set(self.motion, from.motion, to.motion),
+            hysteresis: set(self.hysteresis, from.hysteresis, to.hysteresis),
+        }
+    }
+}
+
+impl From<Sliders> for GivenSliders {
+    /// All of them are set.
+    fn from(all: Sliders) -> Self {
+        let Sliders { size, accuracy, importance, focus, motion, hysteresis } = all;
+        Self {
+            size: Some(size),
+            accuracy: Some(accuracy),
+            importance: Some(importance),
+            focus: Some(focus),
+            motion: Some(motion),
+            hysteresis: Some(hysteresis),
+        }
+    }
+}
+
 /// The error of a surface drawn with one sample.
 pub const BASE_ERROR: f64 = 0.5;
 

@@ -39,9 +39,15 @@ fn best_single(tree: &Tree) -> Option<Vec<Level>> {
     let mut around = alloc::vec![Entry::default(); tree.len()];
     let mut best: Option<(u64, usize, u32)> = None;
     for &node in tree.order() {
+        // its parent's, and the siblings before and after it; sums that saturate cannot be taken apart again
+        let (mut before, mut after) = (around[node], Entry::default());
         for &child in tree.children(node) {
-            let siblings = tree.children(node).iter().filter(|&&other| other != child).map(|&other| base[other]);
-            around[child] = siblings.fold(around[node], sum);
+            around[child] = before;
+            before = sum(before, base[child]);
+        }
+        for &child in tree.children(node).iter().rev() {
+            around[child] = sum(around[child], after);
+            after = sum(after, base[child]);
         }
         for (level, &own) in (0..).zip(tree.impostors(node)) {
             let all = sum(own, around[node]);

@@ -148,7 +148,7 @@ fn is_at_end(candidate: Candidate, status: Status, polygons: f64, views: &[Objec
                 Bound::Coarsest => polygons <= (1.0 + NEAR) * least,
             }
         }
-        Status::Clamped(_) | Status::BetweenLevels | Status::Fixed => true,
+        Status::Clamped(_) | Status::Reserved | Status::BetweenLevels | Status::Fixed => true,
         _ => false,
     }
 }

@@ -102,6 +102,49 @@ fn reach_of(cells: &Cells, eye: DVec3, ray: DVec3) -> f64 {
     }
 }
 
+/// The balls with a part in a region that the eye reaches, one by one; of those that are outside alone the ones in view.
+fn in_reach(view: &SceneView) -> u64 {
+    let outside = view.survey.reach.is_reached(Region::Outside);
+    let is_in_reach = |seen: &&Visibility| {
+        let (low, high) = (seen.centre_m - seen.radius_m, seen.centre_m + seen.radius_m);
+        let is_in = |(cell, is_reached): (Cell, bool)| is_reached && cell.overlaps(low, high);
+        match view.survey.cells.exposure(low, high) {
+            Exposure::Outside => seen.visible,
+            exposure => outside && exposure == Exposure::Partly || view.cells().any(is_in),
+        }
+    };
+    view.seen().iter().filter(is_in_reach).count() as u64
+}
+
+#[test]
+fn impostors_of_groups_are_not_counted_and_what_moves_is_counted_anew() {
+    let cell = Cell { low_m: DVec3::ZERO, high_m: DVec3::splat(4.0) };
+    let cells = Cells::new(
+        vec![cell, Cell { low_m: cell.low_m + DVec3::X * 4.0, high_m: cell.high_m + DVec3::X * 4.0 }],
+        vec![],
+    );
+    let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
+    let ball = |id| Actor { id: AgentId(id), form: Form::Solid(Solid::Ball { radius_m: 0.1 }), appearance };
+    let mut view = SceneView::new((0..4).map(ball).collect(), vec![]);
+    view.set_cells(cells.unwrap());
+    view.set_impostors(1);
+    let put = |view: &mut SceneView, id: u32, at: DVec3, steps: u64| {
+        let body = Body::Rigid(RigidState { position: at, ..RigidState::default() });
+        let time = SimTime::from_nanos(1_000_000 * steps);
+        view.set_snapshot(AgentId(id), &Arc::new(Snapshot { time, steps, body, ..Snapshot::default() }), true);
+        view.pose(time, States::Latest);
+        view.survey(&Camera::looking(DVec3::new(0.5, 2.0, 2.0), DVec3::new(2.0, 2.0, 2.0), 0.8), SIZE);
+        let VisibleCounts { potentially_visible, visible } = view.visible_counts();
+        (potentially_visible, visible)
+    };
+    // in view, behind the eye, in the next room, and an impostor in view
+    let places = [DVec3::new(2.0, 2.0, 2.0), DVec3::new(0.2, 2.0, 2.0), DVec3::new(6.0, 2.0, 2.0), DVec3::splat(2.0)];
+    let all: Vec<_> = (0..4).map(|id| put(&mut view, id, places[id as usize], 1)).collect();
+    assert_eq!(all[3], (2, 1));
+    assert_eq!(put(&mut view, 2, DVec3::new(3.0, 2.0, 2.0), 2), (3, 2), "into the room of the eye");
+    assert_eq!(put(&mut view, 0, DVec3::new(6.0, 2.0, 2.0), 3), (2, 1), "out of it");
+}
+
 #[test]
 fn no_object_that_a_ray_sees_is_missed() {
     let mut random = Random(1993);
@@ -115,6 +158,7 @@ fn no_object_that_a_ray_sees_is_missed() {
             let eye = cell.low_m + (cell.high_m - cell.low_m) * (1.2 * random.point() - 0.1);
             let camera = Camera::looking(eye, eye + random.point() - 0.5, 0.9);
             scene_view.survey(&camera, SIZE);
+            assert_eq!(scene_view.visible_counts().potentially_visible, in_reach(&scene_view), "{name} from {eye}");
             let frustum = camera.frustum(SIZE);
             let is_seen = |at: usize| scene_view.seen()[at].visible;
             in_frustum += balls.iter().filter(|(centre, radius_m)| frustum.sees(*centre, *radius_m)).count();

@@ -10,9 +10,14 @@ use std::collections::BTreeSet;
 /// Most collision groups of a scene: a bit each.
 const GROUPS_MAX: usize = 32;
 
-/// The names of the collision groups of a scene; the place of a name is that of its bit, and behind those are the names that have none.
+/// The names of the collision groups of a scene.
 #[derive(Debug, Default)]
-pub(super) struct GroupNames(Vec<String>);
+pub(super) struct GroupNames {
+    /// The place of a name is that of its bit.
+    bits: Vec<String>,
+    /// Those for which there is none; they are reported.
+    refused: BTreeSet<String>,
+}
 
 impl GroupNames {
     /// The groups that any of these objects is in.
@@ -31,7 +36,7 @@ impl GroupNames {
                 }
             }
         }
-        Self(names.into_iter().chain(refused).collect())
+        Self { bits: names.into_iter().collect(), refused }
     }
 
     /// The bits of some groups; all where no list is given.
@@ -39,12 +44,11 @@ impl GroupNames {
         let Some(given) = given else { return u32::MAX };
         let mut bits = 0;
         for (at, name) in given.iter().enumerate() {
-            match self.0.iter().position(|one| one == name) {
-                Some(bit) if bit < GROUPS_MAX => bits |= 1 << bit,
-                // reported
-                Some(_) => {}
+            match self.bits.iter().position(|one| one == name) {
+                Some(bit) => bits |= 1 << bit,
+                None if self.refused.contains(name) => {}
                 None => {
-                    c.reference(place, &format!("{key}.{at}"), name, self.0.iter().map(String::as_str));
+                    c.reference(place, &format!("{key}.{at}"), name, self.bits.iter().map(String::as_str));
                 }
             }
         }

@@ -127,7 +127,18 @@ fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &
         let groups = files.iter().map(|file| &file.name).zip(&mut owners.groups);
         let groups = groups.filter(|(name, _)| *name != itself || *name == wanted);
         let mut found = 0;
+        let vanishes =
+            |name: &str| objects.scenery.iter().any(|it| it.name == name && it.appearance.may_vanish == Some(true));
         for (name, owner) in scenery.chain(groups).filter(|(name, _)| is_meant(name, wanted)) {
+            if vanishes(name) {
+                let what = format_args!("names `{name}`, whose `may_vanish = true` has no effect in a group");
+                return c.wrong(
+                    place,
+                    &key,
+                    what,
+                    "expected members without it: where time is short, the group's mesh is drawn",
+                );
+            }
             if owner.is_some_and(|other| other != number) {
                 let what = format_args!("names `{name}`, which is in another group");
                 return c.wrong(place, &key, what, "expected every object in one group at most");
@@ -136,7 +147,9 @@ fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &
             found += 1;
         }
         if found == 0 {
-            c.reference(place, &key, wanted, objects.names.only(|named| named == NamedObject::Scenery));
+            let groups = files.iter().map(|file| file.name.as_str()).filter(|name| *name != itself);
+            let known = objects.names.only(|named| named == NamedObject::Scenery).chain(groups);
+            c.reference(place, &key, wanted, known);
         }
     }
 }
@@ -198,6 +211,32 @@ mod tests {
         // the impostor of all of them spans the four of them
         let extent = all.proxy.model.extent();
         assert!(extent.radius > 4.5, "{extent:?}");
+    }
+
+    #[test]
+    fn a_misspelt_member_is_answered_by_the_name_that_is_near() {
+        let object = nested(&[("g", "\"b_1\"")]).unwrap_err();
+        assert!(object.contains("did you mean `b-1`?"), "{object}");
+        let group = nested(&[("left", "\"b-0\""), ("all", "\"lefft\", \"b-1\"")]).unwrap_err();
+        assert!(group.contains("names `lefft`, which does not exist") && group.contains("did you mean `left`?"));
+    }
+
+    #[test]
+    fn a_member_that_is_said_to_vanish_is_refused() {
+        let text = |of: &str| {
+            format!(
+                "format = 1\n[[object]]\nname = \"b\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n{of}[[group]]\nname = \"g\"\nmembers = [\"b\"]\n"
+            )
+        };
+        let refused = |of: &str| {
+            let text = text(of);
+            let loaded = Source::memory("vanish", text.as_bytes()).and_then(|source| load(&source, &[]));
+            loaded.err().map(|error| (error.problems[0].message.clone(), error.problems[0].text.clone()))
+        };
+        let (message, text) = refused("may_vanish = true\n").unwrap();
+        assert_eq!(message, "`members` of group `g` names `b`, whose `may_vanish = true` has no effect in a group");
+        assert_eq!(text, "\"b\"");
+        assert_eq!((refused("may_vanish = false\n"), refused("")), (None, None));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `contact` of an object: whom it meets, how a pair shares its coefficients, whether it only senses.
+//! `contact` of an object: what it collides with, how a pair shares its coefficients, whether it only senses.
 
 use schemars::JsonSchema;
 use serde::Deserialize;

@@ -145,8 +145,8 @@ pub struct ClusterRow {
     pub members: Vec<String>,
     /// The last macro step, milliseconds.
     pub h_ms: f64,
-    /// Share of the macro step that its turn leaves unused, by the present cost of its members' steps: 1 where steps cost nothing, below zero
-    /// where it cannot keep up with time.
+    /// Share of the macro step that its turn leaves unused, by the wall time of its leader's turns, in which threads may help: 1 where they
+    /// cost nothing, below zero where it cannot keep up with time.
     pub slack: f64,
     /// Steps of each member within it.
     pub steps: Vec<u32>,

@@ -7,8 +7,8 @@ use super::super::cpu_budget::{FrameLoop, FramePeriod};
 use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
-use metachron_lod::control::Backdrop;
-use metachron_render::{Camera, Hand, Picture, Size, Style};
+use metachron_lod::control::{Backdrop, ObjectView};
+use metachron_render::{Camera, Hand, Level, Picture, Size, Style};
 use metachron_runtime::AgentHandle;
 use std::time::Duration;
 
@@ -38,7 +38,7 @@ impl Session {
     pub fn spend_declared(&mut self, size: Size) -> Duration {
         let Chosen { cull, select, select_next, objects_s, other_triangles, .. } = self.chosen;
         let backdrop = self.backdrop(size, other_triangles);
-        let seconds = self.declared.backdrop_s(backdrop) + objects_s;
+        let seconds = self.declared.with_shadows(self.control.shadows()).backdrop_s(backdrop) + objects_s;
         let draw = self.machine.frame_time(seconds, self.frames(), self.now());
         let (started, next) = (self.now(), select_next.unwrap_or_default());
         if self.shares_processor {
@@ -74,8 +74,8 @@ impl Session {
         self.levels.extend(self.views.iter().zip(&plan.levels).map(|(view, demand)| assemble::level(view, demand)));
         let counts = self.scene_view.visible_counts();
         (self.chosen.objects, self.chosen.potentially_visible) = (counts.visible, counts.potentially_visible);
-        let drawn = self.views.iter().zip(&self.levels).filter(|(view, level)| view.visible && level.triangles > 0);
-        self.chosen.drawn = drawn.count() as u64;
+        let is_drawn = |(view, level): &(&ObjectView, &Level)| view.visible && level.triangles > 0 && !view.is_group();
+        self.chosen.drawn = self.views.iter().zip(&self.levels).filter(is_drawn).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
         let declared = self.declared.with_shadows(self.control.shadows());
         self.chosen.objects_s = declared.objects_s(self.views.iter(), &plan.levels);

@@ -17,9 +17,9 @@ impl Session {
     #[must_use]
     pub fn clamp(&self) -> Option<String> {
         let status = self.control.status();
-        let mut said = matches!(status, Status::Clamped(_) | Status::Reduced | Status::BetweenLevels | Status::Fixed)
-            .then(|| status.to_string())?;
-        if status == Status::Clamped(Bound::Coarsest)
+        let rests = matches!(status, Status::Clamped(_) | Status::Reduced | Status::BetweenLevels | Status::Fixed);
+        let mut said = (rests || status == Status::Reserved).then(|| status.to_string())?;
+        if matches!(status, Status::Clamped(Bound::Coarsest) | Status::Reserved)
             && let Some(parts) = parts(self.newest_frames(FRAMES))
         {
             said += &parts;
@@ -39,12 +39,11 @@ impl Session {
     }
 }
 
-/// What frames take their time for, in the mean: the drawing, finding what is seen and choosing, and the rest, which is panels and
-/// presenting; `None` without a frame.
+/// What frames take their time for, in the mean: the drawing, finding what is seen and choosing before it, and the rest, which is panels and
+/// presenting; `None` without a frame. What is found and chosen for the next frame is done while this one is drawn, and not counted again.
 fn parts(frames: &[FrameRecord]) -> Option<String> {
     let mean = |of: fn(&FrameRecord) -> f64| frames.iter().map(of).sum::<f64>() / frames.len() as f64;
-    let [all, draw, choose] =
-        [mean(|row| row.frame_ms), mean(|row| row.draw_ms), mean(|row| row.cull_ms + row.select_ms)];
+    let [all, draw, choose] = [mean(|row| row.frame_ms), mean(|row| row.draw_ms), mean(|row| row.lag_ms - row.draw_ms)];
     let rest = (all - draw - choose).max(0.0);
     (!frames.is_empty()).then(|| {
         format!(
@@ -58,9 +57,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_of_late_frames_are_told_and_add_up() {
-        let row =
-            |frame_ms| FrameRecord { frame_ms, draw_ms: 30.0, cull_ms: 0.5, select_ms: 1.5, ..FrameRecord::default() };
+    fn the_parts_of_late_frames_add_up_with_the_next_choice_inside_the_drawing() {
+        let row = |frame_ms| FrameRecord {
+            frame_ms,
+            draw_ms: 30.0,
+            lag_ms: 32.0,
+            cull_ms: 0.5,
+            select_ms: 9.5,
+            ..FrameRecord::default()
+        };
         assert_eq!(parts(&[]), None);
         let said = parts(&[row(40.0), row(44.0)]).unwrap();
         assert_eq!(said, ": of 42.0 ms drawing takes 30.0, finding and choosing 2.0, panels and presenting 10.0");

@@ -44,6 +44,27 @@ fn a_body_on_one_point_loses_its_spin_by_reach_times_its_weight_by_every_way() {
     }
 }
 
+#[test]
+fn a_row_that_is_pressed_gives_no_more_than_its_own_bounds_allow() {
+    let (mass, reach_m, spin) = (2.0, 0.01, 3.0);
+    let body = Body { free: vec![DVec3::Z * (-G * H_S), DVec3::Z * spin], ..rigid(mass, DVec3::splat(0.1)) };
+    let inertia = body.blocks[SPIN].value.z_axis.z;
+    let touch = contact([Side::rigid(0, DVec3::Z * -0.1), Side::FIXED], DVec3::Z);
+    let pressed = reach_m * mass * G * H_S;
+    for (own, wanted) in [(0.25 * pressed, 0.25 * pressed), (4.0 * pressed, pressed), (0.0, 0.0)] {
+        for convex_only in [false, true] {
+            let hold = Hold::motor(DVec3::Z, own);
+            let row = JointRow { hold, ..spin_of(0, [Side::node(0, SPIN), Side::FIXED], DVec3::Z, reach_m) };
+            let case = Case { h_s: H_S, bodies: vec![body.clone()], contacts: vec![touch], rows: vec![row] };
+            let mut solver = Solver::new(Settings { convex_only, ..Settings::default() });
+            let after = case.with(|problem| solver.solve(problem).unwrap().velocities(0)[SPIN].z);
+            let given = inertia * (spin - after);
+            // the contact gives way by v_s, and presses by that much less
+            assert!((given - wanted).abs() < 1e-2 * pressed, "{own}, convex only: {convex_only}: {given} of {wanted}");
+        }
+    }
+}
+
 /// Boxes on each other and on the ground, on one to three points each, spinning.
 fn pile(seed: u64) -> Case {
     let mut random = Seeded::new(seed);

@@ -80,18 +80,22 @@ impl Search {
         let Self { touches: into, scratch, point, .. } = self;
         let Some(here) = round.all[pair.member].member.skin() else { return false };
         into.clear();
-        match pair.against {
-            Against::Own => {}
-            Against::Static { solid, .. } => {
-                point.at(&here).into_iter().for_each(|inside| solid.touches(&inside, 0.0, scratch, into));
+        let there = match pair.against {
+            Against::Own => return false,
+            Against::Static { solid, .. } => solid.placed(),
+            Against::Member(other) => match round.all[other].member.skin() {
+                Some(there) => there,
+                None => return false,
+            },
+        };
+        if let Some(inside) = point.at(&here) {
+            match pair.against {
+                Against::Static { solid, .. } => solid.touches(&inside, 0.0, scratch, into),
+                _ => touches(&inside, &there, 0.0, scratch, into),
             }
-            Against::Member(other) => {
-                let Some(there) = round.all[other].member.skin() else { return false };
-                for (one, all) in [(&here, &there), (&there, &here)] {
-                    let inside = point.at(one).filter(|_| into.is_empty());
-                    inside.into_iter().for_each(|inside| touches(&inside, all, 0.0, scratch, into));
-                }
-            }
+        }
+        if let Some(inside) = point.at(&there).filter(|_| into.is_empty()) {
+            touches(&inside, &here, 0.0, scratch, into);
         }
         into.iter().any(|touch| touch.gap_m < 0.0)
     }
@@ -108,9 +112,12 @@ impl Default for Point {
 }
 
 impl Point {
-    /// It where a point of a body is.
+    /// It where a point of a body is: of what has one on its skin that one, as its middle may be beside it.
     fn at(&self, body: &PlacedShape<'_>) -> Option<PlacedShape<'_>> {
         let position = match (body.view, &body.form.kind) {
+            (ShapePose::Solid { position, rotation }, ShapeKind::Solid(SolidShape { solid, com_local, .. })) => {
+                position + rotation * (corner(solid).unwrap_or(*com_local) - *com_local)
+            }
             (ShapePose::Solid { position, .. }, _) => position,
             (ShapePose::Tool { tip, .. }, _) => tip,
             (ShapePose::Chain { positions, .. }, _) => *positions.first()?,
@@ -119,5 +126,14 @@ impl Point {
         };
         let view = ShapePose::Solid { position, rotation: DQuat::IDENTITY };
         Some(PlacedShape { form: self.0.as_ref()?, view })
+    }
+}
+
+/// A point of the skin, in the solid's own axes, of one that is made of points.
+fn corner(solid: &Solid) -> Option<DVec3> {
+    match solid {
+        Solid::Hull { points_m } => points_m.first().copied(),
+        Solid::Mesh { points_m, triangles } => points_m.get(triangles.first()?[0] as usize).copied(),
+        _ => None,
     }
 }

@@ -4,7 +4,7 @@
 
 use super::super::super::chart::GRAVITY;
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::{Block, Side};
+use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, Resolution, SimSpan, Snapshot, StepError, StepReport};
@@ -54,18 +54,6 @@ impl ClusterMember for ShakenFloor {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &[]
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &[]
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &[]
-    }
-
     fn skin(&self) -> Option<PlacedShape<'_>> {
         let view = ShapePose::Solid { position: self.middle(), rotation: DQuat::IDENTITY };
         Some(PlacedShape { form: &self.form, view })
@@ -102,12 +90,6 @@ impl ClusterMember for ShakenFloor {
     fn go_back(&mut self) {
         self.time_s = self.kept_s;
     }
-
-    fn is_calm(&self) -> bool {
-        false
-    }
-
-    fn rest(&mut self) {}
 }
 
 impl Agent for ShakenFloor {

@@ -122,7 +122,7 @@ impl Row {
 }
 
 /// The value that a share `share` of some numbers, 0 … 1, does not exceed (the nearest rank); NaN for no numbers.
-fn within(x: &[f64], share: f64) -> f64 {
+pub(super) fn within(x: &[f64], share: f64) -> f64 {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);
     let rank = (share * x.len() as f64).ceil() as usize;

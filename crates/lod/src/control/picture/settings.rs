@@ -7,7 +7,7 @@ use super::super::price::{Backdrop, Prices};
 use super::super::quality_boost::QualityBoost;
 use super::super::render_scale::PictureRung;
 use super::PictureControl;
-use crate::cost::benefit::Sliders;
+use crate::cost::benefit::{GivenSliders, Sliders};
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
 use std::time::Duration;
@@ -17,9 +17,9 @@ impl PictureControl {
     pub fn set_policy(&mut self, policy: Policy) {
         if policy != self.policy {
             self.ahead = None;
-            let other = policy.prices(&self.prices) != self.policy.prices(&self.prices);
+            let before = (self.policy.prices(&self.prices), self.policy.sliders(self.sliders()));
             self.policy = policy;
-            if other {
+            if (self.policy.prices(&self.prices), self.policy.sliders(self.sliders())) != before {
                 self.forget_ladders();
             }
             self.raise = self.raise.map(|_| QualityBoost::default());
@@ -49,18 +49,25 @@ impl PictureControl {
         self.margin = margin.is_finite().then(|| margin.clamp(0.0, 0.9));
     }
 
-    /// Changes how much each factor counts in the benefit of a level.
-    pub fn set_sliders(&mut self, sliders: Sliders) {
-        if sliders != self.sliders() {
-            self.sliders = Some(sliders);
+    /// Changes how much factors count in the benefit of a level; those that are not set follow the policy.
+    pub fn set_sliders(&mut self, given: impl Into<GivenSliders>) {
+        let before = self.sliders();
+        self.sliders = given.into();
+        if self.sliders() != before {
             self.forget_ladders();
         }
+    }
+
+    /// The sliders that are set.
+    #[must_use]
+    pub fn given_sliders(&self) -> GivenSliders {
+        self.sliders
     }
 
     /// How much each factor counts in the benefit of a level.
     #[must_use]
     pub fn sliders(&self) -> Sliders {
-        self.sliders.unwrap_or(self.policy.usual_sliders())
+        self.sliders.over(self.policy.usual_sliders())
     }
 
     /// Changes the value formula of Robin Hood.

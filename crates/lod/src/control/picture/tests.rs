@@ -4,6 +4,7 @@ mod ahead;
 mod groups;
 mod papers;
 mod policies;
+mod scaled;
 mod vanishing;
 
 use super::super::view::{Kind, Shading};

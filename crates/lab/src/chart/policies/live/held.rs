@@ -7,13 +7,13 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::super::table::Table;
-use super::super::metrics::mean;
+use super::super::metrics::{mean, within};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};
 use metachron_scene::{builtin, load};
 use metachron_session::report::MISS;
-use metachron_session::{Finished, FrameRecord, Session};
+use metachron_session::{FrameRecord, PictureFormat, Session, draw_frame};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -148,15 +148,8 @@ impl Play {
         let Self { session, screen, camera } = self;
         let read = session.scene_camera();
         *camera = session.predict_camera(read);
-        let started = session.now();
-        session.compose(camera, SIZE, Style::default(), None);
-        let composed = session.now();
-        screen.submit(session.picture(), camera)?;
-        session.choose_next_frame(camera, SIZE);
-        let gpu = screen.wait()?;
-        let done = session.now();
-        let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
-        Ok(session.finish(started, Finished { work, draw, gpu, skip: false }))
+        let format = PictureFormat { size: SIZE, style: Style::default() };
+        Ok(draw_frame(session, camera, format, screen, false)?)
     }
 
     /// Frames of so many seconds.
@@ -200,13 +193,6 @@ fn empty(gpu: &Gpu) -> anyhow::Result<Vec<f64>> {
     times(|| Ok(screen.render(&picture, &camera).map(drop)?))
 }
 
-/// The value that a share of some numbers does not exceed; NaN for no numbers.
-fn quantile(mut all: Vec<f64>, share: f64) -> f64 {
-    all.sort_by(f64::total_cmp);
-    let rank = (share * all.len() as f64).ceil() as usize;
-    all.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-}
-
 impl Row {
     fn blank(case: &Case) -> Self {
         let Case { scene, policy, busy, round, quick } = case.clone();
@@ -246,16 +232,16 @@ impl Row {
         let known = |value: fn(&FrameRecord) -> Option<f64>| frames.iter().filter_map(value).collect::<Vec<_>>();
         let period_ms = 1e3 / TARGET_HZ;
         let late = frames.iter().filter(|row| row.frame_ms > MISS * period_ms).count();
-        let middle_s = quantile(again.clone(), 0.5);
+        let middle_s = within(&again, 0.5);
         Ok(Self {
             adapter: gpu.describe(),
             frames: frames.len(),
             late: late as f64 / frames.len() as f64,
             work_ms: mean(&of(|row| row.frame_ms)),
-            work95_ms: quantile(of(|row| row.frame_ms), 0.95),
+            work95_ms: within(&of(|row| row.frame_ms), 0.95),
             empty_ms: 1e3 * mean(&empty),
-            spread95: quantile(again.iter().map(|s| (s / middle_s - 1.0).abs()).collect(), 0.95),
-            error95: quantile(known(|row| row.predicted_ms.map(|ms| (ms / row.frame_ms - 1.0).abs())), 0.95),
+            spread95: within(&again.iter().map(|s| (s / middle_s - 1.0).abs()).collect::<Vec<_>>(), 0.95),
+            error95: within(&known(|row| row.predicted_ms.map(|ms| (ms / row.frame_ms - 1.0).abs())), 0.95),
             triangles: mean(&of(|row| row.triangles as f64)),
             scale: mean(&of(|row| row.render_scale)),
             value: mean(&known(|row| row.value_over_bound)),
@@ -399,7 +385,7 @@ impl Row {
 
 /// The median over the rounds that match; NaN for none.
 fn median(rows: &[Row], value: impl Fn(&Row) -> f64, matches: impl Fn(&Row) -> bool) -> f64 {
-    quantile(rows.iter().filter(|row| matches(row)).map(value).filter(|x| !x.is_nan()).collect(), 0.5)
+    within(&rows.iter().filter(|row| matches(row)).map(value).filter(|x| !x.is_nan()).collect::<Vec<_>>(), 0.5)
 }
 
 #[cfg(test)]

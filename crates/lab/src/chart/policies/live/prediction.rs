@@ -8,6 +8,7 @@ use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
 use super::super::machine::RandomSource;
+use super::super::metrics::within;
 use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
 use metachron_lod::control::Policy;
@@ -59,7 +60,7 @@ pub(in super::super::super) struct Row {
 impl Row {
     fn of(case: &Case, adapter: String, pictures: &[Predicted]) -> Self {
         let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.predicted_ms, *p.measured_ms.first()?))).collect();
-        let factor = quantile(pairs.iter().map(|(predicted, measured)| measured / predicted).collect(), 0.5);
+        let factor = within(&pairs.iter().map(|(predicted, measured)| measured / predicted).collect::<Vec<_>>(), 0.5);
         let errors = |by: f64| {
             pairs.iter().map(|(predicted, measured)| (by * predicted / measured - 1.0).abs()).collect::<Vec<_>>()
         };
@@ -70,8 +71,8 @@ impl Row {
             adapter,
             pictures: case.pictures,
             error: plain.iter().sum::<f64>() / plain.len() as f64,
-            error95: quantile(plain, 0.95),
-            scaled_error95: quantile(errors(factor), 0.95),
+            error95: within(&plain, 0.95),
+            scaled_error95: within(&errors(factor), 0.95),
             factor,
             scatter95: scatter95(pictures),
             pairs: pairs
@@ -91,15 +92,10 @@ impl Row {
 /// Deviation from their median that 19 of 20 times of the same picture keep.
 fn scatter95(pictures: &[Predicted]) -> f64 {
     let about = |picture: &Predicted| {
-        let middle = quantile(picture.measured_ms.clone(), 0.5);
+        let middle = within(&picture.measured_ms, 0.5);
         picture.measured_ms.iter().map(|measured| (measured / middle - 1.0).abs()).collect::<Vec<_>>()
     };
-    quantile(pictures.iter().flat_map(about).collect(), 0.95)
-}
-
-fn quantile(mut all: Vec<f64>, part: f64) -> f64 {
-    all.sort_by(f64::total_cmp);
-    all.get((part * all.len() as f64) as usize).copied().unwrap_or(f64::NAN)
+    within(&pictures.iter().flat_map(about).collect::<Vec<_>>(), 0.95)
 }
 
 impl Experiment for Prediction {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::control::level::Span;
+use crate::cost::benefit::Sliders;
 use proptest::prelude::*;
 
 /// Prices of the plant of these tests: its pixels are the backdrop's.

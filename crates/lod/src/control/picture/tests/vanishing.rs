@@ -101,6 +101,31 @@ fn focus_motion_and_hysteresis_are_off_with_the_benefit_as_printed_and_count_whe
 }
 
 #[test]
+fn sliders_that_are_not_set_follow_the_policy() {
+    let mut control = control(Policy::Adaptive, 60.0);
+    control.set_sliders(GivenSliders { focus: Some(0.7), ..GivenSliders::default() });
+    assert_eq!((control.sliders().focus, control.sliders().motion), (0.7, 0.5));
+    control.set_policy(Policy::Greedy);
+    assert_eq!((control.sliders().focus, control.sliders().motion), (0.7, 0.0), "as printed");
+    // the window moves one of them
+    let moved = Sliders { importance: 0.2, ..control.sliders() };
+    control.set_sliders(control.given_sliders().moved(control.sliders(), moved));
+    control.set_policy(Policy::Adaptive);
+    assert_eq!(control.sliders(), Sliders { importance: 0.2, focus: 0.7, ..Policy::Adaptive.usual_sliders() });
+}
+
+#[test]
+fn ladders_are_made_anew_where_another_policy_counts_otherwise() {
+    let fast: Vec<_> =
+        (0..40).map(|i| ObjectView { speed_px_s: 600.0 * f64::from(i % 2), ..mesh(i, 4000.0, 4000) }).collect();
+    let mut fresh = control(Policy::MarginalStop, 60.0);
+    let mut changed = control(Policy::Greedy, 60.0);
+    changed.plan(&fast);
+    changed.set_policy(Policy::MarginalStop);
+    assert_eq!(changed.plan(&fast).levels, fresh.plan(&fast).levels);
+}
+
+#[test]
 fn hysteresis_as_printed_makes_levels_change_less() {
     for policy in [Policy::Greedy, Policy::GreedyIncremental] {
         let changes = |hysteresis: f64| {
