@@ -51,17 +51,20 @@ impl LateMargin {
         self.update();
     }
 
-    /// Reports that the machine is slower from now on, and that predictions know it: the slow frames that showed it are forgotten. A
-    /// machine that does so again before all stored frames are newer scatters, and its slow frames count.
-    pub(super) fn forgive(&mut self) {
-        if self.since_step == FRAMES {
+    /// Reports that the machine is slower from now on, and that predictions know it: the slow frames that showed it are forgotten.
+    ///
+    /// `false` where it did so before within as many frames as are stored: such a machine scatters, and its slow frames count.
+    pub(super) fn forgive(&mut self) -> bool {
+        let forgiven = self.since_step == FRAMES;
+        self.since_step = 0;
+        if forgiven {
             for _ in 1..IN_A_ROW {
                 self.next = (self.next + FRAMES - 1) % FRAMES;
                 self.ratios[self.next] = 0.0;
             }
             self.update();
         }
-        self.since_step = 0;
+        forgiven
     }
 
     /// Takes another share of frames that may be late.

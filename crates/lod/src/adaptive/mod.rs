@@ -238,10 +238,10 @@ impl Adaptive {
         let before = self.estimators[stage].kappa();
         let (table, target) = (prediction.table[stage] as f64, prediction.target);
         let update = self.estimators[stage].observe(table / target, took / target);
-        if update == FilterUpdate::NewRegime && prediction.informed && self.estimators[stage].kappa() > before {
-            // neither do those in flight know of it
+        let slower = update == FilterUpdate::NewRegime && self.estimators[stage].kappa() > before;
+        if slower && prediction.informed && self.late.forgive() {
+            // those in flight do not know of it either
             self.predictions.iter_mut().flatten().for_each(|prediction| prediction.informed = false);
-            self.late.forgive();
         }
         update
     }
