@@ -42,7 +42,7 @@ const DECLARED: [(&str, &str); 12] = [
     ("machine.wander", "0.05"),
 ];
 
-/// Greatest number of pictures compared, evenly along a path, and least number of frames between two: a comparison takes as long as
+/// Greatest number of pictures compared in the first round, evenly along a path, and least number of frames between two: a comparison takes as long as
 /// dozens of frames.
 const PICTURES: usize = 5;
 const APART: usize = 10;
@@ -53,7 +53,7 @@ const MEASURED_LEAD_IN: usize = 100;
 /// A measured play is bounded: one of full detail, and one at the target, seconds; and fewest frames for all that. Places along the path are
 /// then fewer, and the same for all policies.
 const FULL_S: f64 = 40.0;
-const PLAY_S: f64 = 2.5;
+const PLAY_S: f64 = 2.0;
 const FRAMES_LEAST: f64 = 25.0;
 /// Places at which full detail is timed beforehand, and times that each is drawn: the first one builds meshes.
 const TRIALS: usize = 8;
@@ -157,7 +157,7 @@ fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
-    let lead_in = if times == Times::Measured { MEASURED_LEAD_IN.min(case.frames) } else { LEAD_IN };
+    let lead_in = if times == Times::Measured { MEASURED_LEAD_IN.min(case.frames).max(LEAD_IN) } else { LEAD_IN };
     for _ in 0..lead_in {
         fly_through.step(0.0)?;
     }
@@ -165,7 +165,7 @@ fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow
     let mut played = PlayedPath { adapter, frames, pictures: Vec::new(), again_ms: Vec::new() };
     for frame in 0..case.frames {
         played.frames.push(fly_through.step(frame as f64 / case.frames as f64)?);
-        if frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
+        if case.round == 0 && frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
             played.pictures.extend(fly_through.picture()?);
         }
     }
