@@ -23,7 +23,7 @@ impl Experiment for Every {
     const TITLE: &'static str = "every policy on every scene of the papers, through the frame loop in lockstep";
 
     fn cases(quick: bool) -> Vec<Case> {
-        PLAYS.iter().flat_map(|play| play.cases(quick)).collect()
+        PLAYS.iter().flat_map(|play| play.cases(quick, 0)).collect()
     }
 
     fn measure(case: &Case) -> Row {

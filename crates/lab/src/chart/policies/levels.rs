@@ -77,8 +77,12 @@ impl Experiment for Levels {
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES[usize::from(quick)];
-        let case =
-            |scene: &str, policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames };
+        let case = |scene: &str, policy: Policy| Case {
+            scene: scene.to_owned(),
+            policy: policy.name().to_owned(),
+            frames,
+            round: 0,
+        };
         settings().flat_map(|(scene, ..)| POLICIES.map(|policy| case(&scene, policy))).collect()
     }
 

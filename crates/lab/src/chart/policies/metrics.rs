@@ -2,7 +2,7 @@
 //!
 //! In: frames. Out: a row of numbers. Never here: policies. The definitions are those of a run's report.
 
-use super::super::experiment::worst;
+use super::super::experiment::{Finding, worst};
 use super::closed_loop::Frame;
 use metachron_session::report::{BINDING, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN};
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,11 @@ pub(in super::super) struct Row {
     pub(super) policy: String,
     /// The adapter that drew the pictures; empty where nothing was drawn.
     pub(super) adapter: String,
+    /// Frames played, and frames asked for: fewer are played where they would take too long.
     pub(super) frames: usize,
+    pub(super) asked: usize,
+    /// Which of equal plays, from 0.
+    pub(super) round: usize,
     /// T, milliseconds, where full detail sets it.
     pub(super) target_ms: f64,
     pub(super) mean: f64,
@@ -48,6 +52,8 @@ pub(in super::super) struct Row {
     /// |predicted − measured| over measured: the mean, and the bound that 19 of 20 frames keep.
     pub(super) model_error: f64,
     pub(super) model_error95: f64,
+    /// Deviation from their median that 19 of 20 times of one and the same picture keep, where these are measured.
+    pub(super) spread95: f64,
     /// Levels that changed, and levels that changed back within three frames, per object and frame.
     pub(super) changes: f64,
     pub(super) reversals: f64,
@@ -87,6 +93,8 @@ impl Row {
             policy: policy.to_owned(),
             adapter: String::new(),
             frames: frames.len(),
+            asked: frames.len(),
+            round: 0,
             target_ms: f64::NAN,
             mean: mean(&all),
             min: within(&all, 0.0),
@@ -105,6 +113,7 @@ impl Row {
             overshoot: worst(runs.iter().map(|run| overshoot(run, steepest(run)))),
             model_error: mean(&errors),
             model_error95: within(&errors, 0.95),
+            spread95: f64::NAN,
             changes: each(|f| f.changes),
             reversals: each(|f| f.reversals),
             holes: each(|f| f.holes),
@@ -127,6 +136,25 @@ pub(super) fn within(x: &[f64], share: f64) -> f64 {
     sorted.sort_by(f64::total_cmp);
     let rank = (share * x.len() as f64).ceil() as usize;
     sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+/// Deviation from their median that 19 of 20 times keep; NaN for no times.
+pub(super) fn deviation95(times: &[f64]) -> f64 {
+    let middle = within(times, 0.5);
+    within(&times.iter().map(|time| (time / middle - 1.0).abs()).collect::<Vec<_>>(), 0.95)
+}
+
+/// Error of 19 of 20 predictions over what is allowed: a tenth (FS93, §4), or 1.2 times the spread of one and the same picture if that is
+/// more, since no prediction can err by less; NaN where one of the two is.
+pub(super) fn error_over_allowed(error95: f64, spread95: f64) -> f64 {
+    if spread95.is_nan() { f64::NAN } else { error95 / (1.2 * spread95).max(0.1) }
+}
+
+/// The claim about that number in a scene.
+pub(super) fn predicts(scene: &str, over_allowed: f64) -> Finding {
+    let allowed =
+        "error of 19 of 20 predictions over 10 %, or over 1.2 times the spread of one picture if that is more";
+    Finding::at_most(format!("adaptive, {scene}: {allowed}"), over_allowed, 1.0)
 }
 
 /// The most misses in a row.

@@ -149,7 +149,7 @@ impl PictureControl {
         self.policy.prices(&self.prices.with_shadows(self.shadows()))
     }
 
-    fn rung(&self) -> PictureRung {
+    pub(super) fn rung(&self) -> PictureRung {
         if self.policy.scales_pictures() { self.scale.rung() } else { self.scale.most() }
     }
 

@@ -1,20 +1,26 @@
 //! The papers' scenes drawn by the present adapter, under every policy, through the program's own frame loop.
 //!
-//! In: a scene's number among the plays. Out: an experiment. Never here: how frames are drawn ([`super::played`]), a declared machine.
+//! In: a scene's number among the plays. Out: an experiment, of rounds in which all policies take turns; full detail, which sets the target, is
+//! played once. Never here: how frames are drawn ([`super::played`]), a declared machine.
 
 pub(in super::super) mod held;
 pub(in super::super) mod prediction;
+mod rounds;
 pub(in super::super) mod traversal;
 pub(in super::super) mod views;
 
-use super::super::experiment::{Experiment, Finding};
+use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::Figure;
 use super::super::table::Table;
 use super::metrics::Row;
-use super::played::{Case, PLAYS, Times, curves, table};
+use super::played::{Case, PLAYS, Times, curves};
+use rounds::{median_of, summary, verdict};
 
 /// The experiment on play number `P`.
 pub(in super::super) struct Live<const P: usize>;
+
+/// Rounds in full and in the quick run.
+const ROUNDS: [usize; 2] = [5, 1];
 
 /// The policies, grouped as in the figure's panels.
 const KINDS: [(&str, &[&str]); 4] = [
@@ -35,7 +41,8 @@ impl<const P: usize> Experiment for Live<P> {
     const ALONE: bool = true;
 
     fn cases(quick: bool) -> Vec<Case> {
-        PLAYS[P].cases(quick).collect()
+        let rounds = 0..ROUNDS[usize::from(quick)];
+        rounds.flat_map(|round| PLAYS[P].cases(quick, round)).filter(|c| c.round == 0 || c.policy != "full").collect()
     }
 
     fn measure(case: &Case) -> Row {
@@ -50,21 +57,24 @@ impl<const P: usize> Experiment for Live<P> {
         let adapter = rows.first().map_or("", |row| &row.adapter);
         let title = format!("{} on {adapter}", Self::NAME);
         let panel = |(title, policies): (&str, &[&str])| {
-            curves(title, rows.iter().filter(|row| policies.contains(&row.policy.as_str())))
+            curves(title, rows.iter().filter(|row| row.round == 0 && policies.contains(&row.policy.as_str())))
         };
         Figure { title, panels: KINDS.map(panel).to_vec(), columns: 2 }
     }
 
     fn table(rows: &[Row]) -> Table {
-        table(rows)
+        summary(rows)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of = |what: fn(&Row) -> f64| rows.iter().find(|row| row.policy == "adaptive").map_or(f64::NAN, what);
-        vec![
+        let of = |what: fn(&Row) -> f64| median_of(rows, "adaptive", what);
+        let holes = worst(rows.iter().filter(|row| row.policy == "adaptive").map(|row| row.holes));
+        let mut findings = verdict(Self::NAME, rows);
+        findings.extend([
             Finding::at_most("adaptive: longest frame / T", of(|row| row.max), 1.3),
             Finding::at_most("adaptive: stddev / T of binding frames", of(|row| row.binding_stddev), 0.08),
-            Finding::at_most("adaptive: objects left out per object and frame", of(|row| row.holes), 0.0),
-        ]
+            Finding::at_most("adaptive: objects left out per object and frame", holes, 0.0),
+        ]);
+        findings
     }
 }

@@ -31,18 +31,19 @@ pub(super) const PLAYS: [Play; 5] = [
     Play { paper: Paper::Library, frames: [60, 10], times_over: 2.5 },
 ];
 
-/// A policy on a scene, of so many frames.
+/// A policy on a scene, of so many frames, in one of some equal rounds.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     pub(super) scene: String,
     pub(super) policy: String,
     pub(super) frames: usize,
+    pub(super) round: usize,
 }
 
 impl Case {
     /// The case of a row.
     pub(super) fn of(row: &Row) -> Self {
-        Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
+        Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.asked, round: row.round }
     }
 
     /// Measures the row; one without frames where the case could not be played.
@@ -52,7 +53,8 @@ impl Case {
             let text = play.paper.text(&Choices::default());
             walk::measure(&play.shown(&text), self, times)
         };
-        play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), measure)
+        let row = play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), measure);
+        Row { asked: self.frames, round: self.round, ..row }
     }
 }
 
@@ -61,10 +63,11 @@ impl Play {
         Shown { name: self.paper.name(), text, times_over: self.times_over }
     }
 
-    /// One case for every policy of the program.
-    pub(super) fn cases(&self, quick: bool) -> impl Iterator<Item = Case> {
+    /// One case for every policy of the program in one round.
+    pub(super) fn cases(&self, quick: bool, round: usize) -> impl Iterator<Item = Case> {
         let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
-        let case = move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames };
+        let case =
+            move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames, round };
         Policy::ALL.into_iter().map(case)
     }
 }
@@ -94,7 +97,7 @@ mod tests {
     use metachron_render::Gpu;
 
     fn row(scene: &str, policy: &str) -> Row {
-        Case { scene: scene.to_owned(), policy: policy.to_owned(), frames: 6 }.measure(Times::Declared)
+        Case { scene: scene.to_owned(), policy: policy.to_owned(), frames: 6, round: 0 }.measure(Times::Declared)
     }
 
     #[test]
@@ -109,11 +112,9 @@ mod tests {
         let drawn = Gpu::headless().is_ok();
         for row in &rows {
             let unknown: Vec<_> = row::COLUMNS.iter().filter(|(_, of, _)| of(row).is_nan()).map(|c| c.0).collect();
-            // only a policy with a bound has `value` and `proven`
-            let mut expected: Vec<&str> = match row.policy.as_str() {
-                "robin-hood" => vec!["value", "proven"],
-                _ => Vec::new(),
-            };
+            // only a policy with a bound has `value` and `proven`, and only measured times have a spread
+            let mut expected = vec!["spread95"];
+            expected.extend(["value", "proven"].iter().filter(|_| row.policy == "robin-hood"));
             expected.extend(["ssim", "ssim_least", "psnr_db"].iter().filter(|_| !drawn));
             assert_eq!(unknown, expected, "{}", row.policy);
         }

@@ -4,7 +4,7 @@
 
 use super::super::super::table::{Cell, Table};
 use super::super::closed_loop::Frame;
-use super::super::metrics::{Row, mean};
+use super::super::metrics::{Row, deviation95, mean};
 use metachron_session::FrameRecord;
 
 /// The data of a row.
@@ -16,13 +16,15 @@ pub(super) struct Played<'a> {
     pub(super) frames: &'a [FrameRecord],
     /// Times of full detail at the same places, milliseconds.
     pub(super) full_ms: &'a [f64],
+    /// Times of one and the same picture, milliseconds.
+    pub(super) again_ms: &'a [f64],
     /// SSIM and PSNR of the frames that were compared.
     pub(super) likeness: &'a [(f64, f64)],
 }
 
 impl Played<'_> {
     pub(super) fn row(&self) -> Row {
-        let Self { scene, policy, adapter, target_ms, frames, full_ms, likeness } = *self;
+        let Self { scene, policy, adapter, target_ms, frames, full_ms, again_ms, likeness } = *self;
         let frames_of_row: Vec<Frame> =
             frames.iter().zip(full_ms).map(|(row, full)| frame(row, full / target_ms, target_ms)).collect();
         let times = frames_of_row.iter().map(|f| format!("{:.3}", f.time)).collect::<Vec<_>>().join(" ");
@@ -30,6 +32,7 @@ impl Played<'_> {
         Row {
             adapter: adapter.to_owned(),
             target_ms,
+            spread95: deviation95(again_ms),
             ssim: mean(&column(|l| l.0)),
             ssim_least: column(|l| l.0).into_iter().reduce(f64::min).unwrap_or(f64::NAN),
             psnr_db: mean(&column(|l| l.1)),
@@ -65,7 +68,8 @@ fn frame(row: &FrameRecord, full: f64, target_ms: f64) -> Frame {
 pub(super) type Column = (&'static str, fn(&Row) -> f64, usize);
 
 /// The numbers of a row that compare policies.
-pub(super) const COLUMNS: [Column; 28] = [
+pub(super) const COLUMNS: [Column; 30] = [
+    ("round", |r| r.round as f64, 0),
     ("T_ms", |r| r.target_ms, 2),
     ("mean", |r| r.mean, 3),
     ("min", |r| r.min, 3),
@@ -83,6 +87,7 @@ pub(super) const COLUMNS: [Column; 28] = [
     ("overshoot", |r| r.overshoot, 3),
     ("model", |r| r.model_error, 4),
     ("model95", |r| r.model_error95, 4),
+    ("spread95", |r| r.spread95, 3),
     ("value", |r| r.value_over_bound, 4),
     ("proven", |r| r.certified, 3),
     ("changes", |r| r.changes, 4),

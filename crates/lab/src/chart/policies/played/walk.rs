@@ -42,12 +42,24 @@ const DECLARED: [(&str, &str); 12] = [
     ("machine.wander", "0.05"),
 ];
 
-/// Greatest number of pictures compared, evenly along a path, and least number of frames between two: a comparison takes as long as
+/// Greatest number of pictures compared in the first round, evenly along a path, and least number of frames between two: a comparison takes as long as
 /// dozens of frames.
 const PICTURES: usize = 5;
 const APART: usize = 10;
-/// Frames at the first place before the first that counts: they warm up pipelines, caches and prices.
+/// Frames at the first place before the first that counts: they warm up pipelines, caches and prices; and that many where times are measured
+/// and scatter, which has to be known, or as many as there are of the path.
 const LEAD_IN: usize = 20;
+const MEASURED_LEAD_IN: usize = 100;
+/// A measured play is bounded: one of full detail, and one at the target, seconds; and fewest frames for all that. Places along the path are
+/// then fewer, and the same for all policies.
+const FULL_S: f64 = 40.0;
+const PLAY_S: f64 = 2.0;
+const FRAMES_LEAST: f64 = 25.0;
+/// Places at which full detail is timed beforehand, and times that each is drawn: the first one builds meshes.
+const TRIALS: usize = 8;
+const DRAWN: usize = 2;
+/// How often the last picture is drawn again where times are measured.
+const AGAIN: usize = 20;
 /// PSNR reported for pictures that are alike to the bit, and its upper limit, dB.
 pub(in super::super) const ALIKE_DB: f64 = 99.0;
 
@@ -56,6 +68,8 @@ struct PlayedPath {
     adapter: String,
     frames: Vec<FrameRecord>,
     pictures: Vec<PictureFile>,
+    /// Times of the last picture drawn again and again, milliseconds, where times are measured.
+    again_ms: Vec<f64>,
 }
 
 /// Full detail of a scene in so many frames.
@@ -78,7 +92,8 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     let measured = reference(shown, case.frames, times).and_then(|full| {
         let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
         let full_itself = case.policy == "full";
-        let own = if full_itself { Arc::clone(&full) } else { Arc::new(played(shown, case, target_s, times)?) };
+        let case = Case { frames: full.frames.len(), ..case.clone() };
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(played(shown, &case, target_s, times)?) };
         Ok((full, own, target_s))
     });
     let (full, own, target_s) = measured.unwrap_or_else(|_| (empty_path(), empty_path(), f64::NAN));
@@ -92,13 +107,14 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
         target_ms: 1e3 * target_s,
         frames: &own.frames,
         full_ms: &full_ms,
+        again_ms: &own.again_ms,
         likeness: &likeness,
     };
     played.row()
 }
 
 fn empty_path() -> Arc<PlayedPath> {
-    Arc::new(PlayedPath { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
+    Arc::new(PlayedPath { adapter: String::new(), frames: Vec::new(), pictures: Vec::new(), again_ms: Vec::new() })
 }
 
 fn mean_ms(played: &PlayedPath) -> f64 {
@@ -112,11 +128,28 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
     if let Some((.., played)) = known.iter().find(here) {
         return Ok(Arc::clone(played));
     }
-    let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
+    let in_time = if times == Times::Measured { frames_in_time(shown, frames)? } else { frames };
+    let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames: in_time, round: 0 };
     // the target has no effect on full detail
     let full = Arc::new(played(shown, &case, 1.0, times)?);
     known.push((shown.name, frames, times, Arc::clone(&full)));
     Ok(full)
+}
+
+/// As many of these frames as can be played in the time of a play.
+fn frames_in_time(shown: &Shown<'_>, frames: usize) -> anyhow::Result<usize> {
+    let (_, mut fly_through) = opened(shown.name, shown.text, Times::Measured)?;
+    fly_through.session().control().set_policy(Policy::Full);
+    let mut sum_s = 0.0;
+    for trial in 0..TRIALS {
+        let mut draw = || fly_through.step(trial as f64 / TRIALS as f64);
+        let drawn = (0..DRAWN).map(|_| draw()).collect::<Result<Vec<_>, _>>()?;
+        sum_s += 1e-3 * drawn.last().map_or(0.0, |row| row.frame_ms);
+    }
+    let each_s = sum_s / TRIALS as f64;
+    let most = (FULL_S / each_s).min(PLAY_S * shown.times_over / each_s).max(FRAMES_LEAST);
+    // a cast of floats saturates
+    Ok(frames.min(most as usize))
 }
 
 fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow::Result<PlayedPath> {
@@ -124,17 +157,31 @@ fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
-    for _ in 0..LEAD_IN {
+    let lead_in = if times == Times::Measured { MEASURED_LEAD_IN.min(case.frames).max(LEAD_IN) } else { LEAD_IN };
+    for _ in 0..lead_in {
         fly_through.step(0.0)?;
     }
-    let mut played = PlayedPath { adapter, frames: Vec::with_capacity(case.frames), pictures: Vec::new() };
+    let frames = Vec::with_capacity(case.frames);
+    let mut played = PlayedPath { adapter, frames, pictures: Vec::new(), again_ms: Vec::new() };
     for frame in 0..case.frames {
         played.frames.push(fly_through.step(frame as f64 / case.frames as f64)?);
-        if frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
+        if case.round == 0 && frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
             played.pictures.extend(fly_through.picture()?);
         }
     }
+    if times == Times::Measured {
+        played.again_ms = again(&mut fly_through, (case.frames - 1) as f64 / case.frames as f64)?;
+    }
     Ok(played)
+}
+
+/// Times of the picture at a place of the path, drawn again and again with the levels that it has, milliseconds.
+fn again(fly_through: &mut FlyThrough, part: f64) -> anyhow::Result<Vec<f64>> {
+    fly_through.session().control().freeze(true);
+    for _ in 0..SETTLED {
+        fly_through.step(part)?;
+    }
+    (0..AGAIN).map(|_| Ok(fly_through.step(part)?.frame_ms)).collect()
 }
 
 /// Predicted time of one picture, and its time at each drawing, milliseconds.
