@@ -414,8 +414,8 @@ mod tests {
 
     #[test]
     fn a_table_is_taken_on_its_own_adapter_and_by_its_own_version_alone() {
-        let mut prices = Prices::default();
-        prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
+        let areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
+        let prices = Prices { areas, ..Prices::default() };
         let table = PriceTable { adapter: "one".to_owned(), prices, misses: Misses::default() };
         let text = table.export();
         assert_eq!(PriceTable::import(text.as_bytes(), "one"), Ok(table.clone()));

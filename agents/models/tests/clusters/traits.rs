@@ -196,9 +196,9 @@ fn a_small_static_sensor_is_sensed_from_within_a_large_body() {
         let probe = Obstacle { solid, position, ..floor(traits) };
         let large = RigidSpec { velocity: DVec3::X, gravity: DVec3::ZERO, ..ball(0.3, -DVec3::X) };
         let mut table = at_rate(Table::among(vec![body(large)], &[probe]), 240.0);
-        let inside = sensed(&mut table, 0, SensorPartner::Static(0), 1.0);
+        let inside = sensed(&mut table, 0, ContactPartner::Static(0), 1.0);
         assert_eq!((inside.touching, inside.begins, inside.ends), (true, 1, 0));
-        let beyond = sensed(&mut table, 0, SensorPartner::Static(0), 1.5);
+        let beyond = sensed(&mut table, 0, ContactPartner::Static(0), 1.5);
         assert_eq!((beyond.touching, beyond.begins, beyond.ends), (false, 1, 1));
     }
 }

@@ -394,6 +394,8 @@ fn check_buildable(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
         Spec::Synthetic(spec) => {
             Synthetic::new(spec, member.simulation, member.start).map(drop).map_err(|e| e.to_string())
         }
+        // no file can name one
+        Spec::Custom(_) => Ok(()),
     };
     if let Err(reason) = verdict {
         let span = c.document().locate(&format!("{}.name", place.path));

@@ -119,6 +119,8 @@ pub(super) fn summary(rows: &[Row]) -> Table {
         "reversals",
         "triangles",
         "ssim",
+        "ssim_least",
+        "holes",
     ]);
     let played = |policy: &str| rows.iter().filter(|row| row.policy == policy).count();
     for policy in Policy::ALL.iter().map(|policy| policy.name()).filter(|policy| played(policy) > 0) {
@@ -142,6 +144,8 @@ pub(super) fn summary(rows: &[Row]) -> Table {
             (of(|row| row.reversals), 5).into(),
             (of(|row| row.polygons), 0).into(),
             (of(|row| row.ssim), 4).into(),
+            (of(|row| row.ssim_least), 4).into(),
+            (of(|row| row.holes), 4).into(),
         ]);
     }
     table
