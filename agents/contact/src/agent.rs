@@ -6,7 +6,9 @@
 use crate::stepper::ClusterMember;
 use crate::{Law, Link};
 use glam::DVec3;
-use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
+use metachron_core::{
+    AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport,
+};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
 
@@ -47,6 +49,17 @@ pub trait Agent: Send {
 
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
+
+    /// Writes the state to an archive, or reads it from one, field by field: all that the next bit of a run needs, guesses included, and
+    /// nothing that an agent built alike has anyway. It is called between steps.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`] by a model that does not save its state, as this one does where a model has nothing else;
+    /// [`ArchiveError`] for a state of another agent. After an error while reading the agent must not step again.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let _ = archive;
+        Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })
+    }
 
     /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes.
     fn momentum(&self) -> (DVec3, DVec3);
@@ -106,7 +119,7 @@ impl Neighbour {
 }
 
 /// A spring from a moving point of space to a material point of an agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AnchorSpring {
     /// The agent that pulls; `None` for the user's spring.
     pub by: Option<AgentId>,

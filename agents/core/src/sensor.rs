@@ -5,7 +5,7 @@
 use crate::{AgentId, SimTime};
 
 /// The other side of a touch that is only sensed; one of the two is a sensor, or both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum SensorPartner {
     /// A static solid, by its number in the scene.
     Static(u32),
@@ -14,7 +14,7 @@ pub enum SensorPartner {
 }
 
 /// A pair of which one side only senses. It is published by the agent, of two by that of the lower number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SensorTouch {
     /// The other side.
     pub with: SensorPartner,

@@ -62,7 +62,7 @@ pub(super) struct AgentRunner {
 }
 
 /// A turn between its begin and its finish.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingTurn {
     pub start: Start,
     pub dt: SimSpan,
@@ -105,7 +105,7 @@ pub(super) enum Next {
 }
 
 /// Measures the interval between the starts of an agent's turns.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct TurnPeriod {
     last: Option<(Duration, u64)>,
     period_s: Option<f32>,

@@ -11,7 +11,7 @@ mod published_bounds;
 
 pub(super) use neighbour_list::NeighbourList;
 
-use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime};
 use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
@@ -124,6 +124,28 @@ impl BroadPhase {
                 }
             }
         }
+    }
+
+    /// Writes or reads what agents have published of where they are and whom they have called; called between turns.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.bounds.iter().try_for_each(|bounds| bounds.archive(archive))?;
+        for word in self.log.iter().chain([&self.noted]) {
+            let mut value = word.load(SeqCst);
+            archive.value(&mut value)?;
+            word.store(value, SeqCst);
+        }
+        for to in (0..self.calls.len() as u32).map(AgentId) {
+            let mut callers = Vec::new();
+            self.take_callers(to, |from| callers.push(from));
+            let before = callers.clone();
+            let outcome = archive.value(&mut callers);
+            if outcome.is_err() {
+                callers = before;
+            }
+            callers.iter().for_each(|from| self.call(to, *from));
+            outcome?;
+        }
+        Ok(())
     }
 
     fn log_speed(&self, id: AgentId) {

@@ -4,7 +4,7 @@
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
 use metachron_contact::AnchorSpring;
-use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -48,7 +48,7 @@ pub(super) struct Mailbox {
 }
 
 /// Contents of a mailbox.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingCommands {
     /// The newest requested resolution.
     pub set_resolution: Option<Resolution>,
@@ -82,6 +82,18 @@ impl Mailbox {
             Command::Wake => {}
         }
         self.full.store(true, Release);
+        Ok(())
+    }
+
+    /// Writes or reads the commands that wait.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let mut is_full = self.has_pending();
+        archive.value(&mut is_full)?;
+        if is_full {
+            let pending = self.pending.get_or_init(Box::default);
+            archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
+        }
+        self.full.store(is_full, Release);
         Ok(())
     }
 

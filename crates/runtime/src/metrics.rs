@@ -5,9 +5,10 @@
 
 use super::agent_clock::AgentClock;
 use super::histogram::Histogram;
-use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
+use arc_swap::ArcSwapOption;
+use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// State of an agent's execution.
@@ -116,7 +117,8 @@ pub(super) struct Metrics {
     pub work: Gauge,
     late: [Gauge; 3],
     state: AtomicU8,
-    reason: OnceLock<String>,
+    /// Why it was parked; read when it is.
+    reason: ArcSwapOption<String>,
 }
 
 impl Metrics {
@@ -124,7 +126,7 @@ impl Metrics {
         match self.state.load(Relaxed) {
             RUNNING => AgentState::Running,
             RESTING => AgentState::Resting,
-            _ => AgentState::Parked(self.reason.get().cloned().unwrap_or_default()),
+            _ => AgentState::Parked(self.reason.load().as_deref().cloned().unwrap_or_default()),
         }
     }
 
@@ -142,8 +144,29 @@ impl Metrics {
 
     /// Parks the agent for good; the first reason is kept.
     pub fn park(&self, reason: String) {
-        self.reason.get_or_init(|| reason);
+        if self.state.load(Relaxed) != PARKED {
+            self.reason.store(Some(Arc::new(reason)));
+        }
         self.state.store(PARKED, Relaxed);
+    }
+
+    /// Writes or reads them; CPU time and the times by which turns were late go on being counted.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        for count in [&self.steps, &self.misses, &self.dt, &self.dropped, &self.rested] {
+            let mut value = count.load(Relaxed);
+            archive.value(&mut value)?;
+            count.store(value, Relaxed);
+        }
+        for gauge in [&self.rate_hz, &self.mean_hz, &self.work_s, &self.work] {
+            let mut value = gauge.get();
+            archive.value(&mut value)?;
+            gauge.set(value);
+        }
+        let (mut state, mut reason) = (self.state.load(Relaxed), self.reason.load().as_deref().cloned());
+        archive_values!(archive, state, reason)?;
+        self.reason.store(reason.map(Arc::new));
+        self.state.store(state, Relaxed);
+        Ok(())
     }
 
     pub fn late(&self) -> Spread {
@@ -195,6 +218,12 @@ impl MetricsWriter {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
         Self { turns: 0, steps: 0, misses: 0, late: Histogram::default(), work_s: None, window, first_window: true }
+    }
+
+    /// Writes or reads the counts, but for the times by which turns were late.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self { turns, steps, misses, work_s, window, first_window, .. } = self;
+        archive_values!(archive, *turns, *steps, *misses, *work_s, *window, *first_window)
     }
 
     /// Turns recorded so far.

@@ -16,7 +16,7 @@ use super::sync::atomic::{
 };
 use super::sync::thread::Thread;
 use super::worker_wakeup::WorkerWakeup;
-use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, SimSpan, SimTime, archive_values};
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -263,6 +263,21 @@ impl SleepRegistry {
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
+    /// Writes or reads who rests, is woken, was touched, and who leads whom. After a reading all agents have new states.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        for signal in &self.signals {
+            signal.archive(archive)?;
+        }
+        let (mut notified, mut far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
+        archive_values!(archive, notified, far_behind)?;
+        self.notified.store(notified, Release);
+        self.far_behind.store(far_behind, Release);
+        if archive.is_reading() {
+            (0..).map(AgentId).take(self.signals.len()).for_each(|id| self.changed.mark(id));
+        }
+        Ok(())
+    }
+
     /// Asks every thread to end.
     pub fn stop(&self) {
         self.stop.store(true, Release);
@@ -276,6 +291,19 @@ impl SleepRegistry {
 }
 
 impl Signal {
+    fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        for flag in [&self.resting, &self.woken, &self.closed] {
+            let mut value = flag.load(Acquire);
+            archive.value(&mut value)?;
+            flag.store(value, Release);
+        }
+        let (mut leader, mut touched) = (self.leader.load(Acquire), self.touched.load(Acquire));
+        archive_values!(archive, leader, touched)?;
+        self.leader.store(leader, Release);
+        self.touched.store(touched, Release);
+        Ok(())
+    }
+
     /// Whether it was woken since the last call; writes before the wake are then visible.
     fn take_wake(&self) -> bool {
         // a flag that is down is not written: its cache line stays shared by all readers;

@@ -21,6 +21,7 @@
 
 mod assemble;
 mod builder;
+mod checkpoint;
 pub mod couplings;
 mod initial_overlap;
 mod initial_shape;
@@ -32,6 +33,7 @@ mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};
+pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
 pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
 pub use initial_overlap::Moved;
 pub use overlap::Overlap;
