@@ -210,7 +210,8 @@ impl<'a> Archive<'a> {
         } else if let Bytes::Written(bytes) = &mut self.bytes {
             let at = bytes.len();
             let longer = postcard::to_extend(&**state, std::mem::take(bytes));
-            let malformed = |e: postcard::Error| ArchiveError::Malformed { at, expected: "Snapshot", reason: e.to_string() };
+            let malformed =
+                |e: postcard::Error| ArchiveError::Malformed { at, expected: "Snapshot", reason: e.to_string() };
             *bytes = longer.map_err(malformed)?;
             self.places.insert(Arc::as_ptr(state) as usize, count);
         }
@@ -315,7 +316,8 @@ mod tests {
         archive.fixed("the number of nodes", 5_usize).unwrap();
         let bytes = archive.into_bytes();
         let mut archive = Archive::reader(&bytes);
-        let error = archive.within("agent \"gut\"", |archive| archive.fixed("the number of nodes", 6_usize)).unwrap_err();
+        let error =
+            archive.within("agent \"gut\"", |archive| archive.fixed("the number of nodes", 6_usize)).unwrap_err();
         assert_eq!(error.to_string(), "agent \"gut\": the number of nodes is 5 in the saved state; expected 6");
     }
 }

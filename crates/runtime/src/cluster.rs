@@ -32,8 +32,8 @@ use metachron_contact::stepper::{
 use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
-    AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind, PairState, SimSpan,
-    SimTime, Snapshot, StepReport, archive_values, recycled,
+    AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, DisjointSets, Grip, PairKind,
+    PairState, SimSpan, SimTime, Snapshot, StepReport, archive_values, recycled,
 };
 use std::sync::Arc;
 

@@ -7,8 +7,8 @@ use super::agent_clock::AgentClock;
 use super::histogram::Histogram;
 use arc_swap::ArcSwapOption;
 use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 /// State of an agent's execution.

@@ -147,7 +147,7 @@ impl Checkpoint {
 
     /// Size of the state, bytes.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub fn size_bytes(&self) -> usize {
         self.state.len()
     }
 
@@ -248,9 +248,8 @@ impl SceneIdentity {
     /// # Errors
     /// [`CheckpointError::OtherScene`] with the first difference.
     pub fn check(&self, found: &Self) -> Result<(), CheckpointError> {
-        let other = |what: String, found: String, expected: String| {
-            Err(CheckpointError::OtherScene { what, found, expected })
-        };
+        let other =
+            |what: String, found: String, expected: String| Err(CheckpointError::OtherScene { what, found, expected });
         let counts = [
             ("moving objects", found.objects.len(), self.objects.len()),
             ("fixed solids", found.fixed, self.fixed),
@@ -261,7 +260,9 @@ impl SceneIdentity {
             return other(format!("the number of {what}"), found.to_string(), expected.to_string());
         }
         let mut pairs = found.objects.iter().zip(&self.objects).enumerate();
-        let Some((at, (found, expected))) = pairs.find(|(_, (found, expected))| found != expected) else { return Ok(()) };
+        let Some((at, (found, expected))) = pairs.find(|(_, (found, expected))| found != expected) else {
+            return Ok(());
+        };
         let said = |one: &ObjectIdentity| format!("\"{}\", a {} at {} Hz", one.name, one.model, one.rate_hz);
         other(format!("object {at}"), said(found), said(expected))
     }
@@ -271,4 +272,55 @@ impl SceneIdentity {
 fn checksum(bytes: &[u8]) -> u64 {
     const FNV_PRIME: u64 = 0x0100_0000_01b3;
     bytes.iter().fold(HASH_START, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(FNV_PRIME))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinds::ExecutorKind;
+    use crate::{Rigid, Tube, World};
+    use metachron_core::SimSpan;
+    use metachron_geometry::Solid;
+
+    fn scene() -> Scene {
+        let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.051]);
+        let tube = Tube::along(&[[-0.2, 0.0, 0.12], [0.2, 0.0, 0.12]]).radius_m(0.01).segments(4);
+        Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap()
+    }
+
+    fn start() -> World {
+        World::start(&scene(), ExecutorKind::Lockstep).unwrap()
+    }
+
+    /// The file says whether its bytes are those written; this is what is left if it says so of others.
+    #[test]
+    fn a_state_with_any_byte_changed_is_read_or_refused() {
+        let world = start();
+        world.advance(SimSpan::from_millis(100));
+        let mark = world.checkpoint().unwrap();
+        let mut refused = 0;
+        let mut world = start();
+        for at in (0..mark.state.len()).step_by(1 + mark.state.len() / 300) {
+            let mut broken = mark.clone();
+            broken.state[at] ^= 0xff;
+            match world.restore(&broken) {
+                Ok(()) => {}
+                Err(CheckpointError::Unusable { .. }) => {
+                    assert!(matches!(world.restore(&mark), Err(CheckpointError::Stopped)));
+                    (refused, world) = (refused + 1, start());
+                }
+                Err(other) => panic!("byte {at}: {other}"),
+            }
+        }
+        assert!(refused > 0, "no number was found to be wrong");
+    }
+
+    #[test]
+    fn another_version_is_named() {
+        let mark = start().checkpoint().unwrap();
+        let mut bytes = mark.to_bytes();
+        assert_eq!(Checkpoint::from_bytes(&bytes), Ok(mark));
+        bytes[MAGIC.len()] = 9;
+        assert_eq!(Checkpoint::from_bytes(&bytes), Err(BadCheckpoint::OtherFormat { found: 9 }));
+    }
 }

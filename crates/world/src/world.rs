@@ -3,10 +3,10 @@
 //! In: a [`Scene`] and an executor. Out: each object's latest state, the world's time and its hash.
 //! Never here: a file, a picture, a law of control.
 
-use super::assemble;
-use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::Scene;
+use super::assemble;
 use super::assemble::Govern;
+use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::kinds::ExecutorKind;
 use metachron_core::{AgentId, Archive, ArchiveError, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{
@@ -108,7 +108,9 @@ impl World {
             run.drive(TimelineCommand::Pause);
         }
         let (agents, identity) = (run.agents().to_vec(), SceneIdentity::of(scene));
-        Ok(Self { shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, identity, clock }) })
+        Ok(Self {
+            shared: Arc::new(Shared { state: Mutex::new(State::Running(run)), agents, executor, identity, clock }),
+        })
     }
 
     /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.

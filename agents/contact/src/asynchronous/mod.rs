@@ -21,10 +21,11 @@ use crate::stepper::{
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
 use lines::Lines;
-use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState, SimTime, Site, Snapshot,
-};
 use metachron_core::archive_values;
+use metachron_core::{
+    AgentId, Anchor, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState,
+    SimTime, Site, Snapshot,
+};
 use metachron_geometry::Touch;
 use metachron_geometry::narrow_phase::NarrowPhaseScratch;
 use std::sync::Arc;
@@ -120,7 +121,11 @@ impl Remotes {
             let mut id = remote.seen.id;
             archive_values!(archive, id, remote.memory, remote.grips)?;
             if archive.is_reading() {
-                *remote = Remote { seen: Neighbour::observed(id, Arc::default()), member: RemoteMember::default(), ..std::mem::replace(remote, unseen()) };
+                *remote = Remote {
+                    seen: Neighbour::observed(id, Arc::default()),
+                    member: RemoteMember::default(),
+                    ..std::mem::replace(remote, unseen())
+                };
             }
             Ok(())
         })

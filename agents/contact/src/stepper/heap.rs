@@ -94,9 +94,11 @@ struct Placed<'a> {
 impl Heap {
     /// Writes or reads the heap, with all that rapier3d knows of it.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive.option(&mut self.world, || Box::new(World::empty(DVec3::ZERO)), |world, archive| {
-            archive_values!(archive, world.physics, world.origin_m, world.bodies, world.contacts)
-        })
+        archive.option(
+            &mut self.world,
+            || Box::new(World::empty(DVec3::ZERO)),
+            |world, archive| archive_values!(archive, world.physics, world.origin_m, world.bodies, world.contacts),
+        )
     }
 
     /// Whether the cluster is one.

@@ -10,8 +10,8 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
-    check_span,
+    Archive, ArchiveError, Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport,
+    archive_values, check_span,
 };
 use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use std::sync::Arc;

@@ -21,7 +21,9 @@ use super::{Section, TubeSpec, WallModel};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Archive, ArchiveError, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
+use metachron_core::{
+    Archive, ArchiveError, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
+};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 

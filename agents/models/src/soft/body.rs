@@ -15,7 +15,10 @@ use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
-use metachron_core::{Archive, ArchiveError, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
+use metachron_core::{
+    Archive, ArchiveError, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
+    check_span,
+};
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
 

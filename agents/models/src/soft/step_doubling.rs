@@ -7,8 +7,8 @@ use super::anchor_springs::VertexSpring;
 use super::body::SoftBody;
 use super::system::Purpose;
 use glam::DVec3;
-use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 use metachron_core::step_doubling::{DoublingSchedule, farthest};
+use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 
 /// The error in time of one soft body.
 #[derive(Debug, Default)]

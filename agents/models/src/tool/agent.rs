@@ -16,8 +16,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState,
-    archive_values, check_span, shortest_turn,
+    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError,
+    StepReport, ToolState, archive_values, check_span, shortest_turn,
 };
 use metachron_geometry::ToolShape;
 use metachron_geometry::{CollisionShape, ShapeKind};
