@@ -6,6 +6,7 @@
 use super::agent_runner::AgentRunner;
 use super::cluster::Placed;
 use super::handle::Shared;
+use super::sleep::SleepRegistry;
 use metachron_core::{Archive, ArchiveError, archive_values};
 use std::sync::Arc;
 
@@ -50,6 +51,22 @@ pub(super) fn archive_agents(all: &mut [Placed], archive: &mut Archive<'_>) -> R
         })?;
     }
     let Some(first) = all.first() else { return Ok(()) };
-    first.runner.shared.sleep.archive(archive)?;
+    archive_sleep(&first.runner.shared.sleep, archive)?;
     first.runner.peers.broad_phase.as_ref().map_or(Ok(()), |broad_phase| broad_phase.archive(archive))
+}
+
+/// Writes or reads who rests and who leads whom.
+fn archive_sleep(sleep: &SleepRegistry, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    let mut state = sleep.state();
+    let agents = state.signals.len();
+    archive.value(&mut state)?;
+    if !archive.is_reading() {
+        return Ok(());
+    }
+    if state.signals.len() != agents {
+        let (found, expected) = (state.signals.len().to_string(), agents.to_string());
+        return Err(ArchiveError::Mismatch { what: "the number of agents that may sleep", found, expected });
+    }
+    sleep.set_state(&state);
+    Ok(())
 }

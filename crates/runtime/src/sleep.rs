@@ -16,7 +16,7 @@ use super::sync::atomic::{
 };
 use super::sync::thread::Thread;
 use super::worker_wakeup::WorkerWakeup;
-use metachron_core::{AgentId, Archive, ArchiveError, SimSpan, SimTime, archive_values};
+use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -75,6 +75,24 @@ pub(super) struct SleepRegistry {
     wakeup: OnceLock<WorkerWakeup>,
     /// Agents with new states, for the reader of the run.
     pub changed: DirtySet,
+}
+
+/// What a [`SleepRegistry`] knows of its agents between turns.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct SleepState {
+    pub signals: Vec<SignalState>,
+    notified: bool,
+    far_behind: u64,
+}
+
+/// The flags of one agent, as [`Signal`] has them.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct SignalState {
+    resting: bool,
+    woken: bool,
+    leader: u32,
+    closed: bool,
+    touched: u64,
 }
 
 impl SleepRegistry {
@@ -263,19 +281,19 @@ impl SleepRegistry {
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
-    /// Writes or reads who rests, is woken, was touched, and who leads whom. After a reading all agents have new states.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        for signal in &self.signals {
-            signal.archive(archive)?;
-        }
-        let (mut notified, mut far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
-        archive_values!(archive, notified, far_behind)?;
-        self.notified.store(notified, Release);
-        self.far_behind.store(far_behind, Release);
-        if archive.is_reading() {
-            (0..).map(AgentId).take(self.signals.len()).for_each(|id| self.changed.mark(id));
-        }
-        Ok(())
+    /// Who rests, is woken, was touched, and who leads whom.
+    pub fn state(&self) -> SleepState {
+        let (notified, far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
+        SleepState { signals: self.signals.iter().map(Signal::state).collect(), notified, far_behind }
+    }
+
+    /// Takes over a state of as many agents; all of them have new states then.
+    pub fn set_state(&self, state: &SleepState) {
+        let SleepState { signals, notified, far_behind } = state;
+        self.signals.iter().zip(signals).for_each(|(signal, state)| signal.set_state(*state));
+        self.notified.store(*notified, Release);
+        self.far_behind.store(*far_behind, Release);
+        (0..).map(AgentId).take(self.signals.len()).for_each(|id| self.changed.mark(id));
     }
 
     /// Asks every thread to end.
@@ -291,17 +309,22 @@ impl SleepRegistry {
 }
 
 impl Signal {
-    fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        for flag in [&self.resting, &self.woken, &self.closed] {
-            let mut value = flag.load(Acquire);
-            archive.value(&mut value)?;
-            flag.store(value, Release);
+    fn state(&self) -> SignalState {
+        SignalState {
+            resting: self.resting.load(Acquire),
+            woken: self.woken.load(Acquire),
+            leader: self.leader.load(Acquire),
+            closed: self.closed.load(Acquire),
+            touched: self.touched.load(Acquire),
         }
-        let (mut leader, mut touched) = (self.leader.load(Acquire), self.touched.load(Acquire));
-        archive_values!(archive, leader, touched)?;
+    }
+
+    fn set_state(&self, SignalState { resting, woken, leader, closed, touched }: SignalState) {
+        self.resting.store(resting, Release);
+        self.woken.store(woken, Release);
         self.leader.store(leader, Release);
+        self.closed.store(closed, Release);
         self.touched.store(touched, Release);
-        Ok(())
     }
 
     /// Whether it was woken since the last call; writes before the wake are then visible.
