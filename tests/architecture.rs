@@ -34,6 +34,9 @@ const ABSENT: [(&str, &[&str]); 6] = [
     ("crates/session", &["egui", "std::thread::spawn"]),
 ];
 
+/// Where a crate that otherwise knows no file has one: what the program itself has written, and reads again.
+const OWN_FILES: [&str; 1] = ["crates/world/src/checkpoint.rs"];
+
 /// Modules of the numbers that need neither the standard library nor a type of the engine.
 const NO_STD: [&str; 7] = ["adaptive", "cost", "grisoni", "hysteresis", "log_law", "select", "share"];
 
@@ -160,7 +163,8 @@ fn crates_keep_their_promises_of_absence() {
         for (number, line) in
             code.lines().enumerate().filter(|(_, l)| !is_test(&path) && !l.trim_start().starts_with("//"))
         {
-            for word in absent.iter().filter(|word| line.contains(**word)) {
+            let is_own_file = |word: &str| word == "std::fs" && OWN_FILES.contains(&path.as_str());
+            for word in absent.iter().filter(|word| line.contains(**word) && !is_own_file(word)) {
                 broken.push(format!("{path}:{}: {word}", number + 1));
             }
         }

@@ -7,7 +7,9 @@ use crate::joint::Motor;
 use crate::stepper::ClusterMember;
 use crate::{Law, Link};
 use glam::{DQuat, DVec3};
-use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport};
+use metachron_core::{
+    AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport,
+};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
 
@@ -54,6 +56,17 @@ pub trait Agent: Send {
 
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
+
+    /// Writes the state to an archive, or reads it from one, field by field: all that the next bit of a run needs, guesses included, and
+    /// nothing that an agent built alike has anyway. It is called between steps.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`] by a model that does not save its state, as this one does where a model has nothing else;
+    /// [`ArchiveError`] for a state of another agent. After an error while reading the agent must not step again.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let _ = archive;
+        Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })
+    }
 
     /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes.
     fn momentum(&self) -> (DVec3, DVec3);
@@ -117,7 +130,7 @@ impl Neighbour {
 }
 
 /// A spring from a moving point of space to a material point of an agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AnchorSpring {
     /// The agent that pulls; `None` for the user's spring.
     pub by: Option<AgentId>,
@@ -134,7 +147,7 @@ pub struct AnchorSpring {
 }
 
 /// A force on a material point of an agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AnchorForce {
     /// The material point that it acts on.
     pub anchor: Anchor,
@@ -145,7 +158,7 @@ pub struct AnchorForce {
 }
 
 /// A motor in the place of the one that the scene gives a joint.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SetMotor {
     /// The joint's number in the scene.
     pub joint: u32,
@@ -154,7 +167,7 @@ pub struct SetMotor {
 }
 
 /// Another place or velocity for an agent. What is `None` stays.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SetMotion {
     /// Where the origin of a rigid body's axes is, or the centre of mass of a body that bends, metres.
     pub position_m: Option<DVec3>,

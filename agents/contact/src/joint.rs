@@ -89,7 +89,7 @@ impl Joint {
 }
 
 /// A motor of a joint: of a hinge in radians and newton metres, of a slide in metres and newtons.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Motor {
     /// What it drives the joint to.
     pub goal: MotorGoal,
@@ -98,7 +98,7 @@ pub struct Motor {
 }
 
 /// What a motor drives a joint to: how b moves relative to a.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum MotorGoal {
     /// A velocity, rad/s or m/s, kept as exactly as the bound of the motor allows.
     Velocity(f64),

@@ -6,7 +6,7 @@ use crate::{AgentId, SimTime};
 use std::fmt;
 
 /// An attachment of a scene, by its number among those of its kind, from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum AttachmentId {
     /// A coupling that joins a point of one agent to one of another.
     Coupling(u32),
@@ -28,7 +28,7 @@ impl fmt::Display for AttachmentId {
 }
 
 /// Something that happened to an attachment.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AttachmentEvent {
     /// Which one.
     pub attachment: AttachmentId,
@@ -43,7 +43,7 @@ pub struct AttachmentEvent {
 }
 
 /// What can happen to an attachment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum AttachmentEventKind {
     /// It slipped for the first time.
     Yielded,

@@ -6,7 +6,7 @@ use crate::AgentId;
 use glam::{DQuat, DVec2, DVec3};
 
 /// Position of matter and the fastest speed at which it may leave.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bounds {
     /// The lowest coordinates, metres.
     pub low: DVec3,
@@ -17,7 +17,7 @@ pub struct Bounds {
 }
 
 /// The state of an agent's matter; which one is fixed for an agent's life.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub enum Body {
     /// No matter (a synthetic agent).
     #[default]
@@ -33,7 +33,7 @@ pub enum Body {
 }
 
 /// The vertices of a soft body. What joins them never changes (`metachron_geometry::SurfaceShape`).
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct SoftState {
     /// Positions, metres, world axes.
     pub positions: Vec<DVec3>,
@@ -42,7 +42,7 @@ pub struct SoftState {
 }
 
 /// A framed curve of N segments between N + 1 nodes. Positions are in metres, world axes.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct CurveState {
     /// Rest arc length of each node in metres, rising from 0 to the rest length; N + 1 entries.
     pub arc_m: Vec<f64>,
@@ -60,7 +60,7 @@ pub struct CurveState {
 }
 
 /// The pose and motion of a rigid body, about its centre of mass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RigidState {
     /// Centre of mass, metres.
     pub position: DVec3,
@@ -76,7 +76,7 @@ pub struct RigidState {
 pub const GRASP_BELOW: f64 = 0.2;
 
 /// A driven tool: the tip between its jaws, the shaft along the tool's own −z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ToolState {
     /// The point between the jaws, metres.
     pub tip: DVec3,
@@ -99,7 +99,7 @@ pub struct ToolState {
 }
 
 /// A tool's attachment to a material point of another agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Grasp {
     /// The grasped agent.
     pub target: AgentId,
@@ -114,7 +114,7 @@ pub struct Grasp {
 }
 
 /// Rotational attachment of a rigid body to jaws of length `arm_m` that press along all of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GraspOrientation {
     /// Rotation from the body's axes to the tool's at which the attachment exerts no torque.
     pub rotation: DQuat,
@@ -123,7 +123,7 @@ pub struct GraspOrientation {
 }
 
 /// A material point of a body: it moves with the matter, whatever the resolution.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Anchor {
     /// The point of a curve's axis at this rest arc length in metres.
     Arc(f64),
@@ -134,7 +134,7 @@ pub enum Anchor {
 }
 
 /// The force with which `by` holds this agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Grip {
     /// The agent that holds; `None` for the user's spring.
     pub by: Option<AgentId>,

@@ -3,7 +3,7 @@
 use crate::AgentId;
 
 /// An agent's part in the contact cluster that it was stepped in last.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ClusterState {
     /// The member of lowest number: it makes the cluster's turns.
     pub leader: AgentId,
@@ -16,7 +16,7 @@ pub struct ClusterState {
 }
 
 /// How a cluster was solved. Counts are those of all steps that its leader has led so far.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ClusterSolves {
     /// Contacts of the last step, those that bear nothing included.
     pub contacts: u32,

@@ -4,7 +4,7 @@ use crate::{AgentId, SimTime};
 use glam::DVec3;
 
 /// The other side of a contact, or of a touch that is only sensed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum ContactPartner {
     /// A static solid, by its number in the scene.
     Static(u32),
@@ -13,7 +13,7 @@ pub enum ContactPartner {
 }
 
 /// A contact with all its places. It is published by the agent, of two by that of the lower number.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactState {
     /// The other side.
     pub with: ContactPartner,

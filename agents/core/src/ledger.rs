@@ -15,7 +15,7 @@ use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// An impulse on a body: N·s, and N·m·s about its centre of mass (about its own middle for a segment of a tube).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Impulse {
     /// The change of linear momentum, N·s.
     pub linear: DVec3,
@@ -24,7 +24,7 @@ pub struct Impulse {
 }
 
 /// Where on a body an impulse acts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Site {
     /// A rigid body or a tool, as a whole.
     Whole,
@@ -35,7 +35,7 @@ pub enum Site {
 }
 
 /// The sums that one site was given on one page.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Entry {
     /// Which site.
     pub site: Site,
@@ -46,7 +46,7 @@ pub struct Entry {
 }
 
 /// A stretch of a ledger with its own origin of time.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Page {
     /// Pages of a ledger are numbered from zero.
     pub number: u64,
@@ -57,7 +57,7 @@ pub struct Page {
 }
 
 /// An impulse that acts late in the owner's newest step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Scheduled {
     /// The earliest time at which it may be taken.
     pub due: SimTime,
@@ -70,7 +70,7 @@ pub struct Scheduled {
 }
 
 /// The difference between the impulse that a rigid body has taken and the booked one, of either sign: it lets a force continue evenly.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ahead {
     /// The impulse taken beyond the ledger.
     pub sum: Impulse,
@@ -89,7 +89,7 @@ impl Ahead {
 }
 
 /// All that the owner of a coupling has given to the peer; the peer keeps a copy of all that it has taken.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
     /// The agent on the other side.
     pub with: AgentId,

@@ -19,6 +19,7 @@
 //! assert_ne!(before.fold_hash(HASH_START), later.fold_hash(HASH_START));
 //! ```
 
+pub mod archive;
 mod attachment;
 pub mod body;
 mod cluster_state;
@@ -42,6 +43,7 @@ pub mod step_doubling;
 pub mod time;
 pub mod wave;
 
+pub use archive::{Archive, ArchiveError};
 pub use attachment::{AttachmentEvent, AttachmentEventKind, AttachmentId};
 pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,

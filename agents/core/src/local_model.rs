@@ -7,7 +7,7 @@ use crate::{AgentId, SimTime};
 use glam::{DMat3, DVec3};
 
 /// A block of three velocities of a body: that of a vertex, a node or a centre of mass (m/s), or a spin (rad/s).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LocalBlock {
     /// The block as the published body counts it: a vertex of a soft body; of a tube nodes and segments in turn, 2 k and 2 k + 1; of a rigid
     /// body or tool its centre, 0, and its spin, 1.
@@ -19,7 +19,7 @@ pub struct LocalBlock {
 }
 
 /// What a partner did to the body in its last step.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LocalPartner {
     /// The partner.
     pub id: AgentId,
@@ -30,7 +30,7 @@ pub struct LocalPartner {
 }
 
 /// A body as its partners need it: where they may touch it or are linked to it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LocalModel {
     /// The body's step, in which it gives evenly what it takes, seconds, > 0.
     pub step_s: f64,

@@ -4,7 +4,7 @@ use super::wave::Wave;
 use crate::AgentId;
 
 /// How an agent's couplings act.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum PairKind {
     /// Contact by impulse ledger.
     #[default]
@@ -34,7 +34,7 @@ impl PairKind {
 }
 
 /// What a coupling does now, published by its owner.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PairState {
     /// The agent on the other side.
     pub with: AgentId,

@@ -7,7 +7,7 @@ pub const N_MAX: u8 = 10;
 ///
 /// A controller requests a pair; the holder of the shape answers with the nearest one that it supports.
 /// The simulation and the picture of an object each have one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Resolution {
     /// Requested spacing ε of samples along the shape, in metres; finite, > 0. Larger is coarser.
     pub eps_m: f64,

@@ -5,7 +5,7 @@
 use crate::{ContactPartner, SimTime};
 
 /// A pair of which one side only senses. It is published by the agent, of two by that of the lower number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SensorTouch {
     /// The other side.
     pub with: ContactPartner,

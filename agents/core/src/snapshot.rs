@@ -8,7 +8,7 @@ use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, Sensor
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Snapshot {
     /// The agent's own time, written by the runtime when it publishes.
     pub time: SimTime,
@@ -61,7 +61,7 @@ pub struct Snapshot {
 }
 
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub enum Inertia {
     /// Immovable, or what impulses do is not published.
     #[default]

@@ -22,7 +22,7 @@ const ROWS: u64 = EVERY / STEPS as u64;
 const GOLDEN: u32 = 2_654_435_769;
 
 /// The error estimate of one object's steps.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub struct DoublingSchedule {
     /// Number of steps of the present row that have been repeated; `None` between rows.
     made: Option<u32>,

@@ -6,11 +6,11 @@
 use std::ops::{Add, AddAssign, Sub};
 
 /// A point of simulated time: nanoseconds since the scene began, `0..=u64::MAX` (584 years).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize, serde::Deserialize)]
 pub struct SimTime(u64);
 
 /// A length of simulated time in nanoseconds, `0..=u64::MAX`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, serde::Serialize, serde::Deserialize)]
 pub struct SimSpan(u64);
 
 const NANOS_PER_SECOND: f64 = 1e9;

@@ -4,7 +4,7 @@ use crate::SimTime;
 use glam::DVec3;
 
 /// The data that one end publishes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Wave {
     /// ∫ w dt since the run began, N·s.
     pub sent: DVec3,

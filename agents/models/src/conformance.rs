@@ -25,7 +25,8 @@ use glam::DVec3;
 use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{
-    AgentId, Body, DT_MAX_S, Grip, HASH_START, PlainLoop, Resolution, SimSpan, SimTime, Snapshot, StepError,
+    AgentId, Archive, ArchiveError, Body, DT_MAX_S, Grip, HASH_START, PlainLoop, Resolution, SimSpan, SimTime,
+    Snapshot, StepError,
 };
 
 mod bits;
@@ -81,6 +82,9 @@ pub enum Promise {
     Residual,
     /// The same calls give the same bits.
     SameBits,
+    /// What is saved and read back goes on with the same bits, in an agent built anew and in one that was elsewhere. A model that saves nothing
+    /// keeps this promise.
+    Archive,
     /// Nothing is allocated once the sizes settle.
     Allocation,
     /// A state that is not finite is refused, never written.
@@ -140,6 +144,7 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
         (Promise::Retune, physics::set_resolution),
         (Promise::Residual, physics::residual),
         (Promise::SameBits, bits::same_bits),
+        (Promise::Archive, bits::archive),
         (Promise::Allocation, bits::allocation),
         (Promise::Finite, bits::finite),
     ];
@@ -175,6 +180,18 @@ struct Cluster {
     stepper: ClusterStepper,
     memory: ContactMemory,
     grips: Vec<Grip>,
+}
+
+impl Run<'_> {
+    /// Writes or reads it, with what its cluster knows of it.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.agent.archive(archive)?;
+        archive.value(&mut self.time)?;
+        self.cluster.iter_mut().try_for_each(|cluster| {
+            archive.value(&mut cluster.memory)?;
+            cluster.stepper.archive(archive)
+        })
+    }
 }
 
 impl Cluster {

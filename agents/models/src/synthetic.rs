@@ -5,7 +5,10 @@
 
 use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, check_span};
+use metachron_core::{
+    Archive, ArchiveError, Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, archive_values,
+    check_span,
+};
 
 /// A synthetic agent: cost per step = `cost_us · (eps_ref / ε)^cost_order`, error = `error_m · (ε / eps_ref)^error_order`,
 /// with `eps_ref` the coarsest spacing of its range.
@@ -145,6 +148,10 @@ impl Agent for Synthetic {
         into.residual_m = self.error_m();
         into.touches.clear();
         into.grips.clear();
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.resolution, self.steps, self.sink)
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {

@@ -32,6 +32,7 @@ pub mod tune;
 
 /// An end of a range of resolutions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub enum Bound {
     /// As fine as allowed: there is time left that cannot be used.
     Finest,

@@ -51,7 +51,7 @@ const TICK: Duration = Duration::from_micros(125);
 const WAIT_MS: u32 = 2;
 
 /// An agent's own time and the length of its next step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct AgentClock {
     time: SimTime,
     dt: SimSpan,
@@ -76,7 +76,7 @@ pub struct AgentClock {
 }
 
 /// Start of a turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Start {
     /// Delay between the release and the start of the turn, wall time; measured before time is dropped.
     pub late: Duration,

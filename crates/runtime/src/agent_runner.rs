@@ -18,6 +18,7 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
+use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
 use metachron_contact::{Agent, Link, SetMotion};
@@ -64,7 +65,7 @@ pub(super) struct AgentRunner {
 }
 
 /// A turn between its begin and its finish.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingTurn {
     pub start: Start,
     pub dt: SimSpan,
@@ -107,7 +108,7 @@ pub(super) enum Next {
 }
 
 /// Measures the interval between the starts of an agent's turns.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct TurnPeriod {
     last: Option<(Duration, u64)>,
     period_s: Option<f32>,
@@ -371,7 +372,11 @@ impl AgentRunner {
     fn vanish(&mut self) {
         let time = self.pace.time();
         let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
-        self.writer.fill(|into| *into = nothing);
+        self.agent = Box::new(Nobody);
+        self.writer.fill(|into| {
+            *into = nothing;
+            true
+        });
         self.withheld = !self.writer.publish();
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_nowhere(self.id(), time);

@@ -12,7 +12,7 @@ mod published_bounds;
 pub(super) use neighbour_list::NeighbourList;
 
 use glam::DVec3;
-use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime};
 use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
@@ -42,7 +42,7 @@ pub(super) struct BroadPhase {
 #[derive(Debug, Default)]
 struct Calls {
     any: AtomicBool,
-    pages: boxcar::Vec<OnceLock<Page>>,
+    pages: OnceLock<Box<boxcar::Vec<OnceLock<Page>>>>,
 }
 
 /// The bits of some callers.
@@ -119,10 +119,11 @@ impl BroadPhase {
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
-        while calls.pages.count() <= word / PAGE_WORDS {
-            calls.pages.push(OnceLock::new());
+        let pages = calls.pages.get_or_init(Box::default);
+        while pages.count() <= word / PAGE_WORDS {
+            pages.push(OnceLock::new());
         }
-        if let Some(page) = calls.pages.get(word / PAGE_WORDS) {
+        if let Some(page) = pages.get(word / PAGE_WORDS) {
             page.get_or_init(Box::default)[word % PAGE_WORDS].fetch_or(bit, SeqCst);
             calls.any.store(true, SeqCst);
         }
@@ -134,7 +135,8 @@ impl BroadPhase {
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;
         }
-        for (page, words) in calls.pages.iter().filter_map(|(at, page)| Some((at, page.get()?))) {
+        let pages = calls.pages.get().into_iter().flat_map(|pages| pages.iter());
+        for (page, words) in pages.filter_map(|(at, page)| Some((at, page.get()?))) {
             for (word, bits) in words.iter().enumerate() {
                 let mut bits = bits.swap(0, SeqCst);
                 while bits != 0 {
@@ -143,6 +145,28 @@ impl BroadPhase {
                 }
             }
         }
+    }
+
+    /// Writes or reads what agents have published of where they are and whom they have called; called between turns.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.bounds.iter().try_for_each(|(_, bounds)| bounds.archive(archive))?;
+        for word in self.log.iter().chain([&self.noted]) {
+            let mut value = word.load(SeqCst);
+            archive.value(&mut value)?;
+            word.store(value, SeqCst);
+        }
+        for to in (0..self.calls.count() as u32).map(AgentId) {
+            let mut callers = Vec::new();
+            self.take_callers(to, |from| callers.push(from));
+            let before = callers.clone();
+            let outcome = archive.value(&mut callers);
+            if outcome.is_err() {
+                callers = before;
+            }
+            callers.iter().for_each(|from| self.call(to, *from));
+            outcome?;
+        }
+        Ok(())
     }
 
     fn log_speed(&self, id: AgentId) {

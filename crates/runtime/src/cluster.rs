@@ -8,6 +8,7 @@ mod attachments;
 mod common_time;
 mod contacts;
 mod membership;
+mod places;
 mod seats;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ mod turn;
 pub(super) use attachments::JointedTo;
 use attachments::{held_by_joints, held_by_links};
 pub(super) use membership::{Epoch, Membership};
+pub(super) use places::{Place, Placed, check_places, put_back, take_apart};
 pub(super) use seats::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
 pub(super) use turn::Leap;
 
@@ -32,8 +34,8 @@ use metachron_contact::stepper::{
 use metachron_contact::{AnchorForce, AnchorSpring, Link, Neighbour, SetMotor, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
-    AgentId, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets, Grip, PairKind, PairState,
-    SimSpan, SimTime, Snapshot, StepReport, recycled,
+    AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets,
+    Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, archive_values, recycled,
 };
 use std::sync::Arc;
 
@@ -164,6 +166,17 @@ impl ClusterSeat {
         if let Some(pairs) = &self.asynchronous {
             pairs.write(into);
         }
+    }
+
+    /// Writes or reads what the next turns need of those before.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.memory, self.grips, self.pairs, self.contacts, self.events)?;
+        archive_values!(archive, self.bonds, self.sleepers)?;
+        archive_values!(archive, self.work, self.work_s, self.schedule, self.drift_m, self.state, self.solves)?;
+        archive.option(&mut self.stepper, Box::default, |stepper, archive| stepper.archive(archive))?;
+        archive.option(&mut self.doubling, Box::default, |doubling, archive| doubling.archive(archive))?;
+        archive.option(&mut self.asynchronous, Box::default, |pairs, archive| pairs.archive(archive))?;
+        archive.option(&mut self.remotes, Box::default, |remotes, archive| remotes.archive(archive))
     }
 
     /// What the turns that it leads took on helpers, as far as it is not accounted for.

@@ -2,12 +2,22 @@
 //!
 //! Never here: a control law. The runtime measures and obeys; it decides no ε.
 
-use metachron_core::{Resolution, SimSpan};
+use metachron_core::{Archive, ArchiveError, Resolution, SimSpan};
 
 /// Controls one agent by the times of its turns.
 pub trait Governor: Send {
     /// Called after every turn; its demand holds from the next turn on.
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand;
+
+    /// Writes its state to an archive, or reads it from one ([`metachron_contact::Agent::archive`]).
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`] by one that does not save its state, as this one does where a governor has nothing else;
+    /// [`ArchiveError`] for a state of another one.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let _ = archive;
+        Err(ArchiveError::Refused { what: "its governor".to_owned() })
+    }
 }
 
 /// Measurements of a turn.

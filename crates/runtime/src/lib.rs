@@ -28,6 +28,7 @@
 mod agent_clock;
 mod agent_runner;
 mod agents;
+mod archive;
 mod broad_phase;
 mod clock;
 mod cluster;
@@ -49,6 +50,7 @@ mod lockstep;
 mod machine;
 mod mailbox;
 mod metrics;
+mod nobody;
 mod observation;
 mod pool;
 mod prefetch;
@@ -86,7 +88,7 @@ pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 
-use metachron_core::{AgentId, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::time::Duration;
 
 /// A run of agents, on any executor.
@@ -120,6 +122,17 @@ pub trait Run: Send {
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
+
+    /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same agents; it then goes on
+    /// as it did then, to the bit. Watched points keep their samples.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`] in real time, and by agents and governors that do not save their state: nothing is changed then. Any error
+    /// while reading leaves a run that is not usable any more.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let _ = archive;
+        Err(ArchiveError::Refused { what: "a run in real time".to_owned() })
+    }
 
     /// Simulated time now.
     fn sim_now(&self) -> SimTime {

@@ -7,13 +7,14 @@ use metachron_contact::{AnchorForce, AnchorSpring, SetMotor};
 use metachron_core::{SimSpan, SimTime};
 
 /// All that users do to an agent.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Loads {
     springs: Vec<Lasting<AnchorSpring>>,
     forces: Vec<Lasting<AnchorForce>>,
     motors: Vec<Lasting<SetMotor>>,
     impulses: Vec<Blow>,
     /// What acts in the step that was prepared last.
+    #[serde(skip)]
     acting: Acting,
 }
 
@@ -25,7 +26,7 @@ struct Acting {
     motors: Vec<SetMotor>,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Lasting<T> {
     key: u32,
     what: T,
@@ -34,7 +35,7 @@ struct Lasting<T> {
 }
 
 /// An impulse: it acts evenly over one step.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Blow {
     /// N·s and N·m·s.
     impulse: AnchorForce,

@@ -10,15 +10,16 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
-use super::cluster::{Handover, close_remaining, hand_over};
+use super::archive::archive_agents;
+use super::cluster::{Handover, Place, Placed, check_places, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::machine::{Machine, duration};
-use super::metrics::{AgentState, AgentStats};
+use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use cores::Cores;
-use metachron_core::AgentId;
+use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -49,7 +50,7 @@ struct AgentEntry {
     turns: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Phase {
     Waiting,
     /// In a turn.
@@ -60,7 +61,7 @@ enum Phase {
 }
 
 /// A turn that goes on.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Turn {
     /// When it began.
     since: Duration,
@@ -200,10 +201,6 @@ impl Lockstep {
             None => entry.phase = Phase::Parked,
         }
         self.count_cpu(agent, started.elapsed());
-        if self.all.handles[agent].state() == AgentState::Gone {
-            self.settle();
-            self.entries[agent].actor = None;
-        }
     }
 
     fn finish(&mut self, agent: usize) {
@@ -256,6 +253,26 @@ impl Lockstep {
         let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
         close_remaining(&self.all.handles, &self.timeline, self.now);
+    }
+
+    /// Writes or reads the events to come and all agents, which were taken from their places.
+    fn archive_all(&mut self, all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_agents(all, archive)?;
+        let mut places: Vec<Place> = all.iter().map(|placed| placed.place).collect();
+        archive.value(&mut places)?;
+        check_places(&places, all)?;
+        archive_values!(archive, self.timeline, self.now, self.due)?;
+        self.cores.archive(archive)?;
+        for entry in &mut self.entries {
+            archive_values!(archive, entry.phase, entry.turns)?;
+        }
+        let owners = self.due.iter().map(|Reverse((_, agent))| *agent).chain(self.cores.owners());
+        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= all.len()) {
+            let (found, expected) = (agent.to_string(), format!("below {}", all.len()));
+            return Err(ArchiveError::Mismatch { what: "the number of an agent with a turn", found, expected });
+        }
+        all.iter_mut().zip(places).for_each(|(placed, place)| placed.place = place);
+        Ok(())
     }
 
     fn settle(&mut self) {
@@ -338,6 +355,15 @@ impl Run for Lockstep {
         self.entries.push(AgentEntry { actor: Some(actor), phase, turns: 0 });
         self.schedule(agent);
         Ok(handle)
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.settle();
+        let mut all = take_apart(self.entries.iter_mut().map(|entry| entry.actor.take()), &self.all.handles);
+        let outcome = self.archive_all(&mut all, archive);
+        let homes = put_back(all, &self.all.handles);
+        self.entries.iter_mut().zip(homes).for_each(|(entry, home)| entry.actor = home);
+        outcome
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

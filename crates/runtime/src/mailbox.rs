@@ -4,7 +4,7 @@
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
 use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -38,7 +38,7 @@ pub enum Command {
 }
 
 /// Something that is done to an agent until it is taken back, or until its time is over.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Keyed<T> {
     /// Its name: the newest of a key takes the place of the older. Below [`KEYS`], but for motors.
     pub key: u32,
@@ -95,7 +95,7 @@ pub(super) struct Mailbox {
 }
 
 /// Contents of a mailbox.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingCommands {
     /// The newest requested resolution.
     pub set_resolution: Option<Resolution>,
@@ -146,6 +146,18 @@ impl Mailbox {
         }
         self.full.store(true, Release);
         drop(pending);
+        Ok(())
+    }
+
+    /// Writes or reads the commands that wait.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let mut is_full = self.has_pending();
+        archive.value(&mut is_full)?;
+        if is_full {
+            let pending = self.pending.get_or_init(Box::default);
+            archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
+        }
+        self.full.store(is_full, Release);
         Ok(())
     }
 

@@ -5,9 +5,10 @@
 
 use super::agent_clock::AgentClock;
 use super::histogram::Histogram;
-use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
+use arc_swap::ArcSwapOption;
+use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// State of an agent's execution.
@@ -123,7 +124,8 @@ pub(super) struct Metrics {
     pub work: Gauge,
     late: [Gauge; 3],
     state: AtomicU8,
-    reason: OnceLock<String>,
+    /// Why it was parked; read when it is.
+    reason: ArcSwapOption<String>,
 }
 
 impl Metrics {
@@ -132,7 +134,7 @@ impl Metrics {
             RUNNING => AgentState::Running,
             RESTING => AgentState::Resting,
             GONE => AgentState::Gone,
-            _ => AgentState::Parked(self.reason.get().cloned().unwrap_or_default()),
+            _ => AgentState::Parked(self.reason.load().as_deref().cloned().unwrap_or_default()),
         }
     }
 
@@ -159,11 +161,29 @@ impl Metrics {
 
     /// Parks the agent for good; the first reason is kept.
     pub fn park(&self, reason: String) {
-        if self.has_left() {
-            return;
+        if matches!(self.state.load(Relaxed), RUNNING | RESTING) {
+            self.reason.store(Some(Arc::new(reason)));
+            self.state.store(PARKED, Relaxed);
         }
-        self.reason.get_or_init(|| reason);
-        self.state.store(PARKED, Relaxed);
+    }
+
+    /// Writes or reads them; CPU time and the times by which turns were late go on being counted.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        for count in [&self.steps, &self.misses, &self.dt, &self.dropped, &self.rested] {
+            let mut value = count.load(Relaxed);
+            archive.value(&mut value)?;
+            count.store(value, Relaxed);
+        }
+        for gauge in [&self.rate_hz, &self.mean_hz, &self.work_s, &self.work] {
+            let mut value = gauge.get();
+            archive.value(&mut value)?;
+            gauge.set(value);
+        }
+        let (mut state, mut reason) = (self.state.load(Relaxed), self.reason.load().as_deref().cloned());
+        archive_values!(archive, state, reason)?;
+        self.reason.store(reason.map(Arc::new));
+        self.state.store(state, Relaxed);
+        Ok(())
     }
 
     pub fn late(&self) -> Spread {
@@ -225,6 +245,12 @@ impl MetricsWriter {
             window,
             first_window: true,
         }
+    }
+
+    /// Writes or reads the counts, but for the times by which turns were late.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self { turns, steps, misses, work_s, turn_s, window, first_window, .. } = self;
+        archive_values!(archive, *turns, *steps, *misses, *work_s, *turn_s, *window, *first_window)
     }
 
     /// Turns recorded so far.

@@ -12,7 +12,7 @@ use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Neighbour;
 use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
-use metachron_core::{AgentId, Snapshot};
+use metachron_core::{AgentId, Archive, ArchiveError, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::{Arc, OnceLock};
 
@@ -144,6 +144,31 @@ impl Observer {
         self.me
     }
 
+    /// Writes or reads whom it sees, each in the state in which it was seen last.
+    pub fn archive(&mut self, peers: &Peers, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let links = self.links as usize;
+        let mut ids: Vec<AgentId> = self.neighbours[links..].iter().map(|neighbour| neighbour.id).collect();
+        archive.value(&mut ids)?;
+        if archive.is_reading() {
+            self.neighbours.truncate(links);
+            self.sources.truncate(links);
+            ids.iter().for_each(|id| self.list(peers, *id));
+            check_seen(&ids, &self.neighbours[links..])?;
+        }
+        for (neighbour, source) in self.neighbours.iter_mut().zip(&mut self.sources) {
+            let mut is_member = source.is_member;
+            archive.value(&mut is_member)?;
+            if is_member != source.is_member {
+                source.is_member = is_member;
+                set_member(neighbour, peers, self.me, is_member);
+            }
+            archive.snapshot(&mut neighbour.snapshot)?;
+        }
+        let me = self.me;
+        let first = || Box::new(NeighbourList::new(me));
+        archive.option(&mut self.neighbour_list, first, |list, archive| list.archive(archive))
+    }
+
     /// The agents so near that they may touch it, as they were at the last update, by rising numbers.
     pub fn near(&self) -> &[AgentId] {
         self.neighbour_list.as_ref().map_or(&[], |list| list.near())
@@ -249,6 +274,17 @@ impl Observer {
         let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.neighbour_of(self.me, id)) else { return };
         self.neighbours.push(neighbour);
         self.sources.push(Source { slot: Arc::clone(&theirs.shared.slot), is_member: false });
+    }
+}
+
+/// Checks that all agents that are to be seen exist.
+fn check_seen(ids: &[AgentId], seen: &[Neighbour]) -> Result<(), ArchiveError> {
+    match ids.iter().find(|id| !seen.iter().any(|neighbour| neighbour.id == **id)) {
+        None => Ok(()),
+        Some(id) => {
+            let (found, expected) = (id.0.to_string(), "that of an agent".to_owned());
+            Err(ArchiveError::Mismatch { what: "the number of a neighbour", found, expected })
+        }
     }
 }
 

@@ -50,6 +50,12 @@ impl<const N: usize> Seqlock<N> {
         self.version.store(version.wrapping_add(2), Ordering::Release);
     }
 
+    /// Forgets what was written; from the writer, while nobody reads.
+    pub fn clear(&self) {
+        self.reached.store(0, Ordering::Relaxed);
+        self.version.store(0, Ordering::Release);
+    }
+
     /// Tries to read once.
     pub fn read(&self) -> ReadOutcome<N> {
         let version = self.version.load(Ordering::Acquire);

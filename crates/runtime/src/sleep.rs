@@ -78,6 +78,24 @@ pub(super) struct SleepRegistry {
     pub changed: DirtySet,
 }
 
+/// What a [`SleepRegistry`] knows of its agents between turns.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct SleepState {
+    pub signals: Vec<SignalState>,
+    notified: bool,
+    far_behind: u64,
+}
+
+/// The flags of one agent, as [`Signal`] has them.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct SignalState {
+    resting: bool,
+    woken: bool,
+    leader: u32,
+    closed: bool,
+    touched: u64,
+}
+
 impl SleepRegistry {
     pub fn new(agents: usize) -> Self {
         let registry = Self {
@@ -274,6 +292,21 @@ impl SleepRegistry {
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
+    /// Who rests, is woken, was touched, and who leads whom.
+    pub fn state(&self) -> SleepState {
+        let (notified, far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
+        SleepState { signals: self.signals.iter().map(|(_, signal)| signal.state()).collect(), notified, far_behind }
+    }
+
+    /// Takes over a state of as many agents; all of them have new states then.
+    pub fn set_state(&self, state: &SleepState) {
+        let SleepState { signals, notified, far_behind } = state;
+        self.signals.iter().zip(signals).for_each(|((_, signal), state)| signal.set_state(*state));
+        self.notified.store(*notified, Release);
+        self.far_behind.store(*far_behind, Release);
+        (0..).map(AgentId).take(self.signals.count()).for_each(|id| self.changed.mark(id));
+    }
+
     /// Asks every thread to end.
     pub fn stop(&self) {
         self.stop.store(true, Release);
@@ -287,6 +320,24 @@ impl SleepRegistry {
 }
 
 impl Signal {
+    fn state(&self) -> SignalState {
+        SignalState {
+            resting: self.resting.load(Acquire),
+            woken: self.woken.load(Acquire),
+            leader: self.leader.load(Acquire),
+            closed: self.closed.load(Acquire),
+            touched: self.touched.load(Acquire),
+        }
+    }
+
+    fn set_state(&self, SignalState { resting, woken, leader, closed, touched }: SignalState) {
+        self.resting.store(resting, Release);
+        self.woken.store(woken, Release);
+        self.leader.store(leader, Release);
+        self.closed.store(closed, Release);
+        self.touched.store(touched, Release);
+    }
+
     /// Whether it was woken since the last call; writes before the wake are then visible.
     fn take_wake(&self) -> bool {
         // a flag that is down is not written: its cache line stays shared by all readers;

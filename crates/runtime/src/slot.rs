@@ -115,6 +115,20 @@ impl<T: Default> SlotWriter<T> {
         self.filled.is_none()
     }
 
+    /// Publishes a value that is there already, in place of the newest.
+    pub(super) fn replace(&mut self, value: Arc<T>) {
+        let mut left = Some(value);
+        while let Some(value) = left {
+            // readers suspended in every cell, each of which leaves its cell in nanoseconds
+            left = self.slot.put(value, &mut self.spare).err();
+        }
+    }
+
+    /// The value that is filled and not yet published, to be replaced; it is shared with nobody when the next is filled.
+    pub(super) fn filled_mut(&mut self) -> &mut Option<Arc<T>> {
+        &mut self.filled
+    }
+
     /// The value that is filled and not yet published.
     #[must_use]
     pub fn filled(&self) -> Option<&T> {

@@ -7,7 +7,7 @@
 //! Agents and the frame loop exchange these numbers through atomics, without waiting.
 
 use super::assemble::{ROOM, SHARE_MAX};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, price, temporal_error_px};
 use metachron_lod::control::ObjectView;
 use std::sync::Arc;
@@ -36,6 +36,16 @@ impl AgentBudget {
     pub fn new(id: AgentId, rate_hz: f64, least: f64, fair: f64) -> Self {
         let [full, share, visible_eps] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
         Self { id, rate_hz, least, fair, full, share, visible_eps }
+    }
+
+    /// Writes or reads the numbers exchanged.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        for number in [&self.full, &self.share, &self.visible_eps] {
+            let mut bits = number.load(Ordering::Relaxed);
+            archive.value(&mut bits)?;
+            number.store(bits, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// The agent.

@@ -4,7 +4,7 @@
 
 use super::cpu_budget::AgentBudget;
 use super::error_control::ErrorStatus;
-use metachron_core::{Resolution, SimSpan};
+use metachron_core::{Archive, ArchiveError, Resolution, SimSpan};
 use metachron_lod::control;
 use metachron_lod::control::{ErrorControl, ErrorMeasure, RateControl, RateDemand};
 use metachron_runtime::{Demand, Governor, TurnMeasure};
@@ -30,6 +30,12 @@ impl Governor for RateGovernor {
         }
         demanded(demand, measure)
     }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self(control, budget) = self;
+        archive.value(control)?;
+        budget.archive(archive)
+    }
 }
 
 /// An agent's error control as a governor of the runtime, and the data it publishes for the frame loop.
@@ -44,6 +50,13 @@ impl Governor for ErrorGovernor {
         let demand = control.after_turn(&turn);
         status.publish(control.rest());
         demanded(demand, measure)
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self(control, status) = self;
+        archive.value(control)?;
+        status.publish(control.rest());
+        Ok(())
     }
 }
 

@@ -20,6 +20,8 @@
 mod assemble;
 #[cfg(feature = "picture")]
 pub mod calibrate;
+#[cfg(test)]
+mod checkpoint_tests;
 mod coupling_record;
 mod cpu_budget;
 mod drawn_form;

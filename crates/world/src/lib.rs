@@ -1,7 +1,7 @@
 //! A scene as a world that runs: the resolved scene, its start, its agents and their latest states.
 //!
 //! In: a [`Scene`] built in code, or read by another crate. Out: a [`World`].
-//! Never here: TOML, a file, the GPU, a law of control.
+//! Never here: TOML, a file but those of checkpoints, the GPU, a law of control.
 //!
 //! ```
 //! use metachron_core::SimSpan;
@@ -17,10 +17,17 @@
 //! let (position, _) = state.body.probe(0.0).unwrap();
 //! assert!((position.z - 0.05).abs() < 1e-3); // the ball rests on the floor
 //! assert_eq!(world.hash(), again.hash()); // the same bits
+//! let mark = world.checkpoint().unwrap(); // kept in memory, or `mark.write(path)`
+//! world.advance(SimSpan::from_millis(100));
+//! let end = world.hash();
+//! world.restore(&mark).unwrap();
+//! world.advance(SimSpan::from_millis(100));
+//! assert_eq!(world.hash(), end); // it did the same again
 //! ```
 
 mod assemble;
 mod builder;
+mod checkpoint;
 pub mod couplings;
 mod events;
 mod frames;
@@ -37,6 +44,7 @@ mod world;
 
 pub use assemble::{Govern, machine};
 pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, Tube};
+pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};
 pub use initial_overlap::Moved;

@@ -7,17 +7,19 @@ use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
 use super::builder::{Part, SceneBuildError, member};
+use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
 use super::object::{Object, WorldTag};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
-use metachron_core::{AgentId, Anchor, Body, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
     Timeline, TimelineCommand, state_hash, wait_until,
 };
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -108,6 +110,8 @@ struct Shared {
     /// The static solids and joints.
     surroundings: Arc<ClusterScene>,
     executor: ExecutorKind,
+    /// By what checkpoints of its scene are known again.
+    identity: SceneIdentity,
     /// The clock of executors in real time.
     clock: Arc<SystemClock>,
 }
@@ -160,9 +164,68 @@ impl World {
         if executor != ExecutorKind::Lockstep {
             run.drive(TimelineCommand::Pause);
         }
-        let (agents, gravity) = (run.agents().clone(), scene.gravity);
+        let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        Ok(Self { shared: Arc::new(Shared { tag, state, agents, gravity, surroundings, executor, clock }) })
+        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock };
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.
+    ///
+    /// # Errors
+    /// Those of [`World::start`] and [`World::restore`].
+    pub fn open(scene: &Scene, executor: ExecutorKind, checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
+        Self::open_governed(scene, executor, &mut |_| None, checkpoint)
+    }
+
+    /// As [`World::open`], with the governors of the world that was saved.
+    ///
+    /// # Errors
+    /// Those of [`World::start_governed`] and [`World::restore`].
+    pub fn open_governed(
+        scene: &Scene,
+        executor: ExecutorKind,
+        govern: Govern<'_>,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, CheckpointError> {
+        let world = Self::start_governed(scene, executor, govern)?;
+        world.restore(checkpoint)?;
+        Ok(world)
+    }
+
+    /// The state of the world now: all that the next bit of it needs. In lockstep only; samples of watched points and CPU times are not in it.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Refused`] on threads and in a pool, and where a model or a governor does not save its state;
+    /// [`CheckpointError::Stopped`]. The world goes on as it was.
+    pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
+        let mut state = self.state();
+        let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
+        let mut archive = Archive::writer();
+        run.archive(&mut archive).map_err(CheckpointError::Refused)?;
+        let of = self.shared.identity.now(&self.shared.agents);
+        Ok(Checkpoint { of, time: run.sim_now(), state: archive.into_bytes() })
+    }
+
+    /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
+    /// again, to the bit. Objects and agents stay valid.
+    ///
+    /// # Errors
+    /// [`CheckpointError::OtherScene`], also where objects have joined or left since, [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
+    /// [`CheckpointError::Unusable`] it is stopped.
+    pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.shared.identity.now(&self.shared.agents).check(&checkpoint.of)?;
+        let mut state = self.state();
+        let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
+        if self.executor() != ExecutorKind::Lockstep {
+            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a world in real time".to_owned() }));
+        }
+        let Err(reason) = read_state(run.as_mut(), &checkpoint.state) else { return Ok(()) };
+        let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
+        let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
+        // what it has become is not accounted for
+        let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
+        Err(CheckpointError::Unusable { reason })
     }
 
     /// The object of that name.
@@ -415,6 +478,19 @@ impl World {
 
     fn state(&self) -> MutexGuard<'_, State> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Reads the state of a run; a broken one may break any promise of those that read it.
+fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
+    let read = catch_unwind(AssertUnwindSafe(|| {
+        let mut archive = Archive::reader(state);
+        run.archive(&mut archive)?;
+        archive.finish()
+    }));
+    match read {
+        Ok(outcome) => outcome.map_err(|error| error.to_string()),
+        Err(_) => Err("its numbers do not fit together".to_owned()),
     }
 }
 

@@ -96,3 +96,26 @@ fn hundreds_come_and_go() {
         assert_eq!(left, 1, "{executor:?}");
     }
 }
+
+#[test]
+fn a_world_goes_back_to_where_it_was_with_what_acted_on_it() {
+    let world = floor(ExecutorKind::Lockstep);
+    let ball = world.add("ball", Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.4])).unwrap();
+    let up = metachron_world::Command::force(metachron_core::Anchor::Local(DVec3::ZERO), DVec3::Z * 1.5);
+    world.command(ball, up.for_ms(400)).unwrap();
+    world.advance(SimSpan::from_millis(150));
+    let mark = world.checkpoint().unwrap();
+    let ends = [0, 1].map(|_| {
+        world.advance(SimSpan::from_millis(500));
+        let end = (world.hash(), position(&world, ball));
+        world.restore(&mark).unwrap();
+        end
+    });
+    assert_eq!(ends[0], ends[1], "the force ends at the same time again");
+    world.remove(ball).unwrap();
+    world.advance(SimSpan::from_millis(50));
+    assert!(world.restore(&mark).unwrap_err().to_string().contains("left"));
+    let without = world.checkpoint().unwrap();
+    world.advance(SimSpan::from_millis(50));
+    world.restore(&without).unwrap();
+}

@@ -31,6 +31,7 @@ mod worker_wakeup;
 #[path = "../../../crates/runtime/src/dirty_set.rs"]
 mod dirty_set;
 #[path = "../../../crates/runtime/src/seqlock.rs"]
+#[expect(dead_code, reason = "a model uses what it needs")]
 mod seqlock;
 #[path = "../../../crates/runtime/src/slot.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]

@@ -8,7 +8,7 @@ use glam::DVec3;
 use metachron_core::{AgentId, Impulse, Ledger, SimTime, Site, Snapshot};
 
 /// The ledgers of one agent.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Ledgers {
     /// By rising numbers of the receivers.
     given: Vec<Ledger>,
@@ -17,7 +17,7 @@ pub struct Ledgers {
 }
 
 /// What was taken from one partner.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Taken {
     copy: Ledger,
     /// The giver's own time in the last reading.
@@ -26,7 +26,7 @@ struct Taken {
 }
 
 /// What a partner gave a site a second in the last step, N and N·m.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct SiteForce {
     site: Site,
     force: Impulse,

@@ -9,7 +9,7 @@ use crate::laws::{Line, LineLaw, LineStep};
 use crate::stepper::{ClusterStepper, KnownImpulse, LineRow, Matter, Participant};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;
-use metachron_core::{AgentId, PairKind, PairState};
+use metachron_core::{AgentId, Archive, ArchiveError, PairKind, PairState};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{ContactSide, Place, Touch};
 
@@ -27,11 +27,12 @@ pub(super) struct Lines {
 }
 
 /// The line to a partner.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 struct LineAt {
     with: AgentId,
     line: Line,
     /// Its row in this macro step; `None` where it is slack.
+    #[serde(skip)]
     row: Option<LineNow>,
     /// The push of the last step, N.
     pushed_n: f64,
@@ -59,6 +60,11 @@ struct Pressed {
 }
 
 impl Lines {
+    /// Writes or reads what the next macro step needs of it.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.all)
+    }
+
     /// Lays out the rows of all lines for a macro step of `dt_s` seconds.
     pub fn lay_out(&mut self, place: usize, one: &Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.all.iter_mut().for_each(|line| line.row = None);

@@ -21,11 +21,14 @@ use crate::stepper::{
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
 use lines::Lines;
+use metachron_core::archive_values;
 use metachron_core::{
-    AgentId, Anchor, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState, SimTime, Site, Snapshot,
+    AgentId, Anchor, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState,
+    SimTime, Site, Snapshot,
 };
 use metachron_geometry::Touch;
 use metachron_geometry::narrow_phase::NarrowPhaseScratch;
+use std::sync::Arc;
 
 /// The share of its weight from which on a force counts as bearing a body.
 const BEARS_SHARE: f64 = 0.5;
@@ -102,6 +105,32 @@ fn by_ledger(context: &StepContext<'_>, other: &Neighbour) -> bool {
 }
 
 impl Remotes {
+    /// Writes or reads what the next macro step needs of them: what partners gave is remembered, what they are is seen anew.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Malformed`].
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let unseen = || Remote {
+            seen: Neighbour::observed(AgentId(0), Arc::default()),
+            member: RemoteMember::default(),
+            memory: ContactMemory::default(),
+            grips: Vec::new(),
+            met: false,
+        };
+        archive.list(&mut self.all, unseen, |remote, archive| {
+            let mut id = remote.seen.id;
+            archive_values!(archive, id, remote.memory, remote.grips)?;
+            if archive.is_reading() {
+                *remote = Remote {
+                    seen: Neighbour::observed(id, Arc::default()),
+                    member: RemoteMember::default(),
+                    ..std::mem::replace(remote, unseen())
+                };
+            }
+            Ok(())
+        })
+    }
+
     /// Before a macro step: takes what partners of `locals` gave them, and adds the partners that they meet as remote members.
     pub fn join<'a>(
         &'a mut self,
@@ -172,6 +201,15 @@ pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: 
 }
 
 impl Pairs {
+    /// Writes or reads what the next macro step needs of them.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Malformed`].
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.ledgers, self.states, self.model, self.weight)?;
+        self.lines.archive(archive)
+    }
+
     /// Takes what partners gave as impulses that act evenly over the step. What nothing holds goes to where blows would have carried it,
     /// had they come when they acted (eq. 4).
     fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {

@@ -9,6 +9,7 @@ use super::problem::Block;
 use super::rows::{Rows, Term};
 use glam::DMat3;
 use glam::DVec3;
+use metachron_core::{Archive, ArchiveError};
 
 /// A matrix, where rows add to it, and its factor.
 #[derive(Debug, Clone, Default)]
@@ -51,6 +52,14 @@ struct Meeting {
 }
 
 impl Coupled {
+    /// Writes or reads what the next matrix needs: the order of its factor.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        if archive.is_reading() {
+            self.forget();
+        }
+        self.factor.archive(archive)
+    }
+
     /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and those of the rows.
     pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, rows: PlacedRows<'_>) {
         for row in (0..self.active.len()).filter(|&row| self.active[row]) {

@@ -10,7 +10,7 @@ use super::members::Members;
 use super::problem::Block;
 use super::rows::Rows;
 use glam::DVec3;
-use metachron_core::ParallelFor;
+use metachron_core::{Archive, ArchiveError, ParallelFor};
 
 /// Both matrices, each with its factor.
 #[derive(Debug, Clone, Default)]
@@ -30,6 +30,12 @@ pub(super) struct Direct {
 }
 
 impl Direct {
+    /// Writes or reads what the next problem needs: the orders of both factors.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.own.archive(archive)?;
+        self.coupled.archive(archive)
+    }
+
     /// Factors the members' matrices.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use super::problem::Block;
 use super::tiles::{TILE, TILE_SIZE, eliminate, filled, solve_down, solve_up, triangle};
 use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
-use metachron_core::ParallelFor;
+use metachron_core::{Archive, ArchiveError, ParallelFor, archive_values};
 use std::ops::Range;
 
 /// Two blocks that are coupled, in either order; a block with itself is its diagonal.
@@ -101,6 +101,17 @@ pub(super) struct Cholesky {
 }
 
 impl Cholesky {
+    /// Writes or reads the order of elimination, from which the bits of a solution follow: it is that of the matrices that came before. The
+    /// numbers are made anew.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.order, self.fresh_cost, self.fronts)?;
+        if archive.is_reading() {
+            self.fronts.check()?;
+            self.lay_out();
+        }
+        Ok(())
+    }
+
     /// Whether there is room for a matrix of `size` blocks with these couplings.
     pub fn fits(&self, size: usize, pairs: &[Pair]) -> bool {
         let known = self.roomy && self.known == pairs;

@@ -3,8 +3,10 @@
 //! In: the neighbours of each block, and an order. Out: fronts, each after those below it. Never here: numbers of the matrix.
 //! A front takes up one below it where that is cheaper by [`Size::cost`], zeros that it stores then included.
 
+use metachron_core::ArchiveError;
+
 /// A group of blocks that are eliminated together.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Front {
     /// The first of its blocks in the order of elimination, and how many they are.
     pub first: usize,
@@ -18,7 +20,7 @@ pub(super) struct Front {
 }
 
 /// All fronts of a matrix.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Fronts {
     pub fronts: Vec<Front>,
     /// Where each block stands in the order of elimination.
@@ -56,6 +58,27 @@ struct Tree {
 }
 
 impl Fronts {
+    /// Checks fronts that were read: that they are those of one matrix.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Mismatch`].
+    pub fn check(&self) -> Result<(), ArchiveError> {
+        let size = self.rank.len();
+        let mut next = 0;
+        let is_sound = self.fronts.iter().enumerate().all(|(at, front)| {
+            let follows = front.first == next && front.columns <= size - next;
+            next += if follows { front.columns } else { 0 };
+            let rows = front.rows.is_sorted_by(|a, b| a < b) && front.rows.iter().all(|row| (next..size).contains(row));
+            follows && rows && front.parent.is_none_or(|parent| (at + 1..self.fronts.len()).contains(&parent))
+        });
+        let ranked = self.rank.iter().all(|rank| *rank < size);
+        if is_sound && ranked && next == size {
+            return Ok(());
+        }
+        let found = format!("{} fronts that do not fit together", self.fronts.len());
+        Err(ArchiveError::Mismatch { what: "a sparse factor", found, expected: format!("fronts of {size} blocks") })
+    }
+
     /// The fronts of a graph in this order of its nodes.
     pub fn new(neighbours: &[Vec<usize>], order: &[usize]) -> Self {
         let mut tree = Tree::new(neighbours, order);

@@ -9,7 +9,7 @@ use super::members::{Members, Size};
 use super::problem::Block;
 use super::rows::Rows;
 use glam::{DMat3, DVec3};
-use metachron_core::ParallelFor;
+use metachron_core::{Archive, ArchiveError, ParallelFor};
 
 /// Starts from the true residual: what is summed up along the way differs from it by rounding.
 const ROUNDS: usize = 3;
@@ -92,6 +92,11 @@ impl Operator<'_> {
 }
 
 impl Gradients {
+    /// Writes or reads what the next problem needs: the order of the factor of what is near.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.near.archive(archive)
+    }
+
     /// Makes room for the members. Whether a matrix is positive definite is seen of the blocks on its diagonal only.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ use super::system::StepForm;
 use super::validate::validate;
 use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
+use metachron_core::{Archive, ArchiveError};
 use std::ops::Range;
 
 /// What a solve aims at.
@@ -137,6 +138,11 @@ pub struct Solver {
 }
 
 impl Solver {
+    /// Writes or reads what the next solve needs of those before: orders of elimination. Impulses are remembered by who gave them.
+    pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.iterate.system.archive(archive)
+    }
+
     /// Solves the equations of steps by this form from now on.
     pub fn set_form(&mut self, form: StepForm) {
         self.settings.form = form;

@@ -11,6 +11,7 @@ use super::problem::{Member, Problem};
 use super::rows::Rows;
 use super::scale::Scales;
 use glam::DVec3;
+use metachron_core::{Archive, ArchiveError};
 use std::ops::Range;
 
 /// How the linear equations of a Newton step are solved.
@@ -41,6 +42,12 @@ pub(super) struct System {
 }
 
 impl System {
+    /// Writes or reads what the next problem needs.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.direct.archive(archive)?;
+        self.gradients.archive(archive)
+    }
+
     /// Takes up the members.
     ///
     /// # Errors

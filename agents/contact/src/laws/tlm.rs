@@ -45,7 +45,7 @@ pub struct LineLaw {
 }
 
 /// One end of a line.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Line {
     stiffness_n_m: f64,
     delay_s: f64,

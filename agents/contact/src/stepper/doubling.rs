@@ -5,7 +5,7 @@
 
 use super::{ClusterMember, ClusterScene, ClusterStepper, Participant};
 use glam::DVec3;
-use metachron_core::{AgentId, ParallelFor, SimSpan, StepError};
+use metachron_core::{AgentId, Archive, ArchiveError, ParallelFor, SimSpan, StepError, archive_values};
 use metachron_geometry::{ShapeKind, ShapePose};
 
 /// A macro step in twice as many parts.
@@ -25,6 +25,15 @@ pub struct StepDoubling {
 }
 
 impl StepDoubling {
+    /// Writes or reads what the next macro step needs of it.
+    ///
+    /// # Errors
+    /// [`ArchiveError`] for what is no state of one.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.row, self.off)?;
+        self.stepper.archive(archive)
+    }
+
     /// Begins a row: what steps so far were off by no longer counts.
     pub fn begin_row(&mut self) {
         self.row.clear();

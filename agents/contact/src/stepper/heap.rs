@@ -11,7 +11,7 @@ use super::progress::Progress;
 use super::search::Search;
 use super::{ClusterReport, ClusterScene, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, StepError};
+use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
 use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
@@ -76,7 +76,7 @@ struct Given {
 }
 
 /// A body, with its inertia in its own axes, kg·m².
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Known {
     id: AgentId,
     /// Its place among the members of the step.
@@ -107,6 +107,15 @@ impl HeapReport {
 }
 
 impl Heap {
+    /// Writes or reads the heap, with all that rapier3d knows of it.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.option(
+            &mut self.world,
+            || Box::new(World::empty(DVec3::ZERO)),
+            |world, archive| archive_values!(archive, world.physics, world.origin_m, world.bodies, world.contacts),
+        )
+    }
+
     /// Whether the cluster has one.
     pub fn is_on(&self) -> bool {
         self.world.is_some()
@@ -235,6 +244,11 @@ impl World {
                 physics.insert_collider(collider.user_data(Side::Static(number).name()), None);
             }
         }
+        Self { physics, ..Self::empty(origin_m) }
+    }
+
+    fn empty(origin_m: DVec3) -> Self {
+        let physics = PhysicsWorld::default();
         Self { physics, origin_m, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
     }
 

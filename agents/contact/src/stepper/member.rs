@@ -285,7 +285,7 @@ pub struct OwnSpring {
 }
 
 /// How far an attachment has slipped.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Slid {
     /// How far the point that it holds at its far end has moved, in that end's axes, metres.
     pub moved_m: DVec3,

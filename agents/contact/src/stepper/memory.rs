@@ -15,7 +15,7 @@ const RELIEVED_SHARE: f64 = 0.125;
 const PART_S: f64 = 0.2;
 
 /// The other side of a pair.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Partner {
     /// The body itself.
     Own,
@@ -38,7 +38,7 @@ pub enum Partner {
 }
 
 /// What a contact or a joint hands to the next step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Remembered {
     /// The name of the place within its pair.
     pub key: TouchKey,
@@ -61,13 +61,14 @@ impl Remembered {
 }
 
 /// One pair, with its places by rising keys.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct PairMemory {
     pub partner: Partner,
     /// Until when the two count as near.
     pub near_until: SimTime,
     pub places: Vec<Remembered>,
     /// Places of the step that is being made.
+    #[serde(skip)]
     pub next: Vec<Remembered>,
 }
 
@@ -103,7 +104,7 @@ impl PairMemory {
 }
 
 /// All that one body remembers: pairs with higher numbers, static solids, itself.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactMemory {
     pairs: Vec<PairMemory>,
     /// Links, joints and own attachments of the body that have torn, sorted. They stay torn.
@@ -117,7 +118,7 @@ pub struct ContactMemory {
 }
 
 /// What an attachment has given since its force was last looked at.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct UnfinishedLoad {
     pub partner: Partner,
     pub impulse_n_s: DVec3,

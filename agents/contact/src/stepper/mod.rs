@@ -56,7 +56,7 @@ pub use matter::Matter;
 pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
-use metachron_core::{AgentId, Grip, ParallelFor, SimSpan, StepError, check_span};
+use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
@@ -236,6 +236,15 @@ impl Default for ClusterStepper {
 }
 
 impl ClusterStepper {
+    /// Writes or reads what the next macro step needs of those before, but for what its members and their memories know.
+    ///
+    /// # Errors
+    /// [`ArchiveError`] for what is no state of a stepper.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.solver.archive(archive)?;
+        self.heap.archive(archive)
+    }
+
     /// The macro step that was made last, seconds.
     #[must_use]
     pub const fn macro_s(&self) -> f64 {

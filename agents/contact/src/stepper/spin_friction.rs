@@ -23,7 +23,7 @@ struct Turns {
 }
 
 /// The spin friction of a contact as it is remembered, about its normal.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Spin {
     /// The radius of the patch that resists, metres.
     pub radius_m: f64,

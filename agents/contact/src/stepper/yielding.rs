@@ -20,7 +20,7 @@ const ALL_SHARE: f64 = 1.0 - 1e-6;
 pub(super) const SLIP_SHARE: f64 = 1e-6;
 
 /// How an attachment holds that has slipped.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Slip {
     /// Which one.
     pub(super) partner: Partner,

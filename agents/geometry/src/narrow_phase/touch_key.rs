@@ -4,7 +4,7 @@
 
 /// The name of a contact among those of a pair of shapes. It holds whole numbers of features: no two features share a name, however many
 /// there are. Keys rise by pieces, kind, parts, features and place.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub struct TouchKey {
     /// The pieces of both shapes that meet: a tool has six, all else one.
     pub pieces: [u8; 2],
@@ -19,7 +19,7 @@ pub struct TouchKey {
 }
 
 /// What meets in a contact.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub enum TouchKind {
     /// Corners, edges or faces of convex parts, as parry packs them.
     #[default]

@@ -3,7 +3,7 @@
 //! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
 use super::{Run, Stepping, Suite, too_long};
-use metachron_core::{SimSpan, StepError};
+use metachron_core::{Archive, ArchiveError, SimSpan, StepError};
 
 /// Tests a promise in every way in which the agent can be stepped.
 fn stepped(suite: &Suite<'_>, kept: fn(&Suite<'_>, Stepping) -> Result<(), String>) -> Result<(), String> {
@@ -49,17 +49,57 @@ pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
     stepped(suite, same_bits_by)
 }
 
+/// The step number `i` of a run in which the agent is pulled and divided anew.
+fn busy_step(suite: &Suite<'_>, run: &mut Run<'_>, i: u32) -> Result<(), String> {
+    let pulled = (suite.steps / 3..suite.steps / 2).contains(&i);
+    if let Some(wanted) = suite.resolutions.get(i as usize / 20 % suite.resolutions.len().max(1)) {
+        run.agent.set_resolution(*wanted);
+    }
+    run.must_step(suite.dt, suite.pull.filter(|_| pulled).as_slice())
+}
+
+/// What is saved and read back goes on with the same bits.
+pub(super) fn archive(suite: &Suite<'_>) -> Result<(), String> {
+    stepped(suite, archive_by)
+}
+
+fn archive_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
+    let (mut run, mut other) = (suite.start_stepped(by), suite.start_stepped(by));
+    let marks = [1, 2, 3, 5].map(|part| part * suite.steps / 6);
+    for i in 0..suite.steps {
+        busy_step(suite, &mut run, i)?;
+        if !marks.contains(&i) {
+            busy_step(suite, &mut other, i)?;
+            if i > marks[0] && run.hash() != other.hash() {
+                return Err(format!("what was read back differs after step {i}"));
+            }
+            continue;
+        }
+        let mut archive = Archive::writer();
+        match run.archive(&mut archive) {
+            Err(ArchiveError::Refused { .. }) => return Ok(()),
+            outcome => outcome.map_err(|error| error.to_string())?,
+        }
+        let bytes = archive.into_bytes();
+        // built anew at one mark, elsewhere at the next
+        if i == marks[1] {
+            other = suite.start_stepped(by);
+        } else {
+            (0..5).try_for_each(|_| other.must_step(suite.dt, suite.pull.as_slice()))?;
+        }
+        let mut archive = Archive::reader(&bytes);
+        other.archive(&mut archive).and_then(|()| archive.finish()).map_err(|error| error.to_string())?;
+        if run.hash() != other.hash() {
+            return Err(format!("what was read back after step {i} is not what was saved"));
+        }
+    }
+    Ok(())
+}
+
 fn same_bits_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
     let (mut one, mut other) = (suite.start_stepped(by), suite.start_stepped(by));
     for i in 0..suite.steps {
-        let pulled = (suite.steps / 3..suite.steps / 2).contains(&i);
-        let hands = suite.pull.filter(|_| pulled);
-        for run in [&mut one, &mut other] {
-            if let Some(wanted) = suite.resolutions.get(i as usize / 20 % suite.resolutions.len().max(1)) {
-                run.agent.set_resolution(*wanted);
-            }
-            run.must_step(suite.dt, hands.as_slice())?;
-        }
+        [&mut one, &mut other].into_iter().try_for_each(|run| busy_step(suite, run, i))?;
         if one.hash() != other.hash() {
             return Err(format!("two equal runs differ after step {i}"));
         }

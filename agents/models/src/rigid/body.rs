@@ -10,7 +10,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{
-    Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, check_span,
+    Archive, ArchiveError, Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport,
+    archive_values, check_span,
 };
 use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use std::sync::Arc;
@@ -165,6 +166,11 @@ impl Agent for RigidBody {
         let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
         into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
         into.bounds = Some(self.bounds());
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.motion, self.acceleration, self.at_rest, self.calm_s, self.steps)?;
+        self.unknowns.archive(archive)
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {

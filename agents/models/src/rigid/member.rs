@@ -8,7 +8,7 @@ use super::motion::Motion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
-use metachron_core::{Anchor, StepError};
+use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// The block of its spin; block 0 is the velocity of its centre of mass.
@@ -42,6 +42,11 @@ impl Default for Unknowns {
 }
 
 impl Unknowns {
+    /// Writes or reads what is known of it between steps.
+    pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.now)
+    }
+
     /// Takes the velocities that a body begins with.
     pub(super) fn start(&mut self, now: [DVec3; 2]) {
         self.now = now;

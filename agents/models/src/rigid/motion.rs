@@ -10,7 +10,7 @@ use super::mass_properties::MassDistribution;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Position and motion of a rigid body, about its centre of mass.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Motion {
     /// Centre of mass, metres.
     pub position: DVec3,

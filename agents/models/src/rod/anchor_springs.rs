@@ -12,7 +12,7 @@ use metachron_contact::stepper::Slid;
 use metachron_core::{AgentId, Anchor};
 
 /// The spring of an attachment at one node.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct NodeSpring {
     /// Number of the attachment.
     pub attachment: u32,

@@ -19,7 +19,7 @@ const DENSER_MAX: f64 = 2.0;
 const CEIL_SLACK: f64 = 1e-9;
 
 /// The rest shape of a divided tube of N segments.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Discretization {
     /// Rest arc length of each node, metres: 0 … L, N + 1 entries.
     pub arc_m: Vec<f64>,

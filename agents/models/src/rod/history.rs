@@ -8,7 +8,7 @@ use super::state::RodState;
 use glam::DVec3;
 
 /// Changes over the last substep, in slots.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct History {
     /// Of node positions, metres, and of segment frames, radians in world axes.
     way: Vec<DVec3>,

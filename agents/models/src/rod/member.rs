@@ -18,7 +18,7 @@ use glam::{DMat3, DVec2, DVec3};
 use metachron_contact::cluster::{Block, Response, SIDE_TERMS_MAX, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, OwnSpring, Role, Slid};
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Anchor, SimSpan, SimTime, StepError};
+use metachron_core::{Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, archive_values};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
@@ -454,6 +454,11 @@ impl Response for Tube {
 }
 
 impl Unknowns {
+    /// Writes or reads what is known of it between steps.
+    pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before)
+    }
+
     /// Adds the system of a wall that gives, with its solution.
     fn take_wall(&mut self, wall: &Wall) {
         let first = self.free.len();

@@ -8,6 +8,7 @@
 //! Contacts are not part of it: in a cluster the tube offers this matrix, with its factor, as a member (`member`).
 
 mod anchor_springs;
+mod archive;
 mod banded_ldl;
 mod block;
 mod check;

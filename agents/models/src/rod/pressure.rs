@@ -3,7 +3,7 @@
 //! In: keys by rising times, a time. Out: the pressure then. Never here: what a pressure does ([`super::wall`]).
 
 /// A pressure at a time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PressureKey {
     /// The tube's own time, seconds, ≥ 0; above that of the key before.
     pub at_s: f64,

@@ -7,7 +7,7 @@ use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::DVec3;
 
 /// Counts quiet time.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct RestDetector {
     quiet_s: f64,
     before: Vec<DVec3>,

@@ -46,7 +46,7 @@ pub struct DividedRod<'a> {
 const TENSION_SHARE: f64 = 0.9;
 
 /// A state, and its elastic quantities, which [`RodState::strain`] fills.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct RodState {
     /// Node positions, metres; N + 1.
     pub x: Vec<DVec3>,
@@ -82,6 +82,15 @@ impl RodState {
         let mut config = Self { x: division.place.clone(), q: division.frame.clone(), ..Self::default() };
         config.resize(division.segments());
         config
+    }
+
+    /// Whether it has as many nodes and frames as that many segments.
+    pub fn is_of(&self, segments: usize) -> bool {
+        let of_segments = [self.q.len(), self.t.len(), self.e.len(), self.b.len()];
+        let of_slots = [self.u.len(), self.force.len()];
+        self.x.len() == segments + 1
+            && of_segments.iter().all(|len| *len == segments)
+            && of_slots.iter().all(|len| *len == 2 * segments + 1)
     }
 
     /// Allocates for `segments` segments.

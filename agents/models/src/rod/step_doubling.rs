@@ -9,8 +9,8 @@ use super::history::History;
 use super::method::Integrator;
 use super::state::RodState;
 use super::step::{Setting, Stepper};
-use metachron_core::AgentId;
 use metachron_core::step_doubling::{DoublingSchedule, farthest};
+use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 
 /// The error in time of one tube.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +29,13 @@ struct FinerRun {
 }
 
 impl Doubling {
+    /// Writes or reads a row of repeated steps as far as it is.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.schedule)?;
+        archive
+            .option(&mut self.again, Box::default, |again, archive| archive_values!(archive, again.state, again.past))
+    }
+
     /// Error that steps accumulate in a tenth of a second, metres.
     pub fn error_m(&self) -> f64 {
         self.schedule.error_m()

@@ -22,7 +22,9 @@ use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, SetMotion, StepContext};
-use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
+use metachron_core::{
+    Archive, ArchiveError, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
+};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -57,7 +59,7 @@ pub struct Tube {
     pub(super) resolution: Resolution,
     pub(super) time: SimTime,
     /// Own time at which its wave and its pressure start, seconds.
-    script_from_s: f64,
+    pub(super) script_from_s: f64,
     pub(super) steps: u64,
     /// What it is in a contact cluster.
     pub(super) unknowns: Unknowns,
@@ -456,6 +458,10 @@ impl Agent for Tube {
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         self.publish(into);
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.archive_state(archive)
     }
 
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {

@@ -16,7 +16,10 @@ use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, SetMotion, StepContext};
-use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
+use metachron_core::{
+    Archive, ArchiveError, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
+    check_span,
+};
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -30,6 +33,8 @@ pub struct SoftBody {
     /// Whether cells of it were removed.
     pub(super) is_cut: bool,
     /// The level n that was asked for: its picture's.
+    /// The ε for which its cage or lattice was made, metres; no meaning where its vertices are its skin.
+    pub(super) eps_m: f64,
     pub(super) level: u8,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
@@ -44,7 +49,7 @@ pub struct SoftBody {
     pub(super) acceleration: DVec3,
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
-    before: Vec<DVec3>,
+    pub(super) before: Vec<DVec3>,
     pub(super) quiet_s: f64,
     pub(super) steps: u64,
     /// What it is in a contact cluster.
@@ -81,6 +86,7 @@ impl SoftBody {
             system,
             skin,
             is_cut: false,
+            eps_m: spec.spacing().map_or(0.0, |spacing| spacing.eps_m),
             level: 0,
             impulses: vec![],
             free: positions.clone(),
@@ -266,6 +272,10 @@ impl Agent for SoftBody {
     /// A body with a skin of its own is divided anew; the division of any other is fixed by its scene.
     fn set_resolution(&mut self, wanted: Resolution) {
         self.divide_anew(wanted);
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.archive_state(archive)
     }
 
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {

@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
-use metachron_core::{Anchor, StepError};
+use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};
 
@@ -42,6 +42,13 @@ struct Kept {
     quiet_s: f64,
     at_rest: bool,
     steps: u64,
+}
+
+impl Unknowns {
+    /// Writes or reads what is known of it between steps.
+    pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.now)
+    }
 }
 
 impl SoftBody {

@@ -6,6 +6,7 @@
 //! (`fe_mesh`, `system`), solves for the velocities, and moves (`step`); in a cluster the body offers this matrix as a member (`member`).
 
 mod anchor_springs;
+mod archive;
 mod bar;
 mod bending;
 mod body;

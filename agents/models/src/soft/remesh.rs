@@ -48,6 +48,7 @@ impl SoftBody {
             return;
         }
         if let Some(carrier) = Carrier::new(&self.spec, wanted.eps_m) {
+            self.eps_m = wanted.eps_m;
             self.move_onto(carrier);
         }
     }

@@ -6,6 +6,7 @@
 use super::carrier::{Carrier, SkinPoints, into_body};
 use super::deformation::{follow_turn, outer};
 use glam::{DMat3, DQuat, DVec3};
+use metachron_core::{Archive, ArchiveError, archive_values};
 use metachron_geometry::Carried;
 
 /// In how long what other nodes would have moved it by is down to 1/e, seconds: at 60 pictures a second a ninetieth of it goes with each.
@@ -31,7 +32,7 @@ pub(super) struct Skin {
 }
 
 /// How far the points are from where their nodes carry them: what is left of what they would have jumped by.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Apart {
     /// Of each point, turned back to how the body lay when it began, metres; empty where nothing is left.
     by: Vec<DVec3>,
@@ -41,6 +42,11 @@ pub(super) struct Apart {
 }
 
 impl Skin {
+    /// Writes or reads where its points are, and how far that is from where its nodes carry them.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.positions, self.velocities, self.apart)
+    }
+
     /// A skin on `carrier`, at rest at its own place.
     pub fn new(points: SkinPoints, carrier: Carrier) -> Self {
         let SkinPoints { rest, material, inward, .. } = points;

@@ -7,8 +7,8 @@ use super::anchor_springs::VertexSpring;
 use super::body::SoftBody;
 use super::system::Purpose;
 use glam::DVec3;
-use metachron_core::AgentId;
 use metachron_core::step_doubling::{DoublingSchedule, farthest};
+use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 
 /// The error in time of one soft body.
 #[derive(Debug, Default)]
@@ -21,6 +21,13 @@ pub(super) struct Doubling {
     /// Number of substeps of the repeated step; `last` is that of the last ordinary step.
     parts: u32,
     last: u32,
+}
+
+impl Doubling {
+    /// Writes or reads a row of repeated steps as far as it is.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.watch, self.finer, self.last)
+    }
 }
 
 impl SoftBody {

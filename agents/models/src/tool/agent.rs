@@ -16,8 +16,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{
-    AgentId, Anchor, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState,
-    check_span, shortest_turn,
+    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError,
+    StepReport, ToolState, archive_values, check_span, shortest_turn,
 };
 use metachron_geometry::ToolShape;
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -271,6 +271,13 @@ impl Agent for Tool {
         into.at_rest = self.at_rest;
         into.inertia = self.drive.inertia();
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.tool, self.commanded, self.drive, self.lag_m, self.jaws)?;
+        archive_values!(archive, self.speed_m_s, self.at_rest, self.steps)?;
+        self.script.archive(archive)?;
+        self.unknowns.archive(archive)
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

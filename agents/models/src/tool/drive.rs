@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 use metachron_core::Inertia;
 
 /// A moving point.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct PointMotion {
     /// Metres.
     pub position: DVec3,
@@ -33,7 +33,7 @@ pub(super) struct Driven {
 }
 
 /// The drive of one tool.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Drive {
     /// Force limit, newtons.
     limit_n: f64,

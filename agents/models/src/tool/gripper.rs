@@ -21,14 +21,14 @@ const RAMP_S: f64 = 0.15;
 const RAMP_START: f64 = 1e-3;
 
 /// Jaws and the grasped body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Jaws {
     held: Option<ActiveGrasp>,
     /// The jaws were open, so that closing them can catch something.
     armed: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct ActiveGrasp {
     target: AgentId,
     anchor: Anchor,

@@ -12,7 +12,7 @@ use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{self, ClusterMember, MaterialPoint, Pose, Role};
 use metachron_contact::{AnchorSpring, StepContext};
-use metachron_core::{AgentId, Anchor, SimSpan, SimTime, StepError, ToolState};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, ToolState, archive_values};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// What it is in a cluster.
@@ -52,6 +52,12 @@ struct Kept {
 }
 
 impl Unknowns {
+    /// Writes or reads what is known of it between steps.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.time, self.hand, self.is_near, self.jaw_before, self.free, self.now)?;
+        archive_values!(archive, self.led, self.led_m_s, self.led_rad_s, self.jaw_per_s)
+    }
+
     /// Its own time.
     pub fn time(&self) -> SimTime {
         self.time

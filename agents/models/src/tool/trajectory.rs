@@ -8,6 +8,7 @@
 
 use super::Keyframe;
 use glam::{DQuat, DVec3, DVec4};
+use metachron_core::{Archive, ArchiveError};
 
 /// The pose that the script commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +39,11 @@ pub(super) struct Script {
 }
 
 impl Script {
+    /// Writes or reads when it starts; its keys never change.
+    pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.begin_s)
+    }
+
     /// A curve through `keyframes`: at least one, times rising.
     pub(super) fn new(keyframes: &[Keyframe], repeat: bool) -> Self {
         let mut keys: Vec<SplineKey> = keyframes

@@ -24,7 +24,7 @@ pub struct TurnMeasure {
 }
 
 /// Limits of the demands to an agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RateLimits {
     /// Length of a step at the requested rate, simulated seconds, > 0.
     pub dt_wanted_s: f64,
@@ -78,7 +78,7 @@ const DEAD: (f64, f64) = (-0.223, 0.049);
 /// Target inside the dead zone.
 const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
 
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Window {
     turns: u32,
     span_s: f64,
@@ -90,7 +90,7 @@ struct Window {
 }
 
 /// Controls dt and ε of one agent.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct RateControl {
     limits: RateLimits,
     /// Upper ends of the two ranges of z, each the logarithm of a ratio of work: p ln(coarsest ε / finest ε) with the power p of work, and that

@@ -45,7 +45,7 @@ const PATIENCE: (u32, u32) = (1, 32);
 const PROOF: u32 = 16;
 
 /// How the error grows with a value: bounds of the exponent of its power law.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Orders {
     /// The greatest possible, used to coarsen.
     greatest: f64,
@@ -59,7 +59,7 @@ const ORDERS_OF_EPS: Orders = Orders { greatest: 2.0, least: 2.0 };
 const ORDERS_OF_DT: Orders = Orders { greatest: 2.0, least: 1.0 };
 
 /// One controlled value, and how the error grows with it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct ControlledValue {
     range: (f64, f64),
     value: f64,
@@ -71,7 +71,7 @@ struct ControlledValue {
 }
 
 /// Controls dt and ε of one agent so that its error stays below a tolerance.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct ErrorControl {
     tolerance_m: f64,
     dt: ControlledValue,

@@ -18,7 +18,7 @@ pub const SPEED_RANGE: (f64, f64) = (0.001, 100.0);
 
 /// A linear piece of the timeline: from wall time `wall` on, simulated time runs from `sim` with `speed`, and stops when it reaches
 /// `until`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Timeline {
     wall: Duration,
     sim: SimTime,

@@ -8,7 +8,7 @@
 use super::super::cluster::{Epoch, Membership};
 use super::published_bounds::{MovingBox, ReadBounds};
 use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
-use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime, archive_values};
 
 /// Knowledge of one agent about the boxes of the others.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub(in super::super) struct NeighbourList {
 }
 
 /// A peer, and when it is checked again.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct ListedPeer {
     id: AgentId,
     at: SimTime,
@@ -76,6 +76,13 @@ impl NeighbourList {
             near: Vec::new(),
             epoch: Epoch::default(),
         }
+    }
+
+    /// Writes or reads who is near, and when others are looked at again.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self { me: _, mine, speed_before_m_s, listed, soonest, common_check, dt, unread, near, epoch } = self;
+        archive_values!(archive, *mine, *speed_before_m_s, *listed, *soonest, *common_check)?;
+        archive_values!(archive, *dt, *unread, *near, *epoch)
     }
 
     /// The near peers at the last check, by rising numbers.

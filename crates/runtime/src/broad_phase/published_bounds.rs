@@ -6,10 +6,10 @@
 
 use super::super::seqlock::{ReadOutcome, Seqlock};
 use glam::DVec3;
-use metachron_core::{Bounds, SimTime};
+use metachron_core::{Archive, ArchiveError, Bounds, SimTime};
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct MovingBox {
     /// Least coordinates, metres.
     pub low: DVec3,
@@ -65,6 +65,19 @@ impl PublishedBounds {
     /// Writes `reach`; from one thread at a time. Numbers are rounded outwards to 24 bits.
     pub fn write(&self, reach: &MovingBox) {
         self.0.write(words(reach));
+    }
+
+    /// Writes or reads the box, to the bit; called between turns.
+    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let mut words = match self.0.read() {
+            ReadOutcome::Complete(words) => Some(words),
+            ReadOutcome::Empty | ReadOutcome::Torn => None,
+        };
+        archive.value(&mut words)?;
+        if archive.is_reading() {
+            words.map_or_else(|| self.0.clear(), |words| self.0.write(words));
+        }
+        Ok(())
     }
 
     /// The last written box.

@@ -6,7 +6,7 @@
 use metachron_core::AgentId;
 
 /// All that step as one.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct Membership {
     /// By rising numbers.
     ids: Vec<AgentId>,
@@ -16,7 +16,7 @@ pub(in super::super) struct Membership {
 }
 
 /// The leader, and how often a member has left; `None` for an agent that never was a member.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct Epoch(Option<(AgentId, u64)>);
 
 impl Membership {

@@ -12,7 +12,7 @@ use super::super::events::EventKind;
 use super::super::handle::Shared;
 use super::membership::Membership;
 use crossbeam::atomic::AtomicCell;
-use metachron_core::{AgentId, DisjointSets, SimTime};
+use metachron_core::{AgentId, Archive, ArchiveError, DisjointSets, SimTime};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -20,8 +20,8 @@ use std::time::Duration;
 #[derive(Default)]
 pub(in super::super) struct Handover {
     /// Locked without waiting but at the end of a run: an agent that finds it taken tries again after the next turn.
-    arrivals: Mutex<Vec<Arrival>>,
-    returned: AtomicCell<Option<Box<AgentRunner>>>,
+    pub(super) arrivals: Mutex<Vec<Arrival>>,
+    pub(super) returned: AtomicCell<Option<Box<AgentRunner>>>,
 }
 
 impl std::fmt::Debug for Handover {
@@ -37,16 +37,16 @@ type Arrival = Box<AgentRunner>;
 #[derive(Default)]
 pub(in super::super) struct Led {
     /// By rising numbers.
-    seats: Vec<Seat>,
+    pub(super) seats: Vec<Seat>,
     /// All that step as one in this turn, the leader among them.
-    membership: Membership,
+    pub(super) membership: Membership,
 }
 
 /// One that is led.
-struct Seat {
-    actor: Box<AgentRunner>,
+pub(super) struct Seat {
+    pub actor: Box<AgentRunner>,
     /// Zero while it stays; else it leaves, with those of the same number.
-    group: usize,
+    pub group: usize,
 }
 
 impl Handover {
@@ -75,6 +75,11 @@ impl Handover {
 }
 
 impl Led {
+    /// Writes or reads who stepped as one when that was last noted; the agents themselves are archived by their own.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.membership)
+    }
+
     pub fn is_empty(&self) -> bool {
         self.seats.is_empty()
     }

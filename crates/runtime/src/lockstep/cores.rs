@@ -5,6 +5,7 @@
 //! n) whatever the number of jobs (the virtual time of generalised processor sharing).
 //! Integers throughout: the same events on every computer. Never here: agents, the content of a job.
 
+use metachron_core::{Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::time::Duration;
@@ -26,6 +27,16 @@ impl Cores {
     /// That many cores, at least one.
     pub fn new(cores: u32) -> Self {
         Self { cores: u128::from(cores.max(1)), served: 0, jobs: BinaryHeap::new() }
+    }
+
+    /// Writes or reads the jobs in progress.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.served, self.jobs)
+    }
+
+    /// The owners of the jobs in progress.
+    pub fn owners(&self) -> impl Iterator<Item = u32> {
+        self.jobs.iter().map(|Reverse((_, owner))| *owner)
     }
 
     /// Starts the job of `owner`, which takes `work` on a core of its own.

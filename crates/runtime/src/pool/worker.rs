@@ -252,3 +252,9 @@ mod tests {
         assert!((62_000..64_000).contains(&steps), "{steps}");
     }
 }
+#[cfg(test)]
+mod dbg { #[test] fn sizes() {
+ use super::super::super::*;
+ println!("runner {} shared {} seat {} mailbox {} events {} metrics {}", size_of::<agent_runner::AgentRunner>(), size_of::<handle::Shared>(), size_of::<cluster::ClusterSeat>(), size_of::<mailbox::Mailbox>(), size_of::<events::EventRing>(), size_of::<metrics::Metrics>());
+ println!("bc {}", size_of::<boxcar::Vec<u64>>());
+}}

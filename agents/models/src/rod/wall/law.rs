@@ -38,7 +38,7 @@ pub struct WallLaw {
 }
 
 /// The bend stiffness of a section over that of the round one: `mean` in all directions, and `oval` times cos 2φ and sin 2φ more.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Softening {
     /// The mean of its principal values.
     pub mean: f64,

@@ -58,7 +58,7 @@ pub struct WallProblem<'a> {
 }
 
 /// The sections of all nodes.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Sections {
     /// Widening and flattening of each node, metres.
     pub shape: Vec<DVec3>,

@@ -13,7 +13,7 @@ const EXPENSIVE: f64 = 1.25;
 pub(super) const IN_A_ROW: usize = 4;
 
 /// The load of an agent at its finest, as a fraction of a core.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct FullLoad {
     windows: VecDeque<f64>,
     expensive: usize,

@@ -1,0 +1,72 @@
+//! The state of agents and of a lockstep run, written and read back: all that the next bit needs.
+//!
+//! In: an archive, a run between two events. Out: the same run later, or another of the same agents. Never here: files, what models
+//! save of themselves ([`metachron_contact::Agent::archive`]). Not saved: CPU times, percentiles, samples of watched points, storage.
+
+use super::agent_runner::AgentRunner;
+use super::cluster::Placed;
+use super::handle::Shared;
+use super::sleep::SleepRegistry;
+use metachron_core::{Archive, ArchiveError, archive_values};
+use std::sync::Arc;
+
+impl AgentRunner {
+    /// Writes or reads it, without the agents that it leads.
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.agent.archive(archive)?;
+        archive_values!(archive, self.pace, self.loads, self.open, self.was_near, self.withheld)?;
+        archive_values!(archive, self.announced, self.turn_period)?;
+        self.led.archive(archive)?;
+        self.metrics.archive(archive)?;
+        archive.fixed("whether it has a governor", self.governor.is_some())?;
+        self.governor.iter_mut().try_for_each(|governor| governor.archive(archive))?;
+        archive.fixed("whether it is a member of clusters", self.cluster.is_some())?;
+        self.cluster.iter_mut().try_for_each(|seat| seat.archive(archive))?;
+        self.archive_states(archive)
+    }
+
+    /// The states that it has published and written, and those of others that it has seen.
+    fn archive_states(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self { writer, observer, peers, .. } = self;
+        let mut newest = writer.slot().latest();
+        archive.snapshot(&mut newest)?;
+        if archive.is_reading() {
+            writer.replace(newest);
+        }
+        archive.option(writer.filled_mut(), Arc::default, |state, archive| archive.snapshot(state))?;
+        observer.archive(peers, archive)
+    }
+}
+
+/// Writes or reads all agents of a run, by rising numbers, with what they share.
+pub(super) fn archive_agents(all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    archive.fixed("the number of agents", all.len())?;
+    for Placed { runner, .. } in &mut *all {
+        let shared = Arc::clone(&runner.shared);
+        archive.within(format_args!("agent \"{}\"", shared.name), |archive| {
+            let Shared { gauges, mail, .. } = &*shared;
+            runner.archive(archive)?;
+            gauges.archive(archive)?;
+            mail.archive(archive)
+        })?;
+    }
+    let Some(first) = all.first() else { return Ok(()) };
+    archive_sleep(&first.runner.shared.sleep, archive)?;
+    first.runner.peers.broad_phase.get().map_or(Ok(()), |broad_phase| broad_phase.archive(archive))
+}
+
+/// Writes or reads who rests and who leads whom.
+fn archive_sleep(sleep: &SleepRegistry, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    let mut state = sleep.state();
+    let agents = state.signals.len();
+    archive.value(&mut state)?;
+    if !archive.is_reading() {
+        return Ok(());
+    }
+    if state.signals.len() != agents {
+        let (found, expected) = (state.signals.len().to_string(), agents.to_string());
+        return Err(ArchiveError::Mismatch { what: "the number of agents that may sleep", found, expected });
+    }
+    sleep.set_state(&state);
+    Ok(())
+}

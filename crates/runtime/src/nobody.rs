@@ -1,0 +1,40 @@
+//! What is in the place of an agent that has left.
+
+use glam::DVec3;
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{Archive, ArchiveError, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
+
+/// No matter, no time, nothing to save.
+pub(super) struct Nobody;
+
+impl Agent for Nobody {
+    fn model(&self) -> &'static str {
+        "nobody"
+    }
+
+    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        check_span(dt).map(|_| StepReport { work: 0.0, substeps: 0, at_rest: true })
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    fn set_resolution(&mut self, _wanted: Resolution) {}
+
+    fn archive(&mut self, _archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        Ok(())
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.body = Body::Nothing;
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
+}

@@ -1,0 +1,347 @@
+//! A world's state at one moment, kept in memory or in a file, to go on from it: in the same world or in another process.
+//!
+//! In: a world in lockstep between two events. Out: bytes by which it, or a world started from the same scene, goes on as this one would
+//! have, to the bit. Never here: what the state of an object is (`archive` of each says it), the scene.
+//!
+//! A file: [`MAGIC`], the version of the format, the length and the checksum of what follows, then the program's version, the scene's
+//! identity, the time, the state. All numbers of its head are little-endian.
+
+use super::{Scene, WorldError};
+use metachron_core::{Archive, ArchiveError, HASH_START, SimTime};
+use metachron_runtime::{AgentState, Agents};
+use std::path::{Path, PathBuf};
+
+/// The first bytes of every file.
+const MAGIC: [u8; 8] = *b"METACHRN";
+/// The version of the format: it changes with what the bytes mean.
+const FORMAT: u32 = 1;
+/// Bytes before those that the checksum is of.
+const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
+/// The program that can read what it has written: states are saved field by field as this version has them.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+
+/// A world's state at one moment ([`super::World::checkpoint`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checkpoint {
+    pub(super) of: SceneIdentity,
+    pub(super) time: SimTime,
+    pub(super) state: Vec<u8>,
+}
+
+/// By what a scene is known again: its objects, and how many of everything else there are.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct SceneIdentity {
+    name: String,
+    objects: Vec<ObjectIdentity>,
+    fixed: usize,
+    joints: usize,
+    couplings: usize,
+    /// Who has joined the world since its start, in that order, and who has left it, by rising numbers.
+    pub(super) joined: Vec<String>,
+    pub(super) left: Vec<u32>,
+}
+
+/// By what an object is known again.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct ObjectIdentity {
+    name: String,
+    model: String,
+    rate_hz: f64,
+}
+
+/// Why a world's state could not be saved, read or put back.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// Something in the world does not save its state. The world goes on as it was.
+    #[error("the world's state cannot be saved: {0}")]
+    Refused(ArchiveError),
+    /// The world was stopped: it has no state that goes on.
+    #[error("the world was stopped, and cannot be saved or put back")]
+    Stopped,
+    /// The checkpoint is of another scene. The world goes on as it was.
+    #[error("the checkpoint is of another scene: {what} is {found}; expected {expected}")]
+    OtherScene {
+        /// What differs.
+        what: String,
+        /// As the checkpoint has it.
+        found: String,
+        /// As the world has it.
+        expected: String,
+    },
+    /// The state could not be read into the world, which is stopped and shows its last states.
+    #[error("the state could not be read, and the world is not usable any more: {reason}")]
+    Unusable {
+        /// Why.
+        reason: String,
+    },
+    /// The world could not be started.
+    #[error(transparent)]
+    Start(#[from] WorldError),
+    /// A file could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Its path.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// A file is no checkpoint that this program reads.
+    #[error("{}: {reason}", path.display())]
+    BadFile {
+        /// Its path.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: BadCheckpoint,
+    },
+}
+
+/// What is wrong with the bytes of a checkpoint.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadCheckpoint {
+    /// Not the first bytes of one.
+    #[error("this is no checkpoint of metachron")]
+    NoCheckpoint,
+    /// Of another version of the format.
+    #[error("its format is {found}; this program reads format {FORMAT}")]
+    OtherFormat {
+        /// The version of the format.
+        found: u32,
+    },
+    /// Shorter or longer than it says.
+    #[error("it has {found} bytes after its head, which says {expected}: it is not complete")]
+    WrongLength {
+        /// Bytes that there are.
+        found: u64,
+        /// Bytes that there should be.
+        expected: u64,
+    },
+    /// Its bytes are not those that were written.
+    #[error("its checksum is {found:016x}; its bytes make {expected:016x}: it is damaged")]
+    Damaged {
+        /// The checksum that it gives.
+        found: u64,
+        /// The checksum of its bytes.
+        expected: u64,
+    },
+    /// Written by another version of the program, whose objects have other states.
+    #[error("it was written by metachron {found}; this is {PROGRAM}")]
+    OtherProgram {
+        /// The version that has written it.
+        found: String,
+    },
+    /// Bytes that are whole but mean nothing.
+    #[error("{0}")]
+    Malformed(ArchiveError),
+}
+
+impl Checkpoint {
+    /// Simulated time of the state.
+    #[must_use]
+    pub const fn time(&self) -> SimTime {
+        self.time
+    }
+
+    /// The name of its scene.
+    #[must_use]
+    pub fn scene(&self) -> &str {
+        &self.of.name
+    }
+
+    /// Size of the state, bytes.
+    #[must_use]
+    pub fn size_bytes(&self) -> usize {
+        self.state.len()
+    }
+
+    /// Writes it to a file, in place of one that is there.
+    ///
+    /// # Errors
+    /// [`CheckpointError::File`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), CheckpointError> {
+        let path = path.as_ref();
+        std::fs::write(path, self.to_bytes()).map_err(|source| CheckpointError::File { path: path.to_owned(), source })
+    }
+
+    /// Reads the one that a file holds.
+    ///
+    /// # Errors
+    /// [`CheckpointError::File`]; [`CheckpointError::BadFile`] for any file that [`Self::write`] of this version has not written.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, CheckpointError> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| CheckpointError::File { path: path.to_owned(), source })?;
+        Self::from_bytes(&bytes).map_err(|reason| CheckpointError::BadFile { path: path.to_owned(), reason })
+    }
+
+    /// The bytes of a file.
+    fn to_bytes(&self) -> Vec<u8> {
+        let mut archive = Archive::writer();
+        let mut copy = self.clone();
+        // plain values of this program can all be written
+        let written = Self::archive(&mut PROGRAM.to_owned(), &mut copy, &mut archive);
+        debug_assert_eq!(written, Ok(()));
+        let body = archive.into_bytes();
+        let mut bytes = Vec::with_capacity(HEAD + body.len());
+        bytes.extend_from_slice(&MAGIC);
+        bytes.extend_from_slice(&FORMAT.to_le_bytes());
+        bytes.extend_from_slice(&(body.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(&checksum(&body).to_le_bytes());
+        bytes.extend_from_slice(&body);
+        bytes
+    }
+
+    /// The checkpoint in the bytes of a file.
+    fn from_bytes(bytes: &[u8]) -> Result<Self, BadCheckpoint> {
+        let Some((head, body)) = bytes.split_first_chunk::<HEAD>().filter(|(head, _)| head.starts_with(&MAGIC)) else {
+            return Err(BadCheckpoint::NoCheckpoint);
+        };
+        let number = |from: usize| u64::from_le_bytes(std::array::from_fn(|at| head[from + at]));
+        let found = number(MAGIC.len()) as u32;
+        if found != FORMAT {
+            return Err(BadCheckpoint::OtherFormat { found });
+        }
+        let (expected, found) = (number(MAGIC.len() + 4), body.len() as u64);
+        if found != expected {
+            return Err(BadCheckpoint::WrongLength { found, expected });
+        }
+        let (found, expected) = (number(MAGIC.len() + 12), checksum(body));
+        if found != expected {
+            return Err(BadCheckpoint::Damaged { found, expected });
+        }
+        let (mut program, mut read) = (String::new(), Self::empty());
+        let mut archive = Archive::reader(body);
+        archive.value(&mut program).map_err(BadCheckpoint::Malformed)?;
+        if program != PROGRAM {
+            return Err(BadCheckpoint::OtherProgram { found: program });
+        }
+        let mut archive = Archive::reader(body);
+        Self::archive(&mut program, &mut read, &mut archive).map_err(BadCheckpoint::Malformed)?;
+        archive.finish().map_err(BadCheckpoint::Malformed)?;
+        Ok(read)
+    }
+
+    fn archive(program: &mut String, of: &mut Self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        metachron_core::archive_values!(archive, *program, of.of, of.time, of.state)
+    }
+
+    fn empty() -> Self {
+        let of = SceneIdentity::default();
+        Self { of, time: SimTime::ZERO, state: vec![] }
+    }
+}
+
+impl SceneIdentity {
+    pub fn of(scene: &Scene) -> Self {
+        let objects = scene.agents.iter().map(|member| ObjectIdentity {
+            name: member.name.clone(),
+            model: member.spec.model().to_owned(),
+            rate_hz: member.pace.rate_hz,
+        });
+        Self {
+            name: scene.name.clone(),
+            objects: objects.collect(),
+            fixed: scene.obstacles.len(),
+            joints: scene.joints.len(),
+            couplings: scene.couplings.len(),
+            joined: Vec::new(),
+            left: Vec::new(),
+        }
+    }
+
+    /// The same with those that have joined the world and left it since.
+    pub fn now(&self, agents: &Agents) -> Self {
+        let joined = agents.iter().skip(self.objects.len()).map(|agent| agent.name().to_owned()).collect();
+        let left = agents.iter().filter(|agent| agent.state() == AgentState::Gone).map(|agent| agent.id().0).collect();
+        Self { joined, left, ..self.clone() }
+    }
+
+    /// Checks that a checkpoint of the scene `found` is one of this scene. Its name may be another: files are renamed.
+    ///
+    /// # Errors
+    /// [`CheckpointError::OtherScene`] with the first difference.
+    pub fn check(&self, found: &Self) -> Result<(), CheckpointError> {
+        let other =
+            |what: String, found: String, expected: String| Err(CheckpointError::OtherScene { what, found, expected });
+        let counts = [
+            ("moving objects", found.objects.len(), self.objects.len()),
+            ("fixed solids", found.fixed, self.fixed),
+            ("joints", found.joints, self.joints),
+            ("couplings", found.couplings, self.couplings),
+        ];
+        if let Some((what, found, expected)) = counts.into_iter().find(|(_, found, expected)| found != expected) {
+            return other(format!("the number of {what}"), found.to_string(), expected.to_string());
+        }
+        if found.joined != self.joined {
+            let said = |joined: &[String]| format!("[{}]", joined.join(", "));
+            return other("who has joined since the start".to_owned(), said(&found.joined), said(&self.joined));
+        }
+        if found.left != self.left {
+            let said = |left: &[u32]| format!("agents {left:?}");
+            return other("who has left since the start".to_owned(), said(&found.left), said(&self.left));
+        }
+        let mut pairs = found.objects.iter().zip(&self.objects).enumerate();
+        let Some((at, (found, expected))) = pairs.find(|(_, (found, expected))| found != expected) else {
+            return Ok(());
+        };
+        let said = |one: &ObjectIdentity| format!("\"{}\", a {} at {} Hz", one.name, one.model, one.rate_hz);
+        other(format!("object {at}"), said(found), said(expected))
+    }
+}
+
+/// FNV-1a, 64 bits: no change of one byte leaves it as it was.
+fn checksum(bytes: &[u8]) -> u64 {
+    const FNV_PRIME: u64 = 0x0100_0000_01b3;
+    bytes.iter().fold(HASH_START, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(FNV_PRIME))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinds::ExecutorKind;
+    use crate::{Rigid, Tube, World};
+    use metachron_core::SimSpan;
+    use metachron_geometry::Solid;
+
+    fn scene() -> Scene {
+        let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.051]);
+        let tube = Tube::along(&[[-0.2, 0.0, 0.12], [0.2, 0.0, 0.12]]).radius_m(0.01).segments(4);
+        Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap()
+    }
+
+    fn start() -> World {
+        World::start(&scene(), ExecutorKind::Lockstep).unwrap()
+    }
+
+    /// The file says whether its bytes are those written; this is what is left if it says so of others.
+    #[test]
+    fn a_state_with_any_byte_changed_is_read_or_refused() {
+        let world = start();
+        world.advance(SimSpan::from_millis(100));
+        let mark = world.checkpoint().unwrap();
+        let mut refused = 0;
+        let mut world = start();
+        for at in (0..mark.state.len()).step_by(1 + mark.state.len() / 300) {
+            let mut broken = mark.clone();
+            broken.state[at] ^= 0xff;
+            match world.restore(&broken) {
+                Ok(()) => {}
+                Err(CheckpointError::Unusable { .. }) => {
+                    assert!(matches!(world.restore(&mark), Err(CheckpointError::Stopped)));
+                    (refused, world) = (refused + 1, start());
+                }
+                Err(other) => panic!("byte {at}: {other}"),
+            }
+        }
+        assert!(refused > 0, "no number was found to be wrong");
+    }
+
+    #[test]
+    fn another_version_is_named() {
+        let mark = start().checkpoint().unwrap();
+        let mut bytes = mark.to_bytes();
+        assert_eq!(Checkpoint::from_bytes(&bytes), Ok(mark));
+        bytes[MAGIC.len()] = 9;
+        assert_eq!(Checkpoint::from_bytes(&bytes), Err(BadCheckpoint::OtherFormat { found: 9 }));
+    }
+}
