@@ -11,6 +11,7 @@ mod published_bounds;
 
 pub(super) use neighbour_list::NeighbourList;
 
+use super::table::Table;
 use glam::DVec3;
 use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime};
 use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
@@ -29,12 +30,12 @@ pub(super) struct PlannedStep {
 /// Shared data by which the agents of a run find each other.
 #[derive(Debug)]
 pub(super) struct BroadPhase {
-    bounds: boxcar::Vec<PublishedBounds>,
+    bounds: Table<PublishedBounds>,
     /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
     /// Number of entries ever written.
     noted: AtomicU64,
-    calls: boxcar::Vec<Calls>,
+    calls: Table<Calls>,
 }
 
 /// Agents that have given impulses to one agent, or belong with it, since its last query: a bit each, on pages allocated on first use, since most agents never
@@ -66,20 +67,18 @@ const SPEED_ROOM: f64 = 1.25;
 impl BroadPhase {
     /// The broad phase of that many agents, none of which has published a box.
     pub fn new(agents: usize) -> Self {
-        let broad_phase = Self {
-            bounds: boxcar::Vec::new(),
+        Self {
+            bounds: Table::of(agents),
             log: zeros(LOG_LENGTH as usize),
             noted: AtomicU64::new(0),
-            calls: boxcar::Vec::new(),
-        };
-        (0..agents).for_each(|_| broad_phase.join());
-        broad_phase
+            calls: Table::of(agents),
+        }
     }
 
     /// Makes room for the agent of the next number. Agents join one at a time.
     pub fn join(&self) {
-        self.bounds.push(PublishedBounds::default());
-        self.calls.push(Calls::default());
+        self.bounds.grow();
+        self.calls.grow();
     }
 
     /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
@@ -149,13 +148,13 @@ impl BroadPhase {
 
     /// Writes or reads what agents have published of where they are and whom they have called; called between turns.
     pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.bounds.iter().try_for_each(|(_, bounds)| bounds.archive(archive))?;
+        self.bounds.iter().try_for_each(|bounds| bounds.archive(archive))?;
         for word in self.log.iter().chain([&self.noted]) {
             let mut value = word.load(SeqCst);
             archive.value(&mut value)?;
             word.store(value, SeqCst);
         }
-        for to in (0..self.calls.count() as u32).map(AgentId) {
+        for to in (0..self.calls.len() as u32).map(AgentId) {
             let mut callers = Vec::new();
             self.take_callers(to, |from| callers.push(from));
             let before = callers.clone();

@@ -70,39 +70,45 @@ const WORDS: usize = 11;
 
 /// The newest events of an agent.
 #[derive(Debug, Default)]
-pub(super) struct EventRing {
+pub(super) struct EventRing(OnceLock<Box<Ring>>);
+
+/// What the first reader makes.
+#[derive(Debug)]
+struct Ring {
     /// How many were written. Only the agent writes.
     written: AtomicU64,
-    /// Made by the first reader.
-    places: OnceLock<Box<[Seqlock<WORDS>]>>,
+    places: Box<[Seqlock<WORDS>]>,
 }
 
 impl EventRing {
     /// Begins to keep events; the number of the next one.
     pub fn listen(&self) -> u64 {
-        self.places.get_or_init(|| (0..EVENTS_KEPT).map(|_| Seqlock::new()).collect());
-        self.written.load(Acquire)
+        let ring = self.0.get_or_init(|| {
+            let places = (0..EVENTS_KEPT).map(|_| Seqlock::new()).collect();
+            Box::new(Ring { written: AtomicU64::new(0), places })
+        });
+        ring.written.load(Acquire)
     }
 
     /// Writes an event, from one thread at a time; nothing where nobody listens.
     pub fn push(&self, event: &AgentEvent) {
-        let Some(places) = self.places.get() else { return };
-        let number = self.written.load(Relaxed);
+        let Some(Ring { written, places }) = self.0.get().map(|ring| &**ring) else { return };
+        let number = written.load(Relaxed);
         places[number as usize % EVENTS_KEPT].write(words(event));
-        self.written.store(number + 1, Release);
+        written.store(number + 1, Release);
     }
 
     /// Passes the events from number `next` on to `take`; the number of the next one, and how many were overwritten before they were read.
     pub fn read(&self, next: u64, mut take: impl FnMut(AgentEvent)) -> (u64, u64) {
-        let Some(places) = self.places.get() else { return (next, 0) };
-        let written = self.written.load(Acquire);
+        let Some(Ring { written: end, places }) = self.0.get().map(|ring| &**ring) else { return (next, 0) };
+        let written = end.load(Acquire);
         let first = next.max(written.saturating_sub(EVENTS_KEPT as u64));
         let mut lost = first - next;
         for number in first..written {
             match places[number as usize % EVENTS_KEPT].read() {
                 ReadOutcome::Complete(words) => match event(&words) {
                     // the place may have a newer one already
-                    Some(event) if self.written.load(Acquire) <= number + EVENTS_KEPT as u64 => take(event),
+                    Some(event) if end.load(Acquire) <= number + EVENTS_KEPT as u64 => take(event),
                     _ => lost += 1,
                 },
                 ReadOutcome::Empty | ReadOutcome::Torn => lost += 1,

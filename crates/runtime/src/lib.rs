@@ -63,6 +63,7 @@ mod sleep;
 mod slot;
 mod spawn;
 mod sync;
+mod table;
 #[cfg(test)]
 mod testing;
 mod threads;

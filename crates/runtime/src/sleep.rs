@@ -15,6 +15,7 @@ use super::sync::atomic::{
     fence,
 };
 use super::sync::thread::Thread;
+use super::table::Table;
 use super::worker_wakeup::WorkerWakeup;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
@@ -66,7 +67,7 @@ impl Default for Signal {
 #[derive(Debug)]
 pub(super) struct SleepRegistry {
     /// Of every agent that has ever been in the run: more may join it.
-    signals: boxcar::Vec<Signal>,
+    signals: Table<Signal>,
     /// An agent was notified: the lockstep loop serves it.
     notified: AtomicBool,
     stop: AtomicBool,
@@ -99,29 +100,29 @@ pub(super) struct SignalState {
 impl SleepRegistry {
     pub fn new(agents: usize) -> Self {
         let registry = Self {
-            signals: boxcar::Vec::new(),
+            signals: Table::of(agents),
             notified: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             far_behind: AtomicU64::new(0),
             wakeup: OnceLock::new(),
             changed: DirtySet::default(),
         };
-        (0..agents).for_each(|_| registry.join());
+        registry.changed.reach(agents);
         registry
     }
 
     /// Makes room for the agent of the next number. Agents join one at a time.
     pub fn join(&self) {
-        self.changed.reach(self.signals.count() + 1);
+        self.changed.reach(self.signals.len() + 1);
         if let Some(wakeup) = self.wakeup.get() {
-            wakeup.reach(self.signals.count() + 1);
+            wakeup.reach(self.signals.len() + 1);
         }
-        self.signals.push(Signal::default());
+        self.signals.grow();
     }
 
     /// From now on notifications go to this many workers of a pool.
     pub fn set_workers(&self, workers: usize) {
-        self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.count(), workers));
+        self.wakeup.get_or_init(|| WorkerWakeup::new(self.signals.len(), workers));
     }
 
     /// Wake-up of the workers; `None` where every agent has its own thread.
@@ -159,7 +160,7 @@ impl SleepRegistry {
     /// How long the end of a run waits for these agents' turns before they count as hung: a turn of a cluster makes the steps of all its
     /// members.
     pub fn end_patience(&self, missing: impl Iterator<Item = AgentId>) -> Duration {
-        let mut led = vec![0; self.signals.count()];
+        let mut led = vec![0; self.signals.len()];
         (0..).map(AgentId).take(led.len()).for_each(|id| led[self.leader(id).0 as usize] += 1);
         let most = missing.filter_map(|id| led.get(id.0 as usize).copied()).fold(1, u32::max);
         END_PATIENCE * most.min(END_PATIENCE_MAX)
@@ -274,7 +275,7 @@ impl SleepRegistry {
         if let Some(wakeup) = self.wakeup.get() {
             wakeup.wake_all();
         }
-        self.signals.iter().filter_map(|(_, signal)| signal.thread.get()).for_each(Thread::unpark);
+        self.signals.iter().filter_map(|signal| signal.thread.get()).for_each(Thread::unpark);
     }
 
     /// Records at `now` that an agent near peers is far behind, or is still postponed relative to the scene's time.
@@ -295,16 +296,16 @@ impl SleepRegistry {
     /// Who rests, is woken, was touched, and who leads whom.
     pub fn state(&self) -> SleepState {
         let (notified, far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
-        SleepState { signals: self.signals.iter().map(|(_, signal)| signal.state()).collect(), notified, far_behind }
+        SleepState { signals: self.signals.iter().map(Signal::state).collect(), notified, far_behind }
     }
 
     /// Takes over a state of as many agents; all of them have new states then.
     pub fn set_state(&self, state: &SleepState) {
         let SleepState { signals, notified, far_behind } = state;
-        self.signals.iter().zip(signals).for_each(|((_, signal), state)| signal.set_state(*state));
+        self.signals.iter().zip(signals).for_each(|(signal, state)| signal.set_state(*state));
         self.notified.store(*notified, Release);
         self.far_behind.store(*far_behind, Release);
-        (0..).map(AgentId).take(self.signals.count()).for_each(|id| self.changed.mark(id));
+        (0..).map(AgentId).take(self.signals.len()).for_each(|id| self.changed.mark(id));
     }
 
     /// Asks every thread to end.

@@ -39,6 +39,8 @@ mod slot;
 #[path = "../../../crates/runtime/src/sleep.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod sleep;
+#[path = "../../../crates/runtime/src/table.rs"]
+mod table;
 #[path = "../../../agents/core/src/time.rs"]
 mod time;
 
@@ -121,7 +123,8 @@ fn slot_keeps_what_is_held() {
 }
 
 fn news_come_after_the_state() {
-    let (set, state) = (Arc::new(DirtySet::new(2)), Arc::new(AtomicU32::new(0)));
+    let (set, state) = (Arc::new(DirtySet::default()), Arc::new(AtomicU32::new(0)));
+    set.reach(2);
     let teller = {
         let (set, state) = (Arc::clone(&set), Arc::clone(&state));
         thread::spawn(move || {

@@ -175,11 +175,8 @@ impl NeighbourList {
         self.common_check = NEVER;
         self.listed.clear();
         let me = self.me;
-        for (id, published) in broad_phase
-            .bounds
-            .iter()
-            .map(|(at, published)| (AgentId(at as u32), published))
-            .filter(|(id, _)| *id != me && !members.has(*id))
+        for (id, published) in
+            (0..).map(AgentId).zip(broad_phase.bounds.iter()).filter(|(id, _)| *id != me && !members.has(*id))
         {
             let seen = published.read();
             checked += 1;

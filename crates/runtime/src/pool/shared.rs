@@ -11,6 +11,7 @@ use super::super::agents::Agents;
 use super::super::clock::Clock;
 use super::super::cluster::Handover;
 use super::super::sleep::SleepRegistry;
+use super::super::table::Table;
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
 use crossbeam::utils::CachePadded;
@@ -35,7 +36,7 @@ pub(super) struct PoolState {
     pub sleep: Arc<SleepRegistry>,
     pub handles: Agents,
     queues: Vec<CachePadded<WorkerQueue>>,
-    resting: boxcar::Vec<AtomicCell<Option<Box<AgentRunner>>>>,
+    resting: Table<AtomicCell<Option<Box<AgentRunner>>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
@@ -54,7 +55,7 @@ impl PoolState {
         actors: Vec<Option<Box<AgentRunner>>>,
         workers: usize,
     ) -> Self {
-        let resting = handles.iter().map(|_| AtomicCell::new(None)).collect();
+        let resting = Table::of(handles.len());
         let queues = std::iter::repeat_with(CachePadded::default).take(workers).collect();
         let state = Self { clock, timeline: SharedTimeline::new(), sleep, handles, queues, resting };
         // neighbours in the scene share a worker, and still every worker gets agents of each kind
@@ -85,7 +86,7 @@ impl PoolState {
 
     /// Takes up an agent that joins the run, as the next number.
     pub fn take_up(&self, actor: Box<AgentRunner>) {
-        self.resting.push(AtomicCell::new(None));
+        self.resting.grow();
         let (at, now) = (actor.id().0 as usize % self.queues.len(), self.clock.now());
         if !actor.is_parked() {
             self.put(at, actor, now);
@@ -146,7 +147,7 @@ impl PoolState {
 
     /// Visits and removes all resting and queued agents, at the end of a run.
     pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
-        self.resting.iter().filter_map(|(_, slot)| slot.take()).for_each(&mut visit);
+        self.resting.iter().filter_map(AtomicCell::take).for_each(&mut visit);
         self.queues.iter().for_each(|worker| worker.with(|queue| queue.drain().for_each(&mut visit)));
     }
 

@@ -253,8 +253,19 @@ mod tests {
     }
 }
 #[cfg(test)]
-mod dbg { #[test] fn sizes() {
- use super::super::super::*;
- println!("runner {} shared {} seat {} mailbox {} events {} metrics {}", size_of::<agent_runner::AgentRunner>(), size_of::<handle::Shared>(), size_of::<cluster::ClusterSeat>(), size_of::<mailbox::Mailbox>(), size_of::<events::EventRing>(), size_of::<metrics::Metrics>());
- println!("bc {}", size_of::<boxcar::Vec<u64>>());
-}}
+mod dbg {
+    #[test]
+    fn sizes() {
+        use super::super::super::*;
+        println!(
+            "runner {} shared {} seat {} mailbox {} events {} metrics {}",
+            size_of::<agent_runner::AgentRunner>(),
+            size_of::<handle::Shared>(),
+            size_of::<cluster::ClusterSeat>(),
+            size_of::<mailbox::Mailbox>(),
+            size_of::<events::EventRing>(),
+            size_of::<metrics::Metrics>()
+        );
+        println!("bc {}", size_of::<boxcar::Vec<u64>>());
+    }
+}
