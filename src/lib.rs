@@ -37,6 +37,11 @@ pub use metachron_session as session;
 pub use metachron_viewer as viewer;
 pub use metachron_world as world;
 
+/// The page of worlds in programs: its code runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/world.md")]
+struct WorldPage;
+
 /// What a program that builds and runs a scene needs.
 pub mod prelude {
     pub use glam::{DQuat, DVec3};

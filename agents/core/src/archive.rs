@@ -158,7 +158,11 @@ impl<'a> Archive<'a> {
     ) -> Result<(), ArchiveError> {
         let mut is_there = part.is_some();
         self.value(&mut is_there)?;
-        if is_there { visit(part.get_or_insert_with(make), self) } else { Ok(*part = None) }
+        if is_there {
+            return visit(part.get_or_insert_with(make), self);
+        }
+        *part = None;
+        Ok(())
     }
 
     /// A list of parts that `visit` reads into: those that are there, and as many more as `make` has to make.

@@ -3,8 +3,8 @@
 use super::assemble::Governors;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
-use metachron_runtime::{AgentState, Command};
+use metachron_core::{Anchor, Resolution, SimSpan};
+use metachron_runtime::{AgentState, Command, Keyed};
 use metachron_scene::{Source, load};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Checkpoint, CheckpointError, Scene, World};
@@ -94,7 +94,7 @@ fn what_was_divided_anew_goes_on_divided() {
     let finer = |world: &World| {
         for agent in world.agents() {
             let Some(Resolution { eps_m, n }) = agent.latest().resolution else { continue };
-            world.send(agent.id(), Command::Retune(Resolution { eps_m: 0.6 * eps_m, n })).unwrap();
+            agent.send(Command::Retune(Resolution { eps_m: 0.6 * eps_m, n })).unwrap();
         }
     };
     for name in ["crossing", "mesentery", "tube"] {
@@ -121,7 +121,7 @@ fn a_hand_that_holds_holds_on() {
             stiffness_n_m: 50.0,
             damping_n_s_m: 0.5,
         };
-        world.send(agent, Command::Hand(Some(pull))).unwrap();
+        world.agents()[agent.0 as usize].send(Command::Spring(Keyed::first(Some(pull)))).unwrap();
     };
     let held = |world: &World| {
         hand(world);
@@ -156,7 +156,7 @@ fn what_rests_rests_on_and_wakes_as_it_would_have() {
             stiffness_n_m: 500.0,
             damping_n_s_m: 1.0,
         };
-        world.send(AgentId(0), Command::Hand(Some(pull))).unwrap();
+        world.agents()[0].send(Command::Spring(Keyed::first(Some(pull)))).unwrap();
     };
     goes_on(&scene, Spans { before: 2000, after: 300 }, rested, push);
 }
@@ -172,9 +172,8 @@ fn a_heap_of_rapier3d_goes_on() {
     goes_on(&scene, Spans { before: 200, after: 100 }, contacts, |_| ());
 }
 
-#[test]
-fn asynchronous_pairs_with_lost_states_go_on() {
-    let objects = "
+/// Bodies between which impulses and waves are on their way, some of them lost.
+const ASYNCHRONOUS: &str = "
 [[object]]
 name = 'slow'
 model = 'rigid'
@@ -235,7 +234,10 @@ law = 'tlm'
 stiffness_n_m = 2000
 damping_n_s_m = 2
 ";
-    let scene = written("asynchronous", &format!("{FLOOR}{objects}"));
+
+#[test]
+fn asynchronous_pairs_with_lost_states_go_on() {
+    let scene = written("asynchronous", &format!("{FLOOR}{ASYNCHRONOUS}"));
     for before in [150, 260, 417] {
         goes_on(&scene, Spans { before, after: 200 }, |_| (), |_| ());
     }
