@@ -36,7 +36,7 @@ mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};
-pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube};
+pub use builder::{Part, Rigid, SceneBuildError, SceneBuilder, Tube, static_solid};
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};
 pub use initial_overlap::Moved;
