@@ -1,0 +1,177 @@
+//! Many worlds of one scene at once, each in lockstep, each under forces of its own.
+//!
+//! In: a scene, an object, a force for each world and step. Out: positions and velocities after each step.
+//! A world is the same whichever thread plays it. Never here: a reward, a policy.
+
+use crate::command::Keywords;
+use crate::numbers::{array, span};
+use crate::raised;
+use crate::scene::Scene;
+use crate::state::Points;
+use glam::DVec3;
+use metachron::core::{Anchor, Body, SimSpan};
+use metachron::world::kinds::ExecutorKind;
+use metachron::world::{self, Command, World, WorldError};
+use numpy::ndarray::{Array3, Array4, ArrayView2, Axis};
+use numpy::{PyArray1, PyReadonlyArray3};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
+
+/// What became of the worlds: per observed object, arrays of shape (worlds, steps, n, 3).
+#[pyclass(frozen, get_all, module = "metachron")]
+pub struct Rollout {
+    positions: Py<PyDict>,
+    velocities: Py<PyDict>,
+    hashes: Py<PyArray1<u64>>,
+}
+
+/// What every world does.
+struct Plan {
+    scene: world::Scene,
+    /// The object that forces act on, and where.
+    on: String,
+    anchor: Anchor,
+    observe: Vec<String>,
+    step: SimSpan,
+    /// Newtons, by world, step and axis.
+    actions: Array3<f64>,
+}
+
+/// What became of one world.
+struct Played {
+    /// By observed object.
+    motions: Vec<Motion>,
+    hash: u64,
+}
+
+/// Positions and velocities of an object, step after step.
+#[derive(Clone, Default)]
+struct Motion {
+    positions: Vec<f64>,
+    velocities: Vec<f64>,
+}
+
+/// Why a rollout ended early.
+struct Fault {
+    /// The world's number.
+    number: usize,
+    error: WorldError,
+}
+
+/// Plays `actions.shape[0]` worlds, as many at once as there are threads.
+#[pyfunction]
+#[pyo3(signature = (scene, on, actions, **keywords))]
+pub fn rollout(
+    py: Python<'_>,
+    scene: PyRef<'_, Scene>,
+    on: String,
+    actions: PyReadonlyArray3<'_, f64>,
+    keywords: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Rollout> {
+    let keywords = Keywords::new("rollout", keywords, &["step", "observe", "threads", "arc", "local", "vertex"])?;
+    let actions = actions.as_array().to_owned();
+    if actions.shape()[2] != 3 {
+        let message = format!("actions have the shape {:?}; expected (worlds, steps, 3)", actions.shape());
+        return Err(PyValueError::new_err(message));
+    }
+    let step: Option<f64> = keywords.get("step")?;
+    let step = step.ok_or_else(|| PyTypeError::new_err("rollout() needs the keyword argument 'step', seconds"))?;
+    let threads: usize = keywords.get("threads")?.unwrap_or(2);
+    let observe = keywords.get("observe")?.unwrap_or_else(|| vec![on.clone()]);
+    let (anchor, step) = (keywords.anchor()?, span("step", step)?);
+    let plan = Plan { scene: scene.resolved()?, on, anchor, observe, step, actions };
+    let played = py.detach(|| plan.play(threads.max(1)))?;
+    plan.gather(py, &played)
+}
+
+impl Plan {
+    /// Plays all worlds; each thread takes the next that nobody has begun.
+    fn play(&self, threads: usize) -> PyResult<Vec<Played>> {
+        let worlds = self.actions.shape()[0];
+        let next = AtomicUsize::new(0);
+        let played: Mutex<Vec<Option<Result<Played, Fault>>>> = Mutex::new((0..worlds).map(|_| None).collect());
+        let work = || {
+            loop {
+                let number = next.fetch_add(1, Relaxed);
+                if number >= worlds {
+                    break;
+                }
+                let one = self.play_one(number, self.actions.index_axis(Axis(0), number));
+                if one.is_err() {
+                    next.store(worlds, Relaxed);
+                }
+                played.lock().unwrap_or_else(PoisonError::into_inner)[number] = Some(one);
+            }
+        };
+        std::thread::scope(|scope| {
+            let spawn = |_| std::thread::Builder::new().name("rollout".to_owned()).spawn_scoped(scope, work);
+            let started: Vec<_> = (0..threads.min(worlds)).map(spawn).collect();
+            let ends = started.into_iter().map(|thread| match thread {
+                Ok(thread) => thread.join().map_err(|_| PyRuntimeError::new_err("a world of the rollout panicked")),
+                Err(error) => Err(PyRuntimeError::new_err(format!("a thread cannot be started: {error}"))),
+            });
+            ends.collect::<Vec<_>>().into_iter().collect::<PyResult<()>>()
+        })?;
+        let played = played.into_inner().unwrap_or_else(PoisonError::into_inner);
+        // worlds that were not begun come after the one that failed
+        played
+            .into_iter()
+            .flatten()
+            .map(|one| one.map_err(|fault| raised::in_world(fault.number, &fault.error)))
+            .collect()
+    }
+
+    fn play_one(&self, number: usize, actions: ArrayView2<'_, f64>) -> Result<Played, Fault> {
+        let fault = |error| Fault { number, error };
+        let world = World::start(&self.scene, ExecutorKind::Lockstep).map_err(fault)?;
+        let on = world.object(&self.on).map_err(fault)?;
+        let observed: Result<Vec<_>, _> = self.observe.iter().map(|name| world.object(name)).collect();
+        let observed = observed.map_err(fault)?;
+        let mut motions = vec![Motion::default(); observed.len()];
+        for force in actions.rows() {
+            let force = DVec3::new(force[0], force[1], force[2]);
+            world.command(on, Command::force(self.anchor, force)).map_err(fault)?;
+            world.advance(self.step);
+            for (motion, object) in motions.iter_mut().zip(&observed) {
+                motion.record(&world.latest(*object).map_err(fault)?.body);
+            }
+        }
+        Ok(Played { motions, hash: world.hash() })
+    }
+
+    fn gather(&self, py: Python<'_>, played: &[Played]) -> PyResult<Rollout> {
+        let [positions, velocities] = [PyDict::new(py), PyDict::new(py)];
+        for (at, name) in self.observe.iter().enumerate() {
+            let motions = || played.iter().map(|one| &one.motions[at]);
+            positions.set_item(name, array(py, self.stacked(motions().map(|motion| &motion.positions))?))?;
+            velocities.set_item(name, array(py, self.stacked(motions().map(|motion| &motion.velocities))?))?;
+        }
+        let hashes: Vec<_> = played.iter().map(|one| one.hash).collect();
+        let hashes = array(py, hashes.into()).unbind();
+        Ok(Rollout { positions: positions.unbind(), velocities: velocities.unbind(), hashes })
+    }
+
+    /// The numbers of all worlds as one array.
+    fn stacked<'a>(&self, all: impl Iterator<Item = &'a Vec<f64>>) -> PyResult<Array4<f64>> {
+        let flat: Vec<f64> = all.flatten().copied().collect();
+        let &[worlds, steps, _] = self.actions.shape() else {
+            return Err(PyValueError::new_err("actions have three axes"));
+        };
+        let points = flat.len() / (worlds * steps * 3).max(1);
+        // each world has the same objects, whose resolutions nobody changes
+        Array4::from_shape_vec((worlds, steps, points, 3), flat)
+            .map_err(|error| PyRuntimeError::new_err(error.to_string()))
+    }
+}
+
+impl Motion {
+    /// Adds what a body is like now.
+    fn record(&mut self, body: &Body) {
+        let motion = Points::of(body);
+        self.positions.extend(motion.positions.iter().flat_map(|v| v.to_array()));
+        self.velocities.extend(motion.velocities.iter().flat_map(|v| v.to_array()));
+    }
+}
