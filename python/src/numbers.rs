@@ -45,7 +45,7 @@ impl<'py> FromPyObject<'_, 'py> for Rotation {
 
 /// A span of simulated time.
 pub fn span(what: &str, seconds: f64) -> PyResult<SimSpan> {
-    let wanted = || PyValueError::new_err(format!("{what} is {seconds} s; expected 0 s to 584 years"));
+    let wanted = || PyValueError::new_err(format!("{what} is {seconds:?} s; expected 0 s to 584 years"));
     SimSpan::from_secs_f64(seconds).ok_or_else(wanted)
 }
 

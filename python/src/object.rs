@@ -23,6 +23,17 @@ pub enum Named<'py> {
     Name(String),
 }
 
+/// An argument that lists names.
+pub struct Names(pub Vec<String>);
+
+impl<'py> FromPyObject<'_, 'py> for Names {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        given.extract().map(Self).map_err(|_| PyTypeError::new_err("expected a list of names"))
+    }
+}
+
 impl<'py> FromPyObject<'_, 'py> for Named<'py> {
     type Error = PyErr;
 

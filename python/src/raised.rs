@@ -5,7 +5,7 @@
 
 use metachron::scene::{SceneError, SceneProblem};
 use metachron::world::{SceneBuildError, WorldError};
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::{PyErr, Python};
 
 /// An error of a world.
@@ -30,7 +30,12 @@ fn exception(error: &WorldError, message: String) -> PyErr {
 
 /// An error of one argument of a call or one field of a part, with its name.
 pub fn of_argument(py: Python<'_>, what: &str, error: &PyErr) -> PyErr {
-    PyErr::from_type(error.get_type(py), format!("{what}: {}", error.value(py)))
+    let message = format!("{what}: {}", error.value(py));
+    // a number that an integer of the engine cannot hold is wrong as any other is
+    if error.is_instance_of::<PyOverflowError>(py) {
+        return PyValueError::new_err(message);
+    }
+    PyErr::from_type(error.get_type(py), message)
 }
 
 /// Why a scene cannot be built.

@@ -5,6 +5,7 @@
 
 use crate::command::Keywords;
 use crate::numbers::{array, span};
+use crate::object::Names;
 use crate::raised;
 use crate::scene::Scene;
 use crate::state::Points;
@@ -12,8 +13,8 @@ use glam::DVec3;
 use metachron::core::{Anchor, Body, SimSpan};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, World, WorldError};
-use numpy::ndarray::{Array3, Array4, ArrayView2, Axis};
-use numpy::{PyArray1, PyReadonlyArray3};
+use numpy::ndarray::{Array3, Array4, ArrayView2, Axis, Ix3};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLikeDyn};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -68,22 +69,30 @@ pub fn rollout(
     py: Python<'_>,
     scene: PyRef<'_, Scene>,
     on: String,
-    actions: PyReadonlyArray3<'_, f64>,
+    actions: PyArrayLikeDyn<'_, f64, AllowTypeChange>,
     keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Rollout> {
     let keywords = Keywords::new("rollout", keywords, &["step", "observe", "threads", "arc", "local", "vertex"])?;
-    let actions = actions.as_array().to_owned();
-    if actions.shape()[2] != 3 {
-        let message = format!("actions have the shape {:?}; expected (worlds, steps, 3)", actions.shape());
-        return Err(PyValueError::new_err(message));
-    }
+    let actions = actions.as_array();
+    let shape = actions.shape();
+    let actions = actions.to_owned().into_dimensionality::<Ix3>().ok().filter(|actions| actions.shape()[2] == 3);
+    let actions = actions.ok_or_else(|| {
+        let message = format!("actions have the shape {shape:?}; expected (worlds, steps, 3)");
+        PyValueError::new_err(message)
+    })?;
     let step: Option<f64> = keywords.get("step")?;
     let step = step.ok_or_else(|| PyTypeError::new_err("rollout() needs the keyword argument 'step', seconds"))?;
+    if step <= 0.0 {
+        return Err(PyValueError::new_err(format!("step is {step:?} s; expected above zero")));
+    }
     let threads: usize = keywords.get("threads")?.unwrap_or(2);
-    let observe = keywords.get("observe")?.unwrap_or_else(|| vec![on.clone()]);
+    if threads == 0 {
+        return Err(PyValueError::new_err("threads is 0; expected at least 1"));
+    }
+    let observe = keywords.get("observe")?.map_or_else(|| vec![on.clone()], |Names(names)| names);
     let (anchor, step) = (keywords.anchor()?, span("step", step)?);
     let plan = Plan { scene: scene.resolved()?, on, anchor, observe, step, actions };
-    let played = py.detach(|| plan.play(threads.max(1)))?;
+    let played = py.detach(|| plan.play(threads))?;
     plan.gather(py, &played)
 }
 
@@ -157,9 +166,7 @@ impl Plan {
     /// The numbers of all worlds as one array.
     fn stacked<'a>(&self, all: impl Iterator<Item = &'a Vec<f64>>) -> PyResult<Array4<f64>> {
         let flat: Vec<f64> = all.flatten().copied().collect();
-        let &[worlds, steps, _] = self.actions.shape() else {
-            return Err(PyValueError::new_err("actions have three axes"));
-        };
+        let (worlds, steps, _) = self.actions.dim();
         let points = flat.len() / (worlds * steps * 3).max(1);
         // each world has the same objects, whose resolutions nobody changes
         Array4::from_shape_vec((worlds, steps, points, 3), flat)

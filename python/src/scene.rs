@@ -4,6 +4,7 @@
 //! engine's own.
 
 use crate::numbers::{Rotation, Vector};
+use crate::object::Names;
 use crate::raised;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
@@ -119,20 +120,19 @@ impl Scene {
         Ok(slf)
     }
 
-    #[pyo3(signature = (name, kind, a, b = None, *, at))]
+    #[pyo3(signature = (name, kind, a, b = None))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
         name: String,
         kind: &Bound<'py, PyAny>,
         a: &str,
         b: Option<&str>,
-        at: Vector,
     ) -> PyResult<PyRefMut<'py, Self>> {
         if slf.joints.contains(&name) {
             return Err(PyValueError::new_err(format!("the scene has a joint \"{name}\" already")));
         }
-        let kind = joint_kind(kind)?;
-        slf.build(|builder| builder.joint(a, b, kind, at.0.to_array()))?;
+        let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
+        slf.build(|builder| builder.joint(a, b, kind, at.to_array()))?;
         slf.joints.push(name);
         Ok(slf)
     }
@@ -207,7 +207,9 @@ fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
         "Capsule" => Solid::Capsule { radius_m: number("radius")?, half_height_m: number("half_height")? },
         "Cylinder" => Solid::Cylinder { radius_m: number("radius")?, half_height_m: number("half_height")? },
         other => {
-            let message = format!("a part is a Plane, Ball, Box, Capsule, Cylinder or Tube, not a {other}");
+            let message = format!(
+                "a solid is a Plane, Ball, Box, Capsule or Cylinder, and what moves may be a Tube; got a {other}"
+            );
             return Err(PyTypeError::new_err(message));
         }
     })
@@ -215,7 +217,7 @@ fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
 
 fn tube(part: &Bound<'_, PyAny>) -> PyResult<Tube> {
     let points: Vec<_> = field::<Vec<Vector>>(part, "points")?.iter().map(|Vector(point)| point.to_array()).collect();
-    let clamp: Vec<String> = field(part, "clamp")?;
+    let Names(clamp) = field(part, "clamp")?;
     if let Some(wrong) = clamp.iter().find(|end| !ENDS.contains(&&***end)) {
         return Err(PyValueError::new_err(format!("a tube is clamped at \"start\" and \"end\", not at {wrong:?}")));
     }

@@ -14,10 +14,10 @@ use crate::state::State;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
 use metachron::core::SimSpan;
-use metachron::runtime::TimelineCommand;
+use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, EventFilter};
-use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
@@ -39,10 +39,19 @@ struct Joint {
 }
 
 /// An argument that names a joint.
-#[derive(FromPyObject)]
 enum NamedJoint {
     Name(String),
     Number(u32),
+}
+
+impl<'py> FromPyObject<'_, 'py> for NamedJoint {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let name = given.extract().map(Self::Name);
+        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
+        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
+    }
 }
 
 /// The executors, as Python names them.
@@ -116,9 +125,19 @@ impl World {
         self.inner.latest(object.of(&self.inner)?).map(State).map_err(raised::world)
     }
 
+    fn fault(&self, object: Named<'_>) -> PyResult<Option<String>> {
+        let object = object.of(&self.inner)?;
+        self.inner.latest(object).map_err(raised::world)?;
+        Ok(self.inner.agents().of(object.id()).and_then(|agent| match agent.state() {
+            AgentState::Parked(reason) => Some(reason),
+            _ => None,
+        }))
+    }
+
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time().as_secs_f64()
+    fn time(&self, py: Python<'_>) -> f64 {
+        // in lockstep it waits for a piece of `advance` in another thread
+        py.detach(|| self.inner.time().as_secs_f64())
     }
 
     #[getter]
@@ -255,6 +274,9 @@ impl World {
             (false, true) => EventFilter::states(),
             (false, false) => return Err(PyValueError::new_err("events are of contacts, of states, or of both")),
         };
+        if above.is_nan() || above < 0.0 {
+            return Err(PyValueError::new_err(format!("above is {above:?} N; expected 0 or more")));
+        }
         let filter = filter.above_n(above);
         let filter = match of {
             Some(object) => filter.of(object.of(&self.inner)?),
@@ -278,7 +300,7 @@ impl World {
         Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
     }
 
-    fn __repr__(&self) -> String {
-        format!("<World on {} at {} s>", self.executor(), self.time())
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<World on {} at {} s>", self.executor(), self.time(py))
     }
 }

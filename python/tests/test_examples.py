@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+PYTHON = Path(__file__).parent.parent
+EXAMPLES = PYTHON / "examples"
 
 
 def test_the_environment_passes_gymnasiums_own_checks() -> None:
@@ -26,3 +27,12 @@ def test_the_environment_passes_gymnasiums_own_checks() -> None:
 def test_the_example_comes_near_the_wanted_height(capsys: pytest.CaptureFixture[str]) -> None:
     runpy.run_path(str(EXAMPLES / "lift.py"), run_name="__main__")
     assert float(capsys.readouterr().out.split("reward")[1]) > -0.02
+
+
+def test_the_program_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    program = (PYTHON / "README.md").read_text().split("```python\n")[1].split("```")[0]
+    exec(program, {})
+    printed = capsys.readouterr().out.splitlines()
+    # the ball falls half a metre, less its radius, in 0.3 s
+    assert float(printed[0].split()[0]) == pytest.approx(0.5, abs=1.0 / 240.0)
+    assert printed[1].startswith("contact_began ball floor")

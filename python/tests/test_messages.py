@@ -50,14 +50,16 @@ def test_parts_that_cannot_be_are_named() -> None:
     wrong(lambda: scene().add("a", mc.Tube([[0.0, 0.0, 0.0]])), '"a"')
     wrong(lambda: scene().add("a", mc.Plane()), "Plane does not move")  # type: ignore[arg-type]
     wrong(lambda: scene().fixed("a", mc.Ball(0.1, mass=2.0)), "no mass")
-    wrong(lambda: scene().joint("j", mc.Weld(), "a", at=[0.0, 0.0, 0.0]), '"a"')
+    wrong(lambda: scene().fixed("a", mc.Plane(friction=-3.0)), '"a": the friction is -3; it must be between 0 and 1000')
+    wrong(lambda: scene().add("a", mc.Tube([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], segments=-3)), "field 'segments'")
+    wrong(lambda: scene().joint("j", mc.Weld(at=[0.0, 0.0, 0.0]), "a"), '"a"')
     wrong(lambda: scene().add("a", mc.Ball(0.1, rotation=[1.0, 1.0, 0.0, 0.0])), "length")
     wrong(lambda: mc.Scene.from_toml(TOML).add("b", mc.Ball(0.1)), "complete")
     with pytest.raises(ValueError, match="expected one of lockstep, threads, pool, auto"):
         scenes.floating().start("gpu")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="field 'at': expected three numbers"):
         scene().add("a", mc.Ball(0.1, at=[1.0, 2.0]))
-    with pytest.raises(TypeError, match="not a dict"):
+    with pytest.raises(TypeError, match="got a dict"):
         scene().add("a", {})  # type: ignore[arg-type]
 
 
@@ -71,7 +73,7 @@ def test_commands_that_cannot_be_say_why() -> None:
         world.force("ball", [1.0, 0.0, 0.0], arc=0.1)
     with pytest.raises(ValueError, match="keys are 0 to 7"):
         world.force("ball", [1.0, 0.0, 0.0], key=8)
-    with pytest.raises(ValueError, match="expires is -1 s"):
+    with pytest.raises(ValueError, match="expires is -1.0 s"):
         world.force("ball", [1.0, 0.0, 0.0], expires=-1.0)
     with pytest.raises(TypeError, match="no keyword argument 'until'.*expires"):
         world.force("ball", [1.0, 0.0, 0.0], until=2.0)  # type: ignore[call-arg]
@@ -81,16 +83,29 @@ def test_commands_that_cannot_be_say_why() -> None:
         world.force("ball", [1.0, 0.0, 0.0], arc=0.1, vertex=1)
     with pytest.raises(ValueError, match="needs a stiffness"):
         world.spring("ball", [1.0, 0.0, 0.0])
-    with pytest.raises(ValueError, match="advance by is -1 s"):
+    with pytest.raises(ValueError, match="advance by is -1.0 s"):
         world.advance(-1.0)
     with pytest.raises(ValueError, match="ray|cast"):
         world.cast_ray([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
     with pytest.raises(ValueError, match="lockstep"):
         world.run()
+    with pytest.raises(ValueError, match="above is NaN"):
+        world.events(above=np.nan)
     with pytest.raises(AttributeError, match="frames"):
         _ = world.state("ball").frames
     world.advance(0.1)
     assert (world.state("ball").velocities == 0.0).all()
+
+
+def test_an_object_that_fails_says_why() -> None:
+    world = scenes.floating().start()
+    assert world.fault("ball") is None
+    failed = world.events(contacts=False)
+    world.force("ball", [1e308, 0.0, 0.0])
+    world.advance(0.1)
+    reason = world.fault("ball")
+    assert reason is not None and reason != ""
+    assert [event.kind for event in failed.drain()] == ["failed"]
 
 
 def test_an_object_of_another_world_is_refused() -> None:

@@ -27,7 +27,7 @@ def test_a_rollout_pushes_as_mechanics_says_and_observes_what_it_is_asked_for() 
     # F t / m, whole steps of 1/240 s
     assert played.velocities["ball"][1, -1, 0, 0] == pytest.approx(2.0 * 0.5 / 0.5, abs=1e-6)
     assert (played.positions["ball"][0] == 0.0).all()
-    tube = mc.rollout(scenes.tube(), "gut", actions, step=0.01, arc=0.3)
+    tube = mc.rollout(scenes.tube(), "gut", actions.astype(np.float32), step=0.01, arc=0.3)
     assert tube.positions["gut"].shape == (2, 10, 21, 3)
 
 
@@ -37,6 +37,12 @@ def test_wrong_rollouts_say_what_is_wrong_and_in_which_world() -> None:
         mc.rollout(scenes.floating(), "ball", actions)
     with pytest.raises(ValueError, match=r"\(worlds, steps, 3\)"):
         mc.rollout(scenes.floating(), "ball", np.zeros((3, 4, 2)), step=0.1)
+    with pytest.raises(ValueError, match="threads is 0"):
+        mc.rollout(scenes.floating(), "ball", actions, step=0.1, threads=0)
+    with pytest.raises(ValueError, match="step is 0.0 s"):
+        mc.rollout(scenes.floating(), "ball", actions, step=0.0)
+    with pytest.raises(TypeError, match="argument 'observe': expected a list of names"):
+        mc.rollout(scenes.floating(), "ball", actions, step=0.1, observe="ball")
     with pytest.raises(KeyError, match='no moving object "bell"'):
         mc.rollout(scenes.floating(), "bell", actions, step=0.1)
     actions[2, 1, 0] = np.nan

@@ -4,6 +4,7 @@ import threading
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import metachron as mc
 import numpy as np
@@ -23,8 +24,8 @@ def test_a_ball_falls_as_g_t_squared_over_two() -> None:
 
 
 @pytest.mark.parametrize("executor", ["threads", "pool"])
-def test_a_ball_falls_in_real_time_too(executor: str) -> None:
-    with scenes.falling().start(executor) as world:  # type: ignore[arg-type]
+def test_a_ball_falls_in_real_time_too(executor: Literal["threads", "pool"]) -> None:
+    with scenes.falling().start(executor) as world:
         world.advance(0.1)
         state = world.state("ball")
         assert state.time >= 0.1
@@ -82,7 +83,7 @@ def test_a_force_on_a_tube_lifts_it_where_it_is_told() -> None:
 def test_a_motor_turns_its_hinge() -> None:
     wheel = mc.Box([0.2, 0.2, 0.02])
     scene = mc.Scene(gravity=[0.0, 0.0, 0.0]).add("wheel", wheel)
-    world = scene.joint("axle", mc.Revolute([0.0, 0.0, 1.0]), "wheel", at=[0.0, 0.0, 0.0]).start()
+    world = scene.joint("axle", mc.Revolute([0.0, 0.0, 1.0], at=[0.0, 0.0, 0.0]), "wheel").start()
     # of the world relative to the wheel
     world.motor("axle", velocity=-3.0)
     world.advance(1.0)

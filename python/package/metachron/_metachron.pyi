@@ -5,13 +5,15 @@ from os import PathLike
 from typing import Any, Literal, TypedDict, final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, Unpack
 
 from .parts import JointKind, Part, Solid
 from .typing import Array, Numbers
 
-Executor = Literal["lockstep", "threads", "pool", "auto"]
+__all__ = ["Contact", "Event", "Events", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
+
+_Executor = Literal["lockstep", "threads", "pool", "auto"]
 
 class _Point(TypedDict, total=False):
     """A material point: one of three, or none for the centre of mass of a rigid body."""
@@ -85,10 +87,10 @@ class Scene:
     def add(self, name: str, what: Part) -> Self:
         """Adds a rigid body or a tube."""
 
-    def joint(self, name: str, kind: JointKind, a: str, b: str | None = None, *, at: Numbers) -> Self:
-        """Joins the rigid bodies `a` and `b`, or `a` and the world, at a place where both are at the start, m."""
+    def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
+        """Joins the rigid bodies `a` and `b`, or `a` and the world."""
 
-    def start(self, executor: Executor = "lockstep") -> World:
+    def start(self, executor: _Executor = "lockstep") -> World:
         """Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built."""
 
 @final
@@ -96,7 +98,7 @@ class World:
     """A world that runs; any thread may read and command it. In a `with` block it stops at the end."""
 
     @staticmethod
-    def from_toml(text_or_path: str | PathLike[str], executor: Executor = "lockstep") -> World:
+    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep") -> World:
         """`Scene.from_toml(text_or_path).start(executor)`."""
 
     def object(self, name: str) -> Object:
@@ -104,6 +106,9 @@ class World:
 
     def state(self, object: str | Object) -> State:
         """The newest state of an object; it waits for nothing."""
+
+    def fault(self, object: str | Object) -> str | None:
+        """Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives."""
 
     @property
     def time(self) -> float:
@@ -337,7 +342,7 @@ class Rollout:
     def hashes(self) -> NDArray[np.uint64]:
         """(worlds,): as `World.hash`, at the end."""
 
-def rollout(scene: Scene, on: str, actions: Array, **keywords: Unpack[_Rollout]) -> Rollout:
+def rollout(scene: Scene, on: str, actions: ArrayLike, **keywords: Unpack[_Rollout]) -> Rollout:
     """Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).
 
     `step` is required. A world is the same, bit for bit, on any number of threads.

@@ -109,9 +109,17 @@ class Tube:
     """Steps a simulated second, 1 ... 100000; default 240."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Joint:
+    """A joint between two bodies, or of one with the world."""
+
+    at: Numbers
+    """Where both are at the start, m."""
+
+
 @final
 @dataclass(frozen=True)
-class Revolute:
+class Revolute(_Joint):
     """A hinge."""
 
     axis: Numbers
@@ -122,7 +130,7 @@ class Revolute:
 
 @final
 @dataclass(frozen=True)
-class Prismatic:
+class Prismatic(_Joint):
     """A slide."""
 
     axis: Numbers
@@ -133,13 +141,13 @@ class Prismatic:
 
 @final
 @dataclass(frozen=True)
-class Spherical:
+class Spherical(_Joint):
     """A ball in its socket."""
 
 
 @final
 @dataclass(frozen=True)
-class Weld:
+class Weld(_Joint):
     """Nothing moves."""
 
 
