@@ -13,13 +13,17 @@ use glam::DVec3;
 use metachron::core::{Anchor, Body, SimSpan};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, World, WorldError};
-use numpy::ndarray::{Array3, Array4, ArrayView2, Axis, Ix3};
+use numpy::ndarray::{Array3, Array4, Axis, Ix3};
 use numpy::{AllowTypeChange, PyArray1, PyArrayLikeDyn};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::time::Duration;
+
+/// So long is waited before Python is asked whether the user has interrupted it.
+const PATIENCE: Duration = Duration::from_millis(20);
 
 /// What became of the worlds: per observed object, arrays of shape (worlds, steps, n, 3).
 #[pyclass(frozen, get_all, module = "metachron")]
@@ -48,18 +52,17 @@ struct Played {
     hash: u64,
 }
 
+/// One world that has ended.
+struct Outcome {
+    number: usize,
+    result: Result<Played, WorldError>,
+}
+
 /// Positions and velocities of an object, step after step.
 #[derive(Clone, Default)]
 struct Motion {
     positions: Vec<f64>,
     velocities: Vec<f64>,
-}
-
-/// Why a rollout ended early.
-struct Fault {
-    /// The world's number.
-    number: usize,
-    error: WorldError,
 }
 
 /// Plays `actions.shape[0]` worlds, as many at once as there are threads.
@@ -93,65 +96,69 @@ pub fn rollout(
     let (anchor, step) = (keywords.anchor()?, span("step", step)?);
     let plan = Plan { scene: scene.resolved()?, on, anchor, observe, step, actions };
     let played = py.detach(|| plan.play(threads))?;
-    plan.gather(py, &played)
+    plan.arrays(py, &played)
 }
 
 impl Plan {
-    /// Plays all worlds; each thread takes the next that nobody has begun.
+    /// Plays all worlds; each thread takes the next that no other has begun.
     fn play(&self, threads: usize) -> PyResult<Vec<Played>> {
         let worlds = self.actions.shape()[0];
-        let next = AtomicUsize::new(0);
-        let played: Mutex<Vec<Option<Result<Played, Fault>>>> = Mutex::new((0..worlds).map(|_| None).collect());
-        let work = || {
+        let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let (done, results) = mpsc::sync_channel::<Outcome>(threads);
+        let work = |done: SyncSender<Outcome>| {
             loop {
                 let number = next.fetch_add(1, Relaxed);
                 if number >= worlds {
                     break;
                 }
-                let one = self.play_one(number, self.actions.index_axis(Axis(0), number));
-                if one.is_err() {
-                    next.store(worlds, Relaxed);
+                let result = self.play_one(number, &is_over);
+                // nobody listens any more where a world has failed, or the user has interrupted
+                if done.send(Outcome { number, result }).is_err() {
+                    break;
                 }
-                played.lock().unwrap_or_else(PoisonError::into_inner)[number] = Some(one);
             }
         };
         std::thread::scope(|scope| {
-            let spawn = |_| std::thread::Builder::new().name("rollout".to_owned()).spawn_scoped(scope, work);
-            let started: Vec<_> = (0..threads.min(worlds)).map(spawn).collect();
-            let ends = started.into_iter().map(|thread| match thread {
-                Ok(thread) => thread.join().map_err(|_| PyRuntimeError::new_err("a world of the rollout panicked")),
-                Err(error) => Err(PyRuntimeError::new_err(format!("a thread cannot be started: {error}"))),
+            let work = &work;
+            let started = (0..threads.min(worlds)).map(|_| {
+                let done = done.clone();
+                std::thread::Builder::new().name("rollout".to_owned()).spawn_scoped(scope, move || work(done))
             });
-            ends.collect::<Vec<_>>().into_iter().collect::<PyResult<()>>()
-        })?;
-        let played = played.into_inner().unwrap_or_else(PoisonError::into_inner);
-        // worlds that were not begun come after the one that failed
-        played
-            .into_iter()
-            .flatten()
-            .map(|one| one.map_err(|fault| raised::in_world(fault.number, &fault.error)))
-            .collect()
+            let started: Vec<_> = started.collect();
+            // the last thread that ends closes the channel
+            drop(done);
+            let played = gather(results, worlds);
+            is_over.store(true, Relaxed);
+            for thread in started {
+                let thread = thread.map_err(|error| PyRuntimeError::new_err(format!("no thread started: {error}")))?;
+                thread.join().map_err(|_| PyRuntimeError::new_err("a world of the rollout panicked"))?;
+            }
+            played
+        })
     }
 
-    fn play_one(&self, number: usize, actions: ArrayView2<'_, f64>) -> Result<Played, Fault> {
-        let fault = |error| Fault { number, error };
-        let world = World::start(&self.scene, ExecutorKind::Lockstep).map_err(fault)?;
-        let on = world.object(&self.on).map_err(fault)?;
+    /// Plays one world to its end, or until all is over.
+    fn play_one(&self, number: usize, is_over: &AtomicBool) -> Result<Played, WorldError> {
+        let world = World::start(&self.scene, ExecutorKind::Lockstep)?;
+        let on = world.object(&self.on)?;
         let observed: Result<Vec<_>, _> = self.observe.iter().map(|name| world.object(name)).collect();
-        let observed = observed.map_err(fault)?;
+        let observed = observed?;
         let mut motions = vec![Motion::default(); observed.len()];
-        for force in actions.rows() {
+        for force in self.actions.index_axis(Axis(0), number).rows() {
+            if is_over.load(Relaxed) {
+                break;
+            }
             let force = DVec3::new(force[0], force[1], force[2]);
-            world.command(on, Command::force(self.anchor, force)).map_err(fault)?;
+            world.command(on, Command::force(self.anchor, force))?;
             world.advance(self.step);
             for (motion, object) in motions.iter_mut().zip(&observed) {
-                motion.record(&world.latest(*object).map_err(fault)?.body);
+                motion.record(&world.latest(*object)?.body);
             }
         }
         Ok(Played { motions, hash: world.hash() })
     }
 
-    fn gather(&self, py: Python<'_>, played: &[Played]) -> PyResult<Rollout> {
+    fn arrays(&self, py: Python<'_>, played: &[Played]) -> PyResult<Rollout> {
         let [positions, velocities] = [PyDict::new(py), PyDict::new(py)];
         for (at, name) in self.observe.iter().enumerate() {
             let motions = || played.iter().map(|one| &one.motions[at]);
@@ -171,6 +178,22 @@ impl Plan {
         // each world has the same objects, whose resolutions nobody changes
         Array4::from_shape_vec((worlds, steps, points, 3), flat)
             .map_err(|error| PyRuntimeError::new_err(error.to_string()))
+    }
+}
+
+/// The worlds by their numbers, taken as they end, until none is left, one has failed, or the user interrupts.
+fn gather(results: Receiver<Outcome>, worlds: usize) -> PyResult<Vec<Played>> {
+    let mut played: Vec<_> = (0..worlds).map(|_| None).collect();
+    loop {
+        match results.recv_timeout(PATIENCE) {
+            Ok(Outcome { number, result }) => {
+                let one = result.map_err(|error| raised::in_world(number, &error))?;
+                played[number] = Some(one);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Ok(played.into_iter().flatten().collect()),
+        }
+        Python::attach(|py| py.check_signals())?;
     }
 }
 

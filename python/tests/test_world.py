@@ -1,5 +1,6 @@
 """Worlds do what mechanics says, and their states are what they were."""
 
+import signal
 import threading
 import tracemalloc
 from collections.abc import Callable
@@ -231,3 +232,18 @@ def test_equal_worlds_have_equal_hashes_however_their_time_passes() -> None:
             world.advance(1.0 / advances)
         hashes.append(world.hash())
     assert hashes[0] == hashes[1]
+
+
+def test_the_user_interrupts_what_takes_long() -> None:
+    world = scenes.bouncing().start()
+    long = np.zeros((2, 1_000_000, 3))
+    calls: list[Callable[[], object]] = [
+        lambda: world.advance(1e9),
+        lambda: mc.rollout(scenes.bouncing(), "ball", long, step=1.0),
+    ]
+    for call in calls:
+        timer = threading.Timer(0.05, signal.raise_signal, [signal.SIGINT])
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            call()
+        timer.join()
