@@ -10,7 +10,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A listener: what happens from the moment on when it was made.
+/// Listens to a world. An object keeps its newest 128 events until they are drained.
 #[pyclass(frozen, module = "metachron")]
 pub struct Events {
     world: World,
@@ -22,11 +22,17 @@ pub struct Events {
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Event {
     kind: &'static str,
+    /// The object that it happened to.
     object: Object,
+    /// The end of the step in which it happened, s.
     time: f64,
+    /// Of a contact what it touches; of one that joined a cluster its leader.
     other: Option<String>,
+    /// Of a contact the place that bore most, m.
     point: Option<Py<PyArray1<f64>>>,
+    /// Of a contact the normal there, towards the object.
     normal: Option<Py<PyArray1<f64>>>,
+    /// Of a contact the greatest force on the object in the mean of a step so far, N, world axes.
     force: Option<Py<PyArray1<f64>>>,
 }
 
@@ -61,11 +67,13 @@ impl Events {
 
 #[pymethods]
 impl Events {
+    /// What happened since the last call, oldest first.
     fn drain(&self, py: Python<'_>) -> Vec<Event> {
         let all: Vec<_> = self.events.lock().unwrap_or_else(PoisonError::into_inner).drain().collect();
         all.iter().map(|event| self.event(py, event)).collect()
     }
 
+    /// How many were overwritten before they were drained.
     #[getter]
     fn lost(&self) -> u64 {
         self.events.lock().unwrap_or_else(PoisonError::into_inner).lost()

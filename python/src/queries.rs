@@ -12,8 +12,11 @@ use pyo3::prelude::*;
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Hit {
     name: String,
+    /// Of its surface, m.
     point: Py<PyArray1<f64>>,
+    /// Of its surface there, outwards.
     normal: Py<PyArray1<f64>>,
+    /// m; negative within what overlaps.
     distance: f64,
 }
 
@@ -21,10 +24,15 @@ pub struct Hit {
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Contact {
     other: String,
+    /// When it began, s.
     since: f64,
+    /// The place that bears most, m.
     point: Py<PyArray1<f64>>,
+    /// The normal there, towards the object.
     normal: Py<PyArray1<f64>>,
+    /// On the object, in the mean of the last step, N, world axes.
     force: Py<PyArray1<f64>>,
+    /// The deepest overlap, m.
     depth: f64,
 }
 

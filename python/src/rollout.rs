@@ -25,11 +25,14 @@ use std::time::Duration;
 /// So long is waited before Python is asked whether the user has interrupted it.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// What became of the worlds: per observed object, arrays of shape (worlds, steps, n, 3).
+/// What became of many worlds.
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Rollout {
+    /// By observed object (worlds, steps, n, 3), m, after each step.
     positions: Py<PyDict>,
+    /// The same, m/s.
     velocities: Py<PyDict>,
+    /// (worlds,): as `World.hash`, at the end.
     hashes: Py<PyArray1<u64>>,
 }
 
@@ -65,7 +68,9 @@ struct Motion {
     velocities: Vec<f64>,
 }
 
-/// Plays `actions.shape[0]` worlds, as many at once as there are threads.
+/// Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).
+///
+/// `step` is required. A world is the same, bit for bit, on any number of threads.
 #[pyfunction]
 #[pyo3(signature = (scene, on, actions, **keywords))]
 pub fn rollout(

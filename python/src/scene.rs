@@ -79,7 +79,9 @@ impl Scene {
         Self { inner: Inner::Built(builder), joints: Vec::new() }
     }
 
-    /// A text that has a line break is the scene itself; any other is a path, or the name of a built-in scene.
+    /// Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
+    ///
+    /// Raises `ValueError` with every problem, a line each, with its line and column.
     #[staticmethod]
     pub fn from_toml(text_or_path: &Bound<'_, PyAny>) -> PyResult<Self> {
         let text: Option<String> = text_or_path.extract().ok().filter(|text: &String| text.contains('\n'));
@@ -94,6 +96,7 @@ impl Scene {
         Ok(Self { inner: Inner::Read(Box::new(scene)), joints: Vec::new() })
     }
 
+    /// Adds a solid that never moves.
     fn fixed<'py>(
         mut slf: PyRefMut<'py, Self>,
         name: String,
@@ -114,12 +117,14 @@ impl Scene {
         Ok(slf)
     }
 
+    /// Adds a rigid body or a tube.
     fn add<'py>(mut slf: PyRefMut<'py, Self>, name: String, what: &Bound<'py, PyAny>) -> PyResult<PyRefMut<'py, Self>> {
         let part = part(what)?;
         slf.build(|builder| builder.add(name, part))?;
         Ok(slf)
     }
 
+    /// Joins the rigid bodies `a` and `b`, or `a` and the world.
     #[pyo3(signature = (name, kind, a, b = None))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
@@ -137,6 +142,7 @@ impl Scene {
         Ok(slf)
     }
 
+    /// Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
     #[pyo3(signature = (executor = "lockstep"))]
     pub fn start(&self, py: Python<'_>, executor: &str) -> PyResult<World> {
         World::start(py, &self.resolved()?, executor, self.joints.clone())

@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use std::slice::from_ref;
 use std::sync::Arc;
 
-/// What an object was like at one moment.
+/// What an object was like at one moment. It never changes; its arrays are copies that nobody can write to.
 #[pyclass(frozen, module = "metachron")]
 pub struct State(pub Arc<Snapshot>);
 
@@ -75,11 +75,13 @@ impl State {
         }
     }
 
+    /// The moment, s.
     #[getter]
     fn time(&self) -> f64 {
         self.0.moment().as_secs_f64()
     }
 
+    /// Steps so far.
     #[getter]
     fn steps(&self) -> u64 {
         self.0.steps
@@ -90,47 +92,55 @@ impl State {
         self.0.at_rest
     }
 
+    /// Kinetic, elastic and that of gravity, J.
     #[getter]
     fn energy(&self) -> f64 {
         self.0.energy_j
     }
 
+    /// (n, 3), m: the nodes of what bends, the centre of mass or the tip of what does not.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Rows<'py> {
         rows(py, Points::of(&self.0.body).positions.iter().map(|v| v.to_array()))
     }
 
+    /// (n, 3), m/s, of the same points.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> Rows<'py> {
         rows(py, Points::of(&self.0.body).velocities.iter().map(|v| v.to_array()))
     }
 
+    /// (4,): of a rigid body or tool, from its axes to the world's. Others raise `AttributeError`.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(row(py, self.turning("rotation")?.0.to_array()))
     }
 
+    /// (3,), rad/s, world axes: of a rigid body or tool.
     #[getter]
     fn spin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(row(py, self.turning("spin")?.1.to_array()))
     }
 
+    /// (n - 1, 4): of a tube, the rotations of its segments, whose z is along it.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
         Ok(rows(py, self.curve("frames")?.frames.iter().map(|frame| frame.to_array())))
     }
 
+    /// (n,), m: of a tube, the rest lengths from its start to its nodes.
     #[getter]
     fn arc<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(crate::numbers::array(py, self.curve("arc lengths")?.arc_m.clone().into()))
     }
 
+    /// (n,), m: of a tube, the outer radius at each node.
     #[getter]
     fn radii<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(crate::numbers::array(py, self.curve("radii")?.radii_m.clone().into()))
     }
 
-    /// Where a material point is, and its velocity.
+    /// Position, m, and velocity, m/s, of a material point, (3,) each.
     #[pyo3(signature = (**keywords))]
     fn point<'py>(
         &self,

@@ -22,7 +22,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 
-/// A running world; the same one in every thread.
+/// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
 #[pyclass(frozen, module = "metachron")]
 pub struct World {
     inner: world::World,
@@ -110,21 +110,25 @@ impl World {
 
 #[pymethods]
 impl World {
+    /// `Scene.from_toml(text_or_path).start(executor)`.
     #[staticmethod]
     #[pyo3(signature = (text_or_path, executor = "lockstep"))]
     fn from_toml(py: Python<'_>, text_or_path: &Bound<'_, PyAny>, executor: &str) -> PyResult<Self> {
         Scene::from_toml(text_or_path)?.start(py, executor)
     }
 
+    /// The object of this name. Raises `KeyError`.
     fn object(&self, name: &str) -> PyResult<Object> {
         let object = self.inner.object(name).map_err(raised::world)?;
         Ok(Object::new(&self.inner, object))
     }
 
+    /// The newest state of an object; it waits for nothing.
     fn state(&self, object: Named<'_>) -> PyResult<State> {
         self.inner.latest(object.of(&self.inner)?).map(State).map_err(raised::world)
     }
 
+    /// Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives.
     fn fault(&self, object: Named<'_>) -> PyResult<Option<String>> {
         let object = object.of(&self.inner)?;
         self.inner.latest(object).map_err(raised::world)?;
@@ -134,21 +138,25 @@ impl World {
         }))
     }
 
+    /// Simulated time, s.
     #[getter]
     fn time(&self, py: Python<'_>) -> f64 {
         // in lockstep it waits for a piece of `advance` in another thread
         py.detach(|| self.inner.time().as_secs_f64())
     }
 
+    /// The executor that runs it.
     #[getter]
     fn executor(&self) -> &'static str {
         self.inner.executor().name()
     }
 
+    /// Equal numbers mean the same states of all objects, bit for bit.
     fn hash(&self) -> u64 {
         self.inner.hash()
     }
 
+    /// Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let span = span("the time to advance by", seconds)?;
         if self.inner.executor() != ExecutorKind::Lockstep {
@@ -165,6 +173,7 @@ impl World {
         Ok(())
     }
 
+    /// Lets time pass from now on, so many simulated seconds a second. Not in lockstep.
     #[pyo3(signature = (speed = 1.0))]
     fn run(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
         if self.inner.executor() == ExecutorKind::Lockstep {
@@ -177,10 +186,12 @@ impl World {
         Ok(())
     }
 
+    /// Stops time.
     fn pause(&self, py: Python<'_>) {
         py.detach(|| self.inner.drive(TimelineCommand::Pause));
     }
 
+    /// Ends the world. Its newest states can still be read.
     fn stop(&self, py: Python<'_>) {
         py.detach(|| drop(self.inner.stop()));
     }
@@ -194,6 +205,7 @@ impl World {
         self.stop(py);
     }
 
+    /// A force in world axes; `None` takes back that of the key.
     #[pyo3(signature = (object, newtons, **keywords))]
     fn force(&self, object: Named<'_>, newtons: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let keywords = Keywords::new("force", keywords, &ANCHORED)?;
@@ -203,6 +215,7 @@ impl World {
         self.send(&object, keywords.timed(command)?)
     }
 
+    /// A torque in world axes; `None` takes back that of the key.
     #[pyo3(signature = (object, newton_metres, **keywords))]
     fn torque(&self, object: Named<'_>, newton_metres: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let keywords = Keywords::new("torque", keywords, &ANCHORED)?;
@@ -212,12 +225,14 @@ impl World {
         self.send(&object, keywords.timed(command)?)
     }
 
+    /// An impulse in world axes, once.
     #[pyo3(signature = (object, newton_seconds, **keywords))]
     fn impulse(&self, object: Named<'_>, newton_seconds: Vector, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let anchor = Keywords::new("impulse", keywords, &["arc", "local", "vertex"])?.anchor()?;
         self.send(&object, Command::impulse(anchor, newton_seconds.0))
     }
 
+    /// A spring to a place in space, m; `None` takes back that of the key.
     #[pyo3(signature = (object, target, **keywords))]
     fn spring(&self, object: Named<'_>, target: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let known = [&["stiffness", "damping"][..], &ANCHORED].concat();
@@ -233,16 +248,19 @@ impl World {
         self.send(&object, keywords.timed(command)?)
     }
 
+    /// To another place: a rigid body to this rotation, what bends turned by it.
     #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY)))]
     fn teleport(&self, object: Named<'_>, position: Vector, rotation: Rotation) -> PyResult<()> {
         self.send(&object, Command::teleport(position.0, rotation.0))
     }
 
+    /// Another velocity, m/s, and spin, rad/s, of all its matter.
     #[pyo3(signature = (object, velocity, spin = Vector(DVec3::ZERO)))]
     fn velocity(&self, object: Named<'_>, velocity: Vector, spin: Vector) -> PyResult<()> {
         self.send(&object, Command::velocity(velocity.0, spin.0))
     }
 
+    /// Drives a joint, by name or by its number in the scene; without a goal, no longer.
     #[pyo3(signature = (joint, **keywords))]
     fn motor(&self, joint: NamedJoint, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let known = ["velocity", "position", "stiffness", "damping", "max_effort", "expires"];
@@ -256,16 +274,19 @@ impl World {
         self.inner.command(body, keywords.timed(command)?).map_err(raised::world)
     }
 
+    /// Takes up another object, which lives from its first step on.
     fn add(&self, name: &str, what: &Bound<'_, PyAny>) -> PyResult<Object> {
         let part = part(what)?;
         let object = what.py().detach(|| self.inner.add(name, part)).map_err(raised::world)?;
         Ok(Object::new(&self.inner, object))
     }
 
+    /// Takes an object out; its handle is an error from its next step on.
     fn remove(&self, object: Named<'_>) -> PyResult<()> {
         self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
     }
 
+    /// Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one.
     #[pyo3(signature = (*, contacts = true, states = true, above = 0.0, of = None))]
     fn events(&self, contacts: bool, states: bool, above: f64, of: Option<Named<'_>>) -> PyResult<Events> {
         let filter = match (contacts, states) {
@@ -285,16 +306,19 @@ impl World {
         Ok(Events::new(&self.inner, &self.fixed, filter))
     }
 
+    /// What an object touches now.
     fn contacts(&self, py: Python<'_>, object: Named<'_>) -> PyResult<Vec<Contact>> {
         let all = self.inner.contacts(object.of(&self.inner)?).map_err(raised::world)?;
         Ok(all.iter().map(|contact| Contact::new(py, &self.inner, &self.fixed, contact)).collect())
     }
 
+    /// The first surface that a ray meets within `reach` metres.
     fn cast_ray(&self, py: Python<'_>, origin: Vector, direction: Vector, reach: f64) -> PyResult<Option<Hit>> {
         let hit = py.detach(|| self.inner.cast_ray(origin.0, direction.0, reach)).map_err(raised::world)?;
         Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
     }
 
+    /// The nearest point of any surface within `reach` metres.
     fn nearest(&self, py: Python<'_>, point: Vector, reach: f64) -> PyResult<Option<Hit>> {
         let hit = py.detach(|| self.inner.nearest(point.0, reach)).map_err(raised::world)?;
         Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))

@@ -260,7 +260,7 @@ class Event:
     ]: ...
     @property
     def object(self) -> Object:
-        """Whom it happened to."""
+        """The object that it happened to."""
 
     @property
     def time(self) -> float:
