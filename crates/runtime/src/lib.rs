@@ -120,6 +120,12 @@ pub trait Run: Send {
     /// then.
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError>;
 
+    /// Takes an agent out, at its next turn: nothing of it is left then but its number.
+    ///
+    /// # Errors
+    /// [`SendError::NoAgent`].
+    fn remove(&mut self, id: AgentId) -> Result<(), SendError>;
+
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;

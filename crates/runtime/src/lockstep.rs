@@ -16,6 +16,7 @@ use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::machine::{Machine, duration};
+use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use cores::Cores;
@@ -364,6 +365,10 @@ impl Run for Lockstep {
         let homes = put_back(all, &self.all.handles);
         self.entries.iter_mut().zip(homes).for_each(|(entry, home)| entry.actor = home);
         outcome
+    }
+
+    fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
+        self.all.leave(id)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -17,9 +17,11 @@ use super::agents::Agents;
 use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
+use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use metachron_core::AgentId;
 use shared::PoolState;
 use std::num::NonZero;
 use std::sync::Arc;
@@ -118,6 +120,10 @@ impl Run for Pool {
         let shared = Arc::clone(&actor.shared);
         self.state.take_up(actor);
         Ok(AgentHandle { shared })
+    }
+
+    fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
+        self.all.leave(id)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -14,8 +14,8 @@ use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::histogram::Histogram;
-use super::mailbox::Mailbox;
-use super::metrics::{Metrics, MetricsWriter};
+use super::mailbox::{Command, Mailbox, SendError};
+use super::metrics::{AgentState, Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
 use super::probe::{Trace, WatchedPoint};
 use super::sleep::SleepRegistry;
@@ -186,6 +186,23 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
 }
 
 impl Everyone {
+    /// Takes an agent out: at its next turn, or at once where it makes no more.
+    ///
+    /// # Errors
+    /// [`SendError::NoAgent`].
+    pub fn leave(&self, id: AgentId) -> Result<(), SendError> {
+        let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
+        if !matches!(agent.state(), AgentState::Parked(_)) {
+            return agent.send(Command::Leave);
+        }
+        // no other thread publishes for it any more
+        if let Some(broad_phase) = self.peers.broad_phase.get() {
+            broad_phase.publish_nowhere(id, agent.latest().moment());
+        }
+        agent.shared.gauges.leave();
+        Ok(())
+    }
+
     /// Takes up an agent that begins at `now`, under the next number; agents join one at a time. It has published its first state.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ use super::cluster::{Handover, close_remaining, hand_over};
 use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
+use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
@@ -152,6 +153,10 @@ impl Run for Threads {
         let shared = Arc::clone(&actor.shared);
         self.begin(Some(actor), Arc::clone(&shared))?;
         Ok(AgentHandle { shared })
+    }
+
+    fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
+        self.all.leave(id)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -375,9 +375,8 @@ impl SceneBuilder {
     /// A solid that never moves, with its axes at `position_m`, metres, turned by `rotation`.
     #[must_use]
     pub fn fixed_at(self, name: impl Into<String>, solid: Solid, position_m: [f64; 3], rotation: DQuat) -> Self {
-        let (friction, restitution) = SURFACE;
-        let (name, position) = (name.into(), position_m.into());
-        self.obstacle(Obstacle { name, solid, position, rotation, friction, restitution, traits: ContactTraits::NONE })
+        let position = position_m.into();
+        self.obstacle(Obstacle { position, rotation, ..static_solid(name, solid) })
     }
 
     /// A solid that never moves, with its own friction, restitution and traits.
@@ -483,6 +482,14 @@ impl Joined {
         joint.check().map_err(bad)?;
         Ok(joint)
     }
+}
+
+/// A solid that never moves, with its axes at the origin, as rough and elastic as one that says nothing of it.
+#[must_use]
+pub fn static_solid(name: impl Into<String>, solid: Solid) -> Obstacle {
+    let (friction, restitution) = SURFACE;
+    let (position, rotation, traits) = (DVec3::ZERO, DQuat::IDENTITY, ContactTraits::NONE);
+    Obstacle { name: name.into(), solid, position, rotation, friction, restitution, traits }
 }
 
 /// Appearance of parts that declare none.

@@ -43,7 +43,7 @@ mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};
-pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, Tube};
+pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, Tube, static_solid};
 pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};

@@ -310,9 +310,12 @@ impl World {
     /// from then on.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`] and [`WorldError::Gone`].
+    /// [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`].
     pub fn remove(&self, object: Object) -> Result<(), WorldError> {
-        self.command(object, Command::Leave)
+        let agent = self.agent(object)?;
+        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
+        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
+        run.remove(object.id()).map_err(|error| refused(error.to_string()))
     }
 
     /// Events of its objects from now on.

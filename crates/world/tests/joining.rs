@@ -119,3 +119,55 @@ fn a_world_goes_back_to_where_it_was_with_what_acted_on_it() {
     world.advance(SimSpan::from_millis(50));
     world.restore(&without).unwrap();
 }
+
+#[test]
+fn one_that_has_failed_can_be_removed() {
+    use metachron_world::{Command, Custom};
+    for executor in EXECUTORS {
+        let scene = Scene::builder().add("broken", Custom::new(|_| Box::new(Broken))).build().unwrap();
+        let world = World::start(&scene, executor).unwrap();
+        world.advance(SimSpan::from_millis(100));
+        let broken = world.object("broken").unwrap();
+        assert!(matches!(world.agents()[0].state(), metachron_runtime::AgentState::Parked(_)), "{executor:?}");
+        world.command(broken, Command::Wake).unwrap();
+        world.remove(broken).unwrap();
+        assert!(matches!(world.latest(broken), Err(WorldError::Gone { .. })), "{executor:?}");
+        world.add("broken", Rigid::ball(0.1)).unwrap();
+    }
+}
+
+/// An agent whose first step fails.
+struct Broken;
+
+impl metachron_contact::Agent for Broken {
+    fn model(&self) -> &'static str {
+        "broken"
+    }
+
+    fn step(
+        &mut self,
+        dt: SimSpan,
+        _context: &metachron_contact::StepContext<'_>,
+    ) -> Result<metachron_core::StepReport, metachron_core::StepError> {
+        let what = "it always does".to_owned();
+        Err(metachron_core::StepError::Diverged { model: "broken", dt_s: dt.as_secs_f64(), what })
+    }
+
+    fn resolution(&self) -> Option<metachron_core::Resolution> {
+        None
+    }
+
+    fn set_resolution(&mut self, _wanted: metachron_core::Resolution) {}
+
+    fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
+        into.body = Body::Nothing;
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
+}

@@ -6,7 +6,7 @@ use metachron_geometry::{CollisionGroups, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{JointKind, Motor, MotorGoal};
 use metachron_runtime::Command;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError};
+use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError, static_solid};
 
 const EXECUTORS: [ExecutorKind; 3] = [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool];
 
@@ -181,4 +181,14 @@ fn a_sensor_a_motor_and_groups_are_said_in_code_as_in_scenes() {
     assert_eq!(nobody, SceneBuildError::NoBody { name: "nobody".to_owned() });
     let endless = JointKind::Rope { length_m: f64::NAN };
     assert!(matches!(builder.joint("wheel", None, endless, [0.0; 3]).build(), Err(SceneBuildError::BadJoint { .. })));
+}
+
+#[test]
+fn a_static_solid_is_as_rough_as_a_body_may_be() {
+    for (friction, restitution) in [(-1.0, 0.0), (f64::NAN, 0.0), (0.5, 1.5)] {
+        let floor = Obstacle { friction, restitution, ..static_solid("floor", Solid::Plane) };
+        let scene = Scene::builder().obstacle(floor).build().unwrap();
+        let error = World::start(&scene, ExecutorKind::Lockstep).unwrap_err().to_string();
+        assert!(error.contains("\"floor\"") && error.contains("must be between 0 and"), "{error}");
+    }
 }

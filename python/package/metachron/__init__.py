@@ -1,0 +1,32 @@
+"""A real-time physics engine in which every object keeps its own time.
+
+A scene is built of parts, or read from TOML; started, it is a world whose objects live on threads, in a pool or in lockstep.
+Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are unit quaternions (x, y, z, w).
+"""
+
+from ._metachron import Checkpoint, Contact, Event, Events, Hit, Object, Rollout, Scene, State, World, rollout
+from .parts import Ball, Box, Capsule, Cylinder, Plane, Prismatic, Revolute, Spherical, Tube, Weld
+
+__all__ = [
+    "Ball",
+    "Box",
+    "Capsule",
+    "Checkpoint",
+    "Contact",
+    "Cylinder",
+    "Event",
+    "Events",
+    "Hit",
+    "Object",
+    "Plane",
+    "Prismatic",
+    "Revolute",
+    "Rollout",
+    "Scene",
+    "Spherical",
+    "State",
+    "Tube",
+    "Weld",
+    "World",
+    "rollout",
+]

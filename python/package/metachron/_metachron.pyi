@@ -1,0 +1,370 @@
+"""The native part: scenes, worlds, states, events. Errors are exceptions with the engine's own sentences."""
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any, Literal, TypedDict, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Self, Unpack
+
+from .parts import JointKind, Part, Solid
+from .typing import Array, Numbers
+
+__all__ = ["Contact", "Event", "Events", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
+
+_Executor = Literal["lockstep", "threads", "pool", "auto"]
+
+class _Point(TypedDict, total=False):
+    """A material point: one of three, or none for the centre of mass of a rigid body."""
+
+    arc: float | None
+    """Of a tube, the rest length from its start, m."""
+    local: Numbers | None
+    """Of a rigid body or tool, m from its centre of mass or tip in its own axes."""
+    vertex: int | None
+    """Of a sheet, solid or rope, a vertex."""
+
+class _Lasting(_Point, total=False):
+    key: int
+    """0 ... 7: the newest command of a key replaces the one before; default 0. Forces and torques share keys."""
+    expires: float | None
+    """For how many seconds of the object's time it acts; `None` until it is replaced or taken back."""
+
+class _Spring(_Lasting, total=False):
+    stiffness: float
+    """N/m, >= 0."""
+    damping: float
+    """N s/m, >= 0; default 0."""
+
+class _Motor(TypedDict, total=False):
+    velocity: float | None
+    """rad/s or m/s: how the second body moves relative to the first."""
+    position: float | None
+    """rad or m; needs `stiffness`."""
+    stiffness: float | None
+    """Of a motor to a position, N m/rad or N/m."""
+    damping: float | None
+    """Of a motor to a position, N m s/rad or N s/m; default 0."""
+    max_effort: float | None
+    """N m or N, > 0; default as much as it takes."""
+    expires: float | None
+    """For how many seconds it acts; `None` until it is replaced or taken back."""
+
+class _Rollout(_Point, total=False):
+    step: float
+    """Seconds that each action acts for."""
+    observe: Sequence[str]
+    """Objects whose motion is recorded; default that on which the actions act."""
+    threads: int
+    """Worlds that are played at once; default 2."""
+
+@final
+class Object:
+    """An object of one world: quicker to find than its name, and never another one of the same name."""
+
+    @property
+    def name(self) -> str: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Scene:
+    """A scene, complete or in the making."""
+
+    def __new__(cls, *, gravity: Numbers | None = None) -> Self:
+        """An empty scene; gravity in m/s2, by default 9.81 along -z."""
+
+    @staticmethod
+    def from_toml(text_or_path: str | PathLike[str]) -> Scene:
+        """Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
+
+        Raises `ValueError` with every problem, a line each, with its line and column.
+        """
+
+    def fixed(self, name: str, solid: Solid) -> Self:
+        """Adds a solid that never moves."""
+
+    def add(self, name: str, what: Part) -> Self:
+        """Adds a rigid body or a tube."""
+
+    def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
+        """Joins the rigid bodies `a` and `b`, or `a` and the world."""
+
+    def start(self, executor: _Executor = "lockstep") -> World:
+        """Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built."""
+
+@final
+class Checkpoint:
+    """All that the next bit of a world needs (`World.checkpoint`)."""
+
+    @staticmethod
+    def read(path: str | PathLike[str]) -> Checkpoint:
+        """The one that a file holds. Raises `OSError`, and `ValueError` for a file that is no checkpoint of this version, or is damaged."""
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Writes it to a file, in place of one that is there. Raises `OSError`."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time of the state, s."""
+
+@final
+class World:
+    """A world that runs; any thread may read and command it. In a `with` block it stops at the end."""
+
+    @staticmethod
+    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep") -> World:
+        """`Scene.from_toml(text_or_path).start(executor)`."""
+
+    def object(self, name: str) -> Object:
+        """The object of this name. Raises `KeyError`."""
+
+    def state(self, object: str | Object) -> State:
+        """The newest state of an object; it waits for nothing."""
+
+    def fault(self, object: str | Object) -> str | None:
+        """Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+
+    @property
+    def executor(self) -> str:
+        """The executor that runs it."""
+
+    def hash(self) -> int:
+        """Equal numbers mean the same states of all objects, bit for bit."""
+
+    def checkpoint(self) -> Checkpoint:
+        """All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors."""
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit."""
+
+    def advance(self, seconds: float) -> None:
+        """Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile."""
+
+    def run(self, speed: float = 1.0) -> None:
+        """Lets time pass from now on, so many simulated seconds a second. Not in lockstep."""
+
+    def pause(self) -> None:
+        """Stops time."""
+
+    def stop(self) -> None:
+        """Ends the world. Its newest states can still be read."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *error: Any) -> None: ...
+    def force(self, object: str | Object, newtons: Numbers | None, **keywords: Unpack[_Lasting]) -> None:
+        """A force in world axes; `None` takes back that of the key."""
+
+    def torque(self, object: str | Object, newton_metres: Numbers | None, **keywords: Unpack[_Lasting]) -> None:
+        """A torque in world axes; `None` takes back that of the key."""
+
+    def impulse(self, object: str | Object, newton_seconds: Numbers, **keywords: Unpack[_Point]) -> None:
+        """An impulse in world axes, once."""
+
+    def spring(self, object: str | Object, target: Numbers | None, **keywords: Unpack[_Spring]) -> None:
+        """A spring to a place in space, m; `None` takes back that of the key."""
+
+    def teleport(self, object: str | Object, position: Numbers, rotation: Numbers = ...) -> None:
+        """To another place: a rigid body to this rotation, what bends turned by it."""
+
+    def velocity(self, object: str | Object, velocity: Numbers, spin: Numbers = ...) -> None:
+        """Another velocity, m/s, and spin, rad/s, of all its matter."""
+
+    def motor(self, joint: str | int, **keywords: Unpack[_Motor]) -> None:
+        """Drives a joint, by name or by its number in the scene; without a goal, no longer."""
+
+    def add(self, name: str, what: Part) -> Object:
+        """Takes up another object, which lives from its first step on."""
+
+    def remove(self, object: str | Object) -> None:
+        """Takes an object out; its handle is an error from its next step on."""
+
+    def events(
+        self, *, contacts: bool = True, states: bool = True, above: float = 0.0, of: str | Object | None = None
+    ) -> Events:
+        """Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one."""
+
+    def contacts(self, object: str | Object) -> list[Contact]:
+        """What an object touches now."""
+
+    def cast_ray(self, origin: Numbers, direction: Numbers, reach: float) -> Hit | None:
+        """The first surface that a ray meets within `reach` metres."""
+
+    def nearest(self, point: Numbers, reach: float) -> Hit | None:
+        """The nearest point of any surface within `reach` metres."""
+
+@final
+class State:
+    """What an object was like at one moment. It never changes; its arrays are copies that nobody can write to."""
+
+    @property
+    def body(self) -> Literal["rigid", "curve", "soft", "tool", "nothing"]: ...
+    @property
+    def time(self) -> float:
+        """The moment, s."""
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+
+    @property
+    def at_rest(self) -> bool: ...
+    @property
+    def energy(self) -> float:
+        """Kinetic, elastic and that of gravity, J."""
+
+    @property
+    def positions(self) -> Array:
+        """(n, 3), m: the nodes of what bends, the centre of mass or the tip of what does not."""
+
+    @property
+    def velocities(self) -> Array:
+        """(n, 3), m/s, of the same points."""
+
+    @property
+    def rotation(self) -> Array:
+        """(4,): of a rigid body or tool, from its axes to the world's. Others raise `AttributeError`."""
+
+    @property
+    def spin(self) -> Array:
+        """(3,), rad/s, world axes: of a rigid body or tool."""
+
+    @property
+    def frames(self) -> Array:
+        """(n - 1, 4): of a tube, the rotations of its segments, whose z is along it."""
+
+    @property
+    def arc(self) -> Array:
+        """(n,), m: of a tube, the rest lengths from its start to its nodes."""
+
+    @property
+    def radii(self) -> Array:
+        """(n,), m: of a tube, the outer radius at each node."""
+
+    def point(self, **keywords: Unpack[_Point]) -> tuple[Array, Array]:
+        """Position, m, and velocity, m/s, of a material point, (3,) each."""
+
+@final
+class Events:
+    """Listens to a world. An object keeps its newest 128 events until they are drained."""
+
+    def drain(self) -> list[Event]:
+        """What happened since the last call, oldest first."""
+
+    @property
+    def lost(self) -> int:
+        """How many were overwritten before they were drained."""
+
+@final
+class Event:
+    """Something that happened."""
+
+    @property
+    def kind(
+        self,
+    ) -> Literal[
+        "contact_began",
+        "contact_ended",
+        "rests",
+        "wakes",
+        "failed",
+        "gone",
+        "joined",
+        "left",
+        "attachment_gave",
+        "rate_missed",
+        "unknown",
+    ]: ...
+    @property
+    def object(self) -> Object:
+        """The object that it happened to."""
+
+    @property
+    def time(self) -> float:
+        """The end of the step in which it happened, s."""
+
+    @property
+    def other(self) -> str | None:
+        """Of a contact what it touches; of one that joined a cluster its leader."""
+
+    @property
+    def point(self) -> Array | None:
+        """Of a contact the place that bore most, m."""
+
+    @property
+    def normal(self) -> Array | None:
+        """Of a contact the normal there, towards the object."""
+
+    @property
+    def force(self) -> Array | None:
+        """Of a contact the greatest force on the object in the mean of a step so far, N, world axes."""
+
+@final
+class Contact:
+    """A contact as it is now."""
+
+    @property
+    def other(self) -> str: ...
+    @property
+    def since(self) -> float:
+        """When it began, s."""
+
+    @property
+    def point(self) -> Array:
+        """The place that bears most, m."""
+
+    @property
+    def normal(self) -> Array:
+        """The normal there, towards the object."""
+
+    @property
+    def force(self) -> Array:
+        """On the object, in the mean of the last step, N, world axes."""
+
+    @property
+    def depth(self) -> float:
+        """The deepest overlap, m."""
+
+@final
+class Hit:
+    """What a ray or a search found."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def point(self) -> Array:
+        """Of its surface, m."""
+
+    @property
+    def normal(self) -> Array:
+        """Of its surface there, outwards."""
+
+    @property
+    def distance(self) -> float:
+        """m; negative within what overlaps."""
+
+@final
+class Rollout:
+    """What became of many worlds."""
+
+    @property
+    def positions(self) -> dict[str, Array]:
+        """By observed object (worlds, steps, n, 3), m, after each step."""
+
+    @property
+    def velocities(self) -> dict[str, Array]:
+        """The same, m/s."""
+
+    @property
+    def hashes(self) -> NDArray[np.uint64]:
+        """(worlds,): as `World.hash`, at the end."""
+
+def rollout(scene: Scene, on: str, actions: ArrayLike, **keywords: Unpack[_Rollout]) -> Rollout:
+    """Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).
+
+    `step` is required. A world is the same, bit for bit, on any number of threads.
+    """

@@ -1,0 +1,156 @@
+"""Parts of a scene: solids, bodies and tubes, and the kinds of joints. They hold numbers and nothing else.
+
+What is `None` is as the engine has it by default. Units are SI; a rotation is a unit quaternion (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, final
+
+from .typing import Numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Placed:
+    """Where a solid is at the start, and its surface."""
+
+    at: Numbers | None = None
+    """Position of its shape's origin, m; default the origin."""
+    rotation: Numbers | None = None
+    """From its shape's axes to the world's."""
+    friction: float | None = None
+    """Coulomb friction coefficient, >= 0; default 0.5."""
+    restitution: float | None = None
+    """Coefficient of restitution, 0 ... 1; default 0.2. Of two that meet the greater counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Moving(_Placed):
+    """A rigid body, or with none of these a solid that is fixed."""
+
+    mass: float | None = None
+    """kg, 1e-9 ... 1e9; default 1."""
+    velocity: Numbers | None = None
+    """Velocity at the start, m/s; default at rest."""
+    rate: float | None = None
+    """Steps a simulated second, 1 ... 100000; default 240."""
+
+
+@final
+@dataclass(frozen=True)
+class Plane(_Placed):
+    """The half space below its z = 0; only as a fixed solid."""
+
+
+@final
+@dataclass(frozen=True)
+class Ball(_Moving):
+    """A ball."""
+
+    radius: float
+    """m, > 0."""
+
+
+@final
+@dataclass(frozen=True)
+class Box(_Moving):
+    """A box about its origin."""
+
+    half_extents: Numbers
+    """Half of each edge, m, > 0."""
+
+
+@final
+@dataclass(frozen=True)
+class Capsule(_Moving):
+    """A capsule along z about its origin."""
+
+    radius: float
+    """m, > 0."""
+    half_height: float
+    """Half the length of its straight part, m, > 0."""
+
+
+@final
+@dataclass(frozen=True)
+class Cylinder(_Moving):
+    """A cylinder along z about its origin."""
+
+    radius: float
+    """m, > 0."""
+    half_height: float
+    """Half its length, m, > 0."""
+
+
+@final
+@dataclass(frozen=True)
+class Tube:
+    """A soft tube, cable or rod along points: by default of soft tissue, solid, both ends free."""
+
+    points: Sequence[Numbers] | Numbers
+    """At least two, m; an array of shape (n, 3) or a list of triples."""
+    radius: float | None = None
+    """Outer radius, m, > 0; default 0.01."""
+    wall: float | None = None
+    """Thickness of its wall, m, above 0 and at most its radius; `None` for a solid one."""
+    young: float | None = None
+    """Young's modulus, Pa, > 0; default 1e6."""
+    density: float | None = None
+    """kg/m3, > 0; default 1050."""
+    segments: int | None = None
+    """Number of equal parts, 2 ... 4096; default 40."""
+    clamp: Sequence[Literal["start", "end"]] = ()
+    """Ends that are held in position and direction."""
+    damping: float | None = None
+    """Mass-proportional damping, 1/s, >= 0; default 0."""
+    rate: float | None = None
+    """Steps a simulated second, 1 ... 100000; default 240."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Joint:
+    """A joint between two bodies, or of one with the world."""
+
+    at: Numbers
+    """Where both are at the start, m."""
+
+
+@final
+@dataclass(frozen=True)
+class Revolute(_Joint):
+    """A hinge."""
+
+    axis: Numbers
+    """In the axes of the first body's shape, of any length above zero."""
+    range: tuple[float, float] | None = None
+    """How far the second body turns relative to the first about the axis, rad, within -pi ... pi."""
+
+
+@final
+@dataclass(frozen=True)
+class Prismatic(_Joint):
+    """A slide."""
+
+    axis: Numbers
+    """In the axes of the first body's shape, of any length above zero."""
+    range: tuple[float, float] | None = None
+    """How far the second body slides relative to the first along the axis, m."""
+
+
+@final
+@dataclass(frozen=True)
+class Spherical(_Joint):
+    """A ball in its socket."""
+
+
+@final
+@dataclass(frozen=True)
+class Weld(_Joint):
+    """Nothing moves."""
+
+
+Solid = Plane | Ball | Box | Capsule | Cylinder
+Part = Ball | Box | Capsule | Cylinder | Tube
+JointKind = Revolute | Prismatic | Spherical | Weld

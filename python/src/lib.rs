@@ -1,0 +1,43 @@
+//! The engine as the Python module `metachron._metachron`: scenes that start, worlds that run, states that are read.
+//!
+//! In: Python's numbers, numpy arrays, parts as the dataclasses of `package/metachron/parts.py`. Out: objects of Python, errors as its exceptions.
+//! Never here: physics, a lock that Python waits for while a world runs.
+
+mod checkpoint;
+mod command;
+mod events;
+mod numbers;
+mod object;
+mod queries;
+mod raised;
+mod rollout;
+mod scene;
+mod state;
+mod world;
+
+/// What the package re-exports; `_metachron.pyi` says what each takes.
+#[pyo3::pymodule]
+mod _metachron {
+    #[pymodule_export]
+    use crate::checkpoint::Checkpoint;
+    #[pymodule_export]
+    use crate::events::{Event, Events};
+    #[pymodule_export]
+    use crate::object::Object;
+    #[pymodule_export]
+    use crate::queries::{Contact, Hit};
+    #[pymodule_export]
+    use crate::rollout::{Rollout, rollout};
+    #[pymodule_export]
+    use crate::scene::Scene;
+    #[pymodule_export]
+    use crate::state::State;
+    #[pymodule_export]
+    use crate::world::World;
+
+    #[pymodule_init]
+    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        metachron::scenes::provide();
+        Ok(())
+    }
+}

@@ -1,0 +1,69 @@
+//! The engine's errors as Python's exceptions, with the engine's own sentences.
+//!
+//! In: errors of scenes and worlds. Out: `KeyError` for a name that there is not, `ValueError` for what is wrong with what was given,
+//! `RuntimeError` for a world or an object that cannot do it any more. Never here: a sentence about physics.
+
+use metachron::scene::{SceneError, SceneProblem};
+use metachron::world::{CheckpointError, SceneBuildError, WorldError};
+use pyo3::exceptions::{PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
+use pyo3::{PyErr, Python};
+
+/// An error of a world.
+pub fn world(error: WorldError) -> PyErr {
+    exception(&error, error.to_string())
+}
+
+/// An error of one world of many.
+pub fn in_world(number: usize, error: &WorldError) -> PyErr {
+    exception(error, format!("world {number}: {error}"))
+}
+
+fn exception(error: &WorldError, message: String) -> PyErr {
+    match error {
+        WorldError::NoObject { .. } | WorldError::NoAgent(_) => PyKeyError::new_err(message),
+        WorldError::Foreign | WorldError::Gone { .. } | WorldError::Stopped | WorldError::Run(_) => {
+            PyRuntimeError::new_err(message)
+        }
+        _ => PyValueError::new_err(message),
+    }
+}
+
+/// Why a state cannot be saved, read or put back.
+pub fn checkpoint(error: CheckpointError) -> PyErr {
+    let message = error.to_string();
+    match error {
+        CheckpointError::File { .. } => PyOSError::new_err(message),
+        CheckpointError::BadFile { .. } | CheckpointError::OtherScene { .. } => PyValueError::new_err(message),
+        CheckpointError::Start(error) => exception(&error, message),
+        _ => PyRuntimeError::new_err(message),
+    }
+}
+
+/// An error of one argument of a call or one field of a part, with its name.
+pub fn of_argument(py: Python<'_>, what: &str, error: &PyErr) -> PyErr {
+    let message = format!("{what}: {}", error.value(py));
+    // a number that an integer of the engine cannot hold is wrong as any other is
+    if error.is_instance_of::<PyOverflowError>(py) {
+        return PyValueError::new_err(message);
+    }
+    PyErr::from_type(error.get_type(py), message)
+}
+
+/// Why a scene cannot be built.
+pub fn build(error: &SceneBuildError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// A scene file's problems, a line each: where it is, what it is, what was expected.
+pub fn scene(error: &SceneError) -> PyErr {
+    let hidden = (error.hidden > 0).then(|| format!("and {} more", error.hidden));
+    let lines = [error.to_string()].into_iter().chain(error.problems.iter().map(problem)).chain(hidden);
+    PyValueError::new_err(lines.collect::<Vec<_>>().join("\n"))
+}
+
+fn problem(problem: &SceneProblem) -> String {
+    let SceneProblem { message, expected, help, line, column, .. } = problem;
+    let place = if *line > 0 { format!("line {line}, column {column}: ") } else { String::new() };
+    let further = [Some(expected), help.as_ref()].into_iter().flatten().filter(|text| !text.is_empty());
+    further.fold(format!("{place}{message}"), |text, more| format!("{text}; {more}"))
+}

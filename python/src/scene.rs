@@ -1,0 +1,254 @@
+//! A scene: read from TOML, or built of parts.
+//!
+//! In: a text, a path, or the dataclasses of `package/metachron/parts.py`. Out: the engine's scene. Never here: defaults, which are the
+//! engine's own.
+
+use crate::numbers::{Rotation, Vector};
+use crate::object::Names;
+use crate::raised;
+use crate::world::World;
+use metachron::contact::joint::JointKind;
+use metachron::geometry::Solid;
+use metachron::scene::{Source, load};
+use metachron::world::{self, Part, Rigid, SceneBuilder, Tube};
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A scene, complete or in the making.
+#[pyclass(module = "metachron")]
+pub struct Scene {
+    inner: Inner,
+    /// The names of its joints, by their numbers; none of a scene from TOML.
+    joints: Vec<String>,
+}
+
+/// The ends of a tube, as its part names them.
+const ENDS: [&str; 2] = ["start", "end"];
+
+enum Inner {
+    Built(SceneBuilder),
+    Read(Box<world::Scene>),
+}
+
+/// What every solid says of itself; `None` where the engine's default stands.
+struct Placed {
+    at: Option<Vector>,
+    rotation: Option<Rotation>,
+    friction: Option<f64>,
+    restitution: Option<f64>,
+}
+
+/// What a body says that moves.
+struct Moving {
+    mass: Option<f64>,
+    velocity: Option<Vector>,
+    rate: Option<f64>,
+}
+
+impl Placed {
+    fn of(part: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self {
+            at: field(part, "at")?,
+            rotation: field(part, "rotation")?,
+            friction: field(part, "friction")?,
+            restitution: field(part, "restitution")?,
+        })
+    }
+}
+
+impl Moving {
+    /// `None` of a solid that never moves.
+    fn of(part: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
+        if class(part)? == "Plane" {
+            return Ok(None);
+        }
+        let (mass, velocity, rate) = (field(part, "mass")?, field(part, "velocity")?, field(part, "rate")?);
+        Ok(Some(Self { mass, velocity, rate }))
+    }
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (*, gravity = None))]
+    fn new(gravity: Option<Vector>) -> Self {
+        let builder = world::Scene::builder();
+        let builder = gravity.into_iter().fold(builder, |builder, Vector(g)| builder.gravity(g.to_array()));
+        Self { inner: Inner::Built(builder), joints: Vec::new() }
+    }
+
+    /// Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
+    ///
+    /// Raises `ValueError` with every problem, a line each, with its line and column.
+    #[staticmethod]
+    pub fn from_toml(text_or_path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let text: Option<String> = text_or_path.extract().ok().filter(|text: &String| text.contains('\n'));
+        let source = match text {
+            Some(text) => Source::memory("given as text", text.as_bytes()),
+            None => {
+                let path: PathBuf = text_or_path.extract()?;
+                Source::open(&path.to_string_lossy())
+            }
+        };
+        let scene = source.and_then(|source| load(&source, &[])).map_err(|error| raised::scene(&error))?;
+        Ok(Self { inner: Inner::Read(Box::new(scene)), joints: Vec::new() })
+    }
+
+    /// Adds a solid that never moves.
+    fn fixed<'py>(
+        mut slf: PyRefMut<'py, Self>,
+        name: String,
+        solid: &Bound<'py, PyAny>,
+    ) -> PyResult<PyRefMut<'py, Self>> {
+        let (shape, placed) = (shape(solid)?, Placed::of(solid)?);
+        let is_still = |m: Moving| m.mass.is_none() && m.velocity.is_none() && m.rate.is_none();
+        if !Moving::of(solid)?.is_none_or(is_still) {
+            let message = format!("\"{name}\" is fixed: it has no mass, no velocity and no rate");
+            return Err(PyValueError::new_err(message));
+        }
+        let mut obstacle = world::static_solid(name, shape);
+        obstacle.position = placed.at.map_or(obstacle.position, |Vector(at)| at);
+        obstacle.rotation = placed.rotation.map_or(obstacle.rotation, |Rotation(rotation)| rotation);
+        obstacle.friction = placed.friction.unwrap_or(obstacle.friction);
+        obstacle.restitution = placed.restitution.unwrap_or(obstacle.restitution);
+        slf.build(|builder| builder.obstacle(obstacle))?;
+        Ok(slf)
+    }
+
+    /// Adds a rigid body or a tube.
+    fn add<'py>(mut slf: PyRefMut<'py, Self>, name: String, what: &Bound<'py, PyAny>) -> PyResult<PyRefMut<'py, Self>> {
+        let part = part(what)?;
+        slf.build(|builder| builder.add(name, part))?;
+        Ok(slf)
+    }
+
+    /// Joins the rigid bodies `a` and `b`, or `a` and the world.
+    #[pyo3(signature = (name, kind, a, b = None))]
+    fn joint<'py>(
+        mut slf: PyRefMut<'py, Self>,
+        name: String,
+        kind: &Bound<'py, PyAny>,
+        a: &str,
+        b: Option<&str>,
+    ) -> PyResult<PyRefMut<'py, Self>> {
+        if slf.joints.contains(&name) {
+            return Err(PyValueError::new_err(format!("the scene has a joint \"{name}\" already")));
+        }
+        let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
+        slf.build(|builder| builder.joint(a, b, kind, at.to_array()))?;
+        slf.joints.push(name);
+        Ok(slf)
+    }
+
+    /// Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
+    #[pyo3(signature = (executor = "lockstep"))]
+    pub fn start(&self, py: Python<'_>, executor: &str) -> PyResult<World> {
+        World::start(py, &self.resolved()?, executor, self.joints.clone())
+    }
+}
+
+impl Scene {
+    /// The engine's scene.
+    pub fn resolved(&self) -> PyResult<world::Scene> {
+        match &self.inner {
+            Inner::Built(builder) => builder.clone().build().map_err(|error| raised::build(&error)),
+            Inner::Read(scene) => Ok((**scene).clone()),
+        }
+    }
+
+    fn build(&mut self, more: impl FnOnce(SceneBuilder) -> SceneBuilder) -> PyResult<()> {
+        let Inner::Built(builder) = &mut self.inner else {
+            let message = "a scene from TOML is complete: add objects to its text, or to the world that it starts";
+            return Err(PyValueError::new_err(message));
+        };
+        *builder = more(std::mem::replace(builder, world::Scene::builder()));
+        Ok(())
+    }
+}
+
+/// A field of a part.
+fn field<'py, T: FromPyObjectOwned<'py>>(part: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
+    let wrong = |error: T::Error| raised::of_argument(part.py(), &format!("field '{name}'"), &error.into());
+    part.getattr(name)?.extract().map_err(wrong)
+}
+
+/// The class of a part.
+fn class(part: &Bound<'_, PyAny>) -> PyResult<String> {
+    Ok(part.get_type().name()?.to_string())
+}
+
+/// What moves: a rigid body or a tube.
+pub fn part(part: &Bound<'_, PyAny>) -> PyResult<Part> {
+    if class(part)? == "Tube" {
+        return Ok(tube(part)?.into());
+    }
+    let (solid, placed) = (shape(part)?, Placed::of(part)?);
+    let Some(moving) = Moving::of(part)? else {
+        return Err(PyValueError::new_err("a Plane does not move: it is fixed in a scene"));
+    };
+    let mut rigid = Rigid::new(solid);
+    if let Some(Vector(at)) = placed.at {
+        rigid = rigid.at(at.to_array());
+    }
+    if let Some(Rotation(rotation)) = placed.rotation {
+        rigid = rigid.turned(rotation);
+    }
+    if let Some(Vector(velocity)) = moving.velocity {
+        rigid = rigid.velocity_m_s(velocity.to_array());
+    }
+    rigid = placed.friction.into_iter().fold(rigid, Rigid::friction);
+    rigid = placed.restitution.into_iter().fold(rigid, Rigid::restitution);
+    rigid = moving.mass.into_iter().fold(rigid, Rigid::mass_kg);
+    Ok(moving.rate.into_iter().fold(rigid, Rigid::rate_hz).into())
+}
+
+fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
+    let number = |name| field::<f64>(part, name);
+    Ok(match class(part)?.as_str() {
+        "Plane" => Solid::Plane,
+        "Ball" => Solid::Ball { radius_m: number("radius")? },
+        "Box" => Solid::Box { half_extents_m: field::<Vector>(part, "half_extents")?.0 },
+        "Capsule" => Solid::Capsule { radius_m: number("radius")?, half_height_m: number("half_height")? },
+        "Cylinder" => Solid::Cylinder { radius_m: number("radius")?, half_height_m: number("half_height")? },
+        other => {
+            let message = format!(
+                "a solid is a Plane, Ball, Box, Capsule or Cylinder, and what moves may be a Tube; got a {other}"
+            );
+            return Err(PyTypeError::new_err(message));
+        }
+    })
+}
+
+fn tube(part: &Bound<'_, PyAny>) -> PyResult<Tube> {
+    let points: Vec<_> = field::<Vec<Vector>>(part, "points")?.iter().map(|Vector(point)| point.to_array()).collect();
+    let Names(clamp) = field(part, "clamp")?;
+    if let Some(wrong) = clamp.iter().find(|end| !ENDS.contains(&&***end)) {
+        return Err(PyValueError::new_err(format!("a tube is clamped at \"start\" and \"end\", not at {wrong:?}")));
+    }
+    let tube = Tube::along(&points).clamp(ENDS.map(|end| clamp.iter().any(|clamped| clamped == end)));
+    let number = |name| field::<Option<f64>>(part, name).map(Option::into_iter);
+    let tube = number("radius")?.fold(tube, Tube::radius_m);
+    let tube = number("wall")?.fold(tube, Tube::wall_m);
+    let tube = number("young")?.fold(tube, Tube::young_pa);
+    let tube = number("density")?.fold(tube, Tube::density_kg_m3);
+    let tube = number("damping")?.fold(tube, Tube::damping_per_s);
+    let tube = number("rate")?.fold(tube, Tube::rate_hz);
+    Ok(field::<Option<usize>>(part, "segments")?.into_iter().fold(tube, Tube::segments))
+}
+
+fn joint_kind(kind: &Bound<'_, PyAny>) -> PyResult<JointKind> {
+    let axis = || field(kind, "axis").map(|Vector(axis)| axis);
+    let range = || field(kind, "range");
+    Ok(match class(kind)?.as_str() {
+        "Weld" => JointKind::Fixed,
+        "Spherical" => JointKind::Spherical,
+        "Revolute" => JointKind::Revolute { axis: axis()?, range_rad: range()?, motor: None },
+        "Prismatic" => JointKind::Prismatic { axis: axis()?, range_m: range()?, motor: None },
+        other => {
+            let message = format!("a joint is a Revolute, Prismatic, Spherical or Weld, not a {other}");
+            return Err(PyTypeError::new_err(message));
+        }
+    })
+}

@@ -1,0 +1,159 @@
+//! The state that an object published: it never changes, and outlives its world.
+//!
+//! In: a snapshot. Out: arrays that nobody can write to, each a copy. Never here: a lock.
+
+use crate::command::Keywords;
+use crate::numbers::{row, rows};
+use glam::{DQuat, DVec3};
+use metachron::core::{Body, CurveState, Snapshot};
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyAttributeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::slice::from_ref;
+use std::sync::Arc;
+
+/// What an object was like at one moment. It never changes; its arrays are copies that nobody can write to.
+#[pyclass(frozen, module = "metachron")]
+pub struct State(pub Arc<Snapshot>);
+
+/// An array with a row for each.
+type Rows<'py> = Bound<'py, PyArray2<f64>>;
+
+/// The points of a body: the nodes of what bends, the centre of mass or the tip of what does not.
+pub struct Points<'a> {
+    pub positions: &'a [DVec3],
+    pub velocities: &'a [DVec3],
+}
+
+impl<'a> Points<'a> {
+    /// Those of this body.
+    pub fn of(body: &'a Body) -> Self {
+        let (positions, velocities) = match body {
+            Body::Rigid(rigid) => (from_ref(&rigid.position), from_ref(&rigid.velocity)),
+            Body::Tool(tool) => (from_ref(&tool.tip), from_ref(&tool.velocity)),
+            Body::Curve(curve) => (&*curve.positions, &*curve.velocities),
+            Body::Soft(soft) => (&*soft.positions, &*soft.velocities),
+            Body::Nothing => (&[][..], &[][..]),
+        };
+        Self { positions, velocities }
+    }
+}
+
+impl State {
+    /// Pose and motion of what does not bend: rotation and spin.
+    fn turning(&self, what: &str) -> PyResult<(DQuat, DVec3)> {
+        match &self.0.body {
+            Body::Rigid(rigid) => Ok((rigid.rotation, rigid.spin)),
+            Body::Tool(tool) => Ok((tool.rotation, tool.spin)),
+            _ => Err(self.lacks(what, "rigid bodies and tools have one")),
+        }
+    }
+
+    fn curve(&self, what: &str) -> PyResult<&CurveState> {
+        match &self.0.body {
+            Body::Curve(curve) => Ok(curve),
+            _ => Err(self.lacks(what, "tubes have them")),
+        }
+    }
+
+    fn lacks(&self, what: &str, have: &str) -> PyErr {
+        PyAttributeError::new_err(format!("the state of a {} body has no {what}: {have}", self.body()))
+    }
+}
+
+#[pymethods]
+impl State {
+    #[getter]
+    fn body(&self) -> &'static str {
+        match &self.0.body {
+            Body::Rigid(_) => "rigid",
+            Body::Curve(_) => "curve",
+            Body::Soft(_) => "soft",
+            Body::Tool(_) => "tool",
+            Body::Nothing => "nothing",
+        }
+    }
+
+    /// The moment, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.0.moment().as_secs_f64()
+    }
+
+    /// Steps so far.
+    #[getter]
+    fn steps(&self) -> u64 {
+        self.0.steps
+    }
+
+    #[getter]
+    fn at_rest(&self) -> bool {
+        self.0.at_rest
+    }
+
+    /// Kinetic, elastic and that of gravity, J.
+    #[getter]
+    fn energy(&self) -> f64 {
+        self.0.energy_j
+    }
+
+    /// (n, 3), m: the nodes of what bends, the centre of mass or the tip of what does not.
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> Rows<'py> {
+        rows(py, Points::of(&self.0.body).positions.iter().map(|v| v.to_array()))
+    }
+
+    /// (n, 3), m/s, of the same points.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> Rows<'py> {
+        rows(py, Points::of(&self.0.body).velocities.iter().map(|v| v.to_array()))
+    }
+
+    /// (4,): of a rigid body or tool, from its axes to the world's. Others raise `AttributeError`.
+    #[getter]
+    fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(row(py, self.turning("rotation")?.0.to_array()))
+    }
+
+    /// (3,), rad/s, world axes: of a rigid body or tool.
+    #[getter]
+    fn spin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(row(py, self.turning("spin")?.1.to_array()))
+    }
+
+    /// (n - 1, 4): of a tube, the rotations of its segments, whose z is along it.
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
+        Ok(rows(py, self.curve("frames")?.frames.iter().map(|frame| frame.to_array())))
+    }
+
+    /// (n,), m: of a tube, the rest lengths from its start to its nodes.
+    #[getter]
+    fn arc<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(crate::numbers::array(py, self.curve("arc lengths")?.arc_m.clone().into()))
+    }
+
+    /// (n,), m: of a tube, the outer radius at each node.
+    #[getter]
+    fn radii<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(crate::numbers::array(py, self.curve("radii")?.radii_m.clone().into()))
+    }
+
+    /// Position, m, and velocity, m/s, of a material point, (3,) each.
+    #[pyo3(signature = (**keywords))]
+    fn point<'py>(
+        &self,
+        py: Python<'py>,
+        keywords: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+        let anchor = Keywords::new("point", keywords, &["arc", "local", "vertex"])?.anchor()?;
+        let no_point = || PyValueError::new_err(format!("a {} body has no point {anchor:?}", self.body()));
+        let (position, velocity) = self.0.body.point(anchor).ok_or_else(no_point)?;
+        Ok([position, velocity].map(|vector| row(py, vector.to_array())))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<State of a {} body at {} s>", self.body(), self.time())
+    }
+}

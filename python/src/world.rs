@@ -1,0 +1,342 @@
+//! A world that runs: driven, commanded and read from any thread of Python.
+//!
+//! In: commands by objects' names or handles. Out: states, events, answers. While time passes Python's own lock is free.
+//! Never here: the meaning of a command.
+
+use crate::checkpoint::Checkpoint;
+use crate::command::Keywords;
+use crate::events::Events;
+use crate::numbers::{Rotation, Vector, span};
+use crate::object::{Named, Object};
+use crate::queries::{Contact, Hit};
+use crate::raised;
+use crate::scene::{Scene, part};
+use crate::state::State;
+use glam::{DQuat, DVec3};
+use metachron::contact::joint::{Motor, MotorGoal};
+use metachron::core::SimSpan;
+use metachron::runtime::{AgentState, TimelineCommand};
+use metachron::world::kinds::ExecutorKind;
+use metachron::world::{self, Command, EventFilter};
+use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
+
+/// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
+#[pyclass(frozen, module = "metachron")]
+pub struct World {
+    inner: world::World,
+    /// The names of its static solids, by their numbers.
+    fixed: Arc<[String]>,
+    joints: Vec<Joint>,
+}
+
+/// A joint that a motor may drive.
+struct Joint {
+    name: Option<String>,
+    /// The object that takes commands for it.
+    body: world::Object,
+}
+
+/// An argument that names a joint.
+enum NamedJoint {
+    Name(String),
+    Number(u32),
+}
+
+impl<'py> FromPyObject<'_, 'py> for NamedJoint {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let name = given.extract().map(Self::Name);
+        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
+        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
+    }
+}
+
+/// The executors, as Python names them.
+const EXECUTORS: [ExecutorKind; 4] =
+    [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Auto];
+
+/// Where on an object, under which key, for how long.
+const ANCHORED: [&str; 5] = ["arc", "local", "vertex", "key", "expires"];
+
+/// So much time passes in lockstep before Python is asked whether the user has interrupted it.
+const PIECE: SimSpan = SimSpan::from_millis(20);
+
+/// Keyword arguments.
+type Given<'py> = Bound<'py, PyDict>;
+
+impl World {
+    /// Starts a scene whose joints have these names, by their numbers.
+    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str, joints: Vec<String>) -> PyResult<Self> {
+        let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
+            let known = EXECUTORS.map(ExecutorKind::name).join(", ");
+            return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
+        };
+        let inner = py.detach(|| world::World::start(scene, kind)).map_err(raised::world)?;
+        let mut names = joints.into_iter();
+        let joints = scene.joints.iter().map(|joint| {
+            let body = inner.object_of(joint.a).map_err(raised::world)?;
+            Ok(Joint { name: names.next(), body })
+        });
+        let joints = joints.collect::<PyResult<_>>()?;
+        let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
+        Ok(Self { inner, fixed, joints })
+    }
+
+    fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
+        self.inner.command(object.of(&self.inner)?, command).map_err(raised::world)
+    }
+
+    /// The joint's number, and the object that takes commands for it.
+    fn joint(&self, joint: &NamedJoint) -> PyResult<(u32, world::Object)> {
+        let at = match joint {
+            NamedJoint::Number(number) => Some(*number as usize),
+            NamedJoint::Name(name) => self.joints.iter().position(|joint| joint.name.as_ref() == Some(name)),
+        };
+        let found = at.and_then(|at| Some((at as u32, self.joints.get(at)?.body)));
+        found.ok_or_else(|| {
+            let names: Vec<_> = self.joints.iter().filter_map(|joint| joint.name.as_deref()).collect();
+            let asked = match joint {
+                NamedJoint::Name(name) => format!("{name:?}"),
+                NamedJoint::Number(number) => number.to_string(),
+            };
+            let (count, names) = (self.joints.len(), names.join(", "));
+            PyKeyError::new_err(format!("the world has no joint {asked}; it has {count}, with the names [{names}]"))
+        })
+    }
+}
+
+#[pymethods]
+impl World {
+    /// `Scene.from_toml(text_or_path).start(executor)`.
+    #[staticmethod]
+    #[pyo3(signature = (text_or_path, executor = "lockstep"))]
+    fn from_toml(py: Python<'_>, text_or_path: &Bound<'_, PyAny>, executor: &str) -> PyResult<Self> {
+        Scene::from_toml(text_or_path)?.start(py, executor)
+    }
+
+    /// The object of this name. Raises `KeyError`.
+    fn object(&self, name: &str) -> PyResult<Object> {
+        let object = self.inner.object(name).map_err(raised::world)?;
+        Ok(Object::new(&self.inner, object))
+    }
+
+    /// The newest state of an object; it waits for nothing.
+    fn state(&self, object: Named<'_>) -> PyResult<State> {
+        self.inner.latest(object.of(&self.inner)?).map(State).map_err(raised::world)
+    }
+
+    /// Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives.
+    fn fault(&self, object: Named<'_>) -> PyResult<Option<String>> {
+        let object = object.of(&self.inner)?;
+        self.inner.latest(object).map_err(raised::world)?;
+        Ok(self.inner.agents().of(object.id()).and_then(|agent| match agent.state() {
+            AgentState::Parked(reason) => Some(reason),
+            _ => None,
+        }))
+    }
+
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self, py: Python<'_>) -> f64 {
+        // in lockstep it waits for a piece of `advance` in another thread
+        py.detach(|| self.inner.time().as_secs_f64())
+    }
+
+    /// The executor that runs it.
+    #[getter]
+    fn executor(&self) -> &'static str {
+        self.inner.executor().name()
+    }
+
+    /// Equal numbers mean the same states of all objects, bit for bit.
+    fn hash(&self) -> u64 {
+        self.inner.hash()
+    }
+
+    /// All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors.
+    fn checkpoint(&self, py: Python<'_>) -> PyResult<Checkpoint> {
+        let inner = py.detach(|| self.inner.checkpoint()).map_err(raised::checkpoint)?;
+        Ok(Checkpoint { inner })
+    }
+
+    /// Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit.
+    fn restore(&self, py: Python<'_>, checkpoint: &Checkpoint) -> PyResult<()> {
+        py.detach(|| self.inner.restore(&checkpoint.inner)).map_err(raised::checkpoint)
+    }
+
+    /// Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile.
+    fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let span = span("the time to advance by", seconds)?;
+        if self.inner.executor() != ExecutorKind::Lockstep {
+            py.detach(|| self.inner.advance(span));
+            return Ok(());
+        }
+        let mut left = span;
+        while left > SimSpan::ZERO {
+            let piece = left.min(PIECE);
+            py.detach(|| self.inner.advance(piece));
+            py.check_signals()?;
+            left = SimSpan::from_nanos(left.as_nanos() - piece.as_nanos());
+        }
+        Ok(())
+    }
+
+    /// Lets time pass from now on, so many simulated seconds a second. Not in lockstep.
+    #[pyo3(signature = (speed = 1.0))]
+    fn run(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
+        if self.inner.executor() == ExecutorKind::Lockstep {
+            return Err(PyValueError::new_err("a world in lockstep has no time of its own: it needs `advance`"));
+        }
+        py.detach(|| {
+            self.inner.drive(TimelineCommand::Speed(speed));
+            self.inner.drive(TimelineCommand::Run);
+        });
+        Ok(())
+    }
+
+    /// Stops time.
+    fn pause(&self, py: Python<'_>) {
+        py.detach(|| self.inner.drive(TimelineCommand::Pause));
+    }
+
+    /// Ends the world. Its newest states can still be read.
+    fn stop(&self, py: Python<'_>) {
+        py.detach(|| drop(self.inner.stop()));
+    }
+
+    fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_error))]
+    fn __exit__(&self, py: Python<'_>, _error: &Bound<'_, pyo3::types::PyTuple>) {
+        self.stop(py);
+    }
+
+    /// A force in world axes; `None` takes back that of the key.
+    #[pyo3(signature = (object, newtons, **keywords))]
+    fn force(&self, object: Named<'_>, newtons: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
+        let keywords = Keywords::new("force", keywords, &ANCHORED)?;
+        let (anchor, force) = (keywords.anchor()?, newtons.map(|Vector(force)| force));
+        let command = Command::force(anchor, force.unwrap_or_default());
+        let command = if force.is_none() { command.taken_back() } else { command };
+        self.send(&object, keywords.timed(command)?)
+    }
+
+    /// A torque in world axes; `None` takes back that of the key.
+    #[pyo3(signature = (object, newton_metres, **keywords))]
+    fn torque(&self, object: Named<'_>, newton_metres: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
+        let keywords = Keywords::new("torque", keywords, &ANCHORED)?;
+        let (anchor, torque) = (keywords.anchor()?, newton_metres.map(|Vector(torque)| torque));
+        let command = Command::torque(anchor, torque.unwrap_or_default());
+        let command = if torque.is_none() { command.taken_back() } else { command };
+        self.send(&object, keywords.timed(command)?)
+    }
+
+    /// An impulse in world axes, once.
+    #[pyo3(signature = (object, newton_seconds, **keywords))]
+    fn impulse(&self, object: Named<'_>, newton_seconds: Vector, keywords: Option<&Given<'_>>) -> PyResult<()> {
+        let anchor = Keywords::new("impulse", keywords, &["arc", "local", "vertex"])?.anchor()?;
+        self.send(&object, Command::impulse(anchor, newton_seconds.0))
+    }
+
+    /// A spring to a place in space, m; `None` takes back that of the key.
+    #[pyo3(signature = (object, target, **keywords))]
+    fn spring(&self, object: Named<'_>, target: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
+        let known = [&["stiffness", "damping"][..], &ANCHORED].concat();
+        let keywords = Keywords::new("spring", keywords, &known)?;
+        let (anchor, target) = (keywords.anchor()?, target.map(|Vector(target)| target));
+        let stiffness: Option<f64> = keywords.get("stiffness")?;
+        let damping: f64 = keywords.get("damping")?.unwrap_or(0.0);
+        let Some(stiffness) = stiffness.or(target.is_none().then_some(0.0)) else {
+            return Err(PyValueError::new_err("a spring needs a stiffness, N/m"));
+        };
+        let command = Command::spring(anchor, target.unwrap_or_default(), stiffness, damping);
+        let command = if target.is_none() { command.taken_back() } else { command };
+        self.send(&object, keywords.timed(command)?)
+    }
+
+    /// To another place: a rigid body to this rotation, what bends turned by it.
+    #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY)))]
+    fn teleport(&self, object: Named<'_>, position: Vector, rotation: Rotation) -> PyResult<()> {
+        self.send(&object, Command::teleport(position.0, rotation.0))
+    }
+
+    /// Another velocity, m/s, and spin, rad/s, of all its matter.
+    #[pyo3(signature = (object, velocity, spin = Vector(DVec3::ZERO)))]
+    fn velocity(&self, object: Named<'_>, velocity: Vector, spin: Vector) -> PyResult<()> {
+        self.send(&object, Command::velocity(velocity.0, spin.0))
+    }
+
+    /// Drives a joint, by name or by its number in the scene; without a goal, no longer.
+    #[pyo3(signature = (joint, **keywords))]
+    fn motor(&self, joint: NamedJoint, keywords: Option<&Given<'_>>) -> PyResult<()> {
+        let known = ["velocity", "position", "stiffness", "damping", "max_effort", "expires"];
+        let keywords = Keywords::new("motor", keywords, &known)?;
+        let (number, body) = self.joint(&joint)?;
+        let idle = Motor { goal: MotorGoal::Velocity(0.0), max_effort: f64::INFINITY };
+        let command = match keywords.motor()? {
+            Some(motor) => Command::motor(number, motor),
+            None => Command::motor(number, idle).taken_back(),
+        };
+        self.inner.command(body, keywords.timed(command)?).map_err(raised::world)
+    }
+
+    /// Takes up another object, which lives from its first step on.
+    fn add(&self, name: &str, what: &Bound<'_, PyAny>) -> PyResult<Object> {
+        let part = part(what)?;
+        let object = what.py().detach(|| self.inner.add(name, part)).map_err(raised::world)?;
+        Ok(Object::new(&self.inner, object))
+    }
+
+    /// Takes an object out; its handle is an error from its next step on.
+    fn remove(&self, object: Named<'_>) -> PyResult<()> {
+        self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
+    }
+
+    /// Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one.
+    #[pyo3(signature = (*, contacts = true, states = true, above = 0.0, of = None))]
+    fn events(&self, contacts: bool, states: bool, above: f64, of: Option<Named<'_>>) -> PyResult<Events> {
+        let filter = match (contacts, states) {
+            (true, true) => EventFilter::all(),
+            (true, false) => EventFilter::contacts(),
+            (false, true) => EventFilter::states(),
+            (false, false) => return Err(PyValueError::new_err("events are of contacts, of states, or of both")),
+        };
+        if above.is_nan() || above < 0.0 {
+            return Err(PyValueError::new_err(format!("above is {above:?} N; expected 0 or more")));
+        }
+        let filter = filter.above_n(above);
+        let filter = match of {
+            Some(object) => filter.of(object.of(&self.inner)?),
+            None => filter,
+        };
+        Ok(Events::new(&self.inner, &self.fixed, filter))
+    }
+
+    /// What an object touches now.
+    fn contacts(&self, py: Python<'_>, object: Named<'_>) -> PyResult<Vec<Contact>> {
+        let all = self.inner.contacts(object.of(&self.inner)?).map_err(raised::world)?;
+        Ok(all.iter().map(|contact| Contact::new(py, &self.inner, &self.fixed, contact)).collect())
+    }
+
+    /// The first surface that a ray meets within `reach` metres.
+    fn cast_ray(&self, py: Python<'_>, origin: Vector, direction: Vector, reach: f64) -> PyResult<Option<Hit>> {
+        let hit = py.detach(|| self.inner.cast_ray(origin.0, direction.0, reach)).map_err(raised::world)?;
+        Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
+    }
+
+    /// The nearest point of any surface within `reach` metres.
+    fn nearest(&self, py: Python<'_>, point: Vector, reach: f64) -> PyResult<Option<Hit>> {
+        let hit = py.detach(|| self.inner.nearest(point.0, reach)).map_err(raised::world)?;
+        Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        format!("<World on {} at {} s>", self.executor(), self.time(py))
+    }
+}
