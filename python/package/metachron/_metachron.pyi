@@ -11,7 +11,7 @@ from typing_extensions import Self, Unpack
 from .parts import JointKind, Part, Solid
 from .typing import Array, Numbers
 
-__all__ = ["Contact", "Event", "Events", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
+__all__ = ["Checkpoint", "Contact", "Event", "Events", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
 
 _Executor = Literal["lockstep", "threads", "pool", "auto"]
 
