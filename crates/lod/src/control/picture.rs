@@ -142,7 +142,7 @@ impl PictureControl {
         }
         let overhead_s = work_s - drawn_s;
         self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
-        let (target_s, rung) = (self.target_s(), self.rung());
+        let target_s = self.target_s();
         // by the prices that the frame was drawn with: its scale and shadows may change now
         let (backdrop_s, objects_s) =
             (self.picture_prices().backdrop_s(self.backdrop), self.drawn_s(&self.plan.levels));
@@ -163,10 +163,6 @@ impl PictureControl {
                 self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
             }
             _ => {}
-        }
-        if self.rung() != rung {
-            // after this frame, which may be the one by which a step of the load is seen
-            self.adaptive.rescale();
         }
     }
 

@@ -149,7 +149,7 @@ impl PictureControl {
         self.policy.prices(&self.prices.with_shadows(self.shadows()))
     }
 
-    pub(super) fn rung(&self) -> PictureRung {
+    fn rung(&self) -> PictureRung {
         if self.policy.scales_pictures() { self.scale.rung() } else { self.scale.most() }
     }
 
