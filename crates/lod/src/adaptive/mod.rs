@@ -128,7 +128,7 @@ struct Prediction {
     table: [u64; STAGES],
     /// Ticks of the whole frame.
     whole: f64,
-    /// Whether its measurement counts, and whether κ was known by then and there was something to choose.
+    /// Whether its measurement counts, and whether κ was known by then.
     usable: bool,
     informed: bool,
 }
@@ -221,7 +221,7 @@ impl Adaptive {
         }
         self.plan.predicted = self.cost(&terms) + fixed;
         self.plan.budget = budget;
-        let (usable, informed) = (self.unsettled <= LEARNING, self.unsettled == 0 && self.plan.feasible);
+        let (usable, informed) = (self.unsettled <= LEARNING, self.unsettled == 0);
         self.unsettled = self.unsettled.saturating_sub(1);
         let Self { table, plan: Plan { predicted: whole, .. }, .. } = *self;
         self.predictions[frame as usize % IN_FLIGHT] =
@@ -264,13 +264,6 @@ impl Adaptive {
     pub fn disturb(&mut self) {
         self.unsettled = UNSETTLED + LEARNING;
         self.predictions = [None; IN_FLIGHT];
-    }
-
-    /// Reports that the fixed part is another from now on: κ, which stands for its errors too, has to be learnt again before the times of
-    /// frames say anything of the machine's scatter.
-    pub fn learn_anew(&mut self) {
-        self.unsettled = self.unsettled.max(LEARNING);
-        self.predictions.iter_mut().flatten().for_each(|prediction| prediction.informed = false);
     }
 
     /// The level given to an object; `None` where it is left out, is unknown, or has no levels.

@@ -124,11 +124,6 @@ impl AdaptiveChoice {
         self.law.disturb();
     }
 
-    /// Reports that the picture has another number of pixels, or other shadows.
-    pub fn rescale(&mut self) {
-        self.law.learn_anew();
-    }
-
     pub fn status(&self) -> Status {
         self.status
     }

@@ -59,9 +59,6 @@ impl PictureControl {
             period_s: 1.0 / self.target_hz,
         };
         self.scale.observe(frame, priced_s);
-        if self.scale.rung() != here {
-            self.adaptive.rescale();
-        }
         if self.scale.rung().shadows != here.shadows {
             self.forget_ladders();
         }
