@@ -296,7 +296,7 @@ fn pairs_gain_the_product_of_their_accuracies() {
 
 /// A controller for the choice alone.
 fn bare() -> Adaptive {
-    Adaptive::new(Settings { margin: 0.0, late: 1.0, hysteresis: 0.0, dwell: 0, trim: false })
+    Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, hysteresis: 0.0, dwell: 0, trim: false })
 }
 
 /// Forty agents, each with five rates (stage 0) and five levels (stage 1): the joint budget, and each budget alone.

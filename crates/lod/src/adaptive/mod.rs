@@ -20,13 +20,11 @@
 
 mod hysteresis;
 pub mod joint;
-mod late_margin;
 mod options;
 mod pick;
 mod speed_estimator;
 
-pub use hysteresis::{Trim, is_late};
-pub use late_margin::{LATE, LATE_SHARE, LateMargin};
+pub use hysteresis::{MissCounter, Trim, is_late};
 pub use options::Offer;
 pub use speed_estimator::{FilterUpdate, SpeedEstimator};
 #[cfg(feature = "std")]
@@ -39,7 +37,7 @@ use pick::{Picker, Terms};
 
 /// The fraction of a frame that a policy with a prediction leaves free where a scene sets none.
 pub const DEFAULT_MARGIN: f64 = 0.02;
-/// The greatest margin that may be asked for, as a fraction of T.
+/// The greatest margin, as a fraction of T.
 pub const MARGIN_MAX: f64 = 0.5;
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
@@ -47,8 +45,6 @@ pub const STAGES: usize = 4;
 const IN_FLIGHT: usize = 8;
 /// Frames after a start or a disturbance whose measurements are ignored.
 const UNSETTLED: u8 = 3;
-/// Frames after those that are late because κ is not known yet: they say nothing of the machine's scatter.
-const LEARNING: u8 = 10;
 /// A relative change up to this counts as none: positions and times are rounded.
 const ROUNDING: f64 = 1e-9;
 /// Greatest fall of the planned κ from one frame to the next: lateness is corrected immediately, spare time is used slowly.
@@ -57,11 +53,11 @@ const EASING: f64 = 0.95;
 /// The settings of [`Adaptive`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The least margin, as a fraction of T; 0 … 0.5.
+    /// The least margin, as a fraction of T; 0 … 0.5. If it is below the machine's noise, every other frame is late.
     pub margin: f64,
-    /// The share of frames that may be late, 0 … 1: the margin is as large as the measured scatter requires for it. With 1 there is no
-    /// margin but the least; less than 1/128 is 1/128, for one slow frame is a hiccup.
-    pub late: f64,
+    /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. On a machine that errs by 5 %, 0.5 is late
+    /// by 5 % once in 400 frames and leaves 2 % of the time; 1.5 less than once in 1250, and leaves 4 %.
+    pub sigmas: f64,
     /// h: additional weight of a step that was taken in the last choice; 0 … 2. At 0 levels change visibly often; above 1 little is gained.
     pub hysteresis: f64,
     /// Frames after a change for which an object is reluctant to reverse it: one that fell may not rise, one that rose falls after others;
@@ -73,14 +69,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { margin: DEFAULT_MARGIN, late: LATE_SHARE, hysteresis: 0.25, dwell: 8, trim: false }
+        Self { margin: DEFAULT_MARGIN, sigmas: 0.5, hysteresis: 0.25, dwell: 8, trim: false }
     }
 }
 
 impl Settings {
     fn sound(self) -> Self {
-        let (margin, late) = (crate::within(self.margin, 0.0, MARGIN_MAX), crate::within(self.late, 0.0, 1.0));
-        Self { margin, late, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
+        let (margin, sigmas) = (crate::within(self.margin, 0.0, MARGIN_MAX), crate::within(self.sigmas, 0.0, 5.0));
+        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
     }
 }
 
@@ -126,11 +122,7 @@ struct Prediction {
     frame: u64,
     target: f64,
     table: [u64; STAGES],
-    /// Ticks of the whole frame.
-    whole: f64,
-    /// Whether its measurement counts, and whether κ was known by then.
     usable: bool,
-    informed: bool,
 }
 
 /// Objects, the estimates of the machine, and the last choice.
@@ -142,7 +134,7 @@ pub struct Adaptive {
     estimators: [SpeedEstimator; STAGES],
     /// κ used in plans: follows the estimators up immediately and down slowly.
     kappa: [f64; STAGES],
-    late: LateMargin,
+    misses: MissCounter,
     hold: ChoiceHold,
     trim: Trim,
     predictions: [Option<Prediction>; IN_FLIGHT],
@@ -157,18 +149,17 @@ impl Adaptive {
     /// A controller without measurements.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
-        let settings = settings.sound();
         Self {
-            settings,
+            settings: settings.sound(),
             options: Options::default(),
             picker: Picker::default(),
             estimators: [SpeedEstimator::default(); STAGES],
             kappa: [1.0; STAGES],
-            late: LateMargin::new(settings.late),
+            misses: MissCounter::default(),
             hold: ChoiceHold::default(),
             trim: Trim::default(),
             predictions: [None; IN_FLIGHT],
-            unsettled: UNSETTLED + LEARNING,
+            unsettled: UNSETTLED,
             plan: Plan::default(),
             table: [0; STAGES],
             chosen_for: None,
@@ -196,7 +187,6 @@ impl Adaptive {
     /// Takes other settings from the next choice on.
     pub fn set_settings(&mut self, settings: Settings) {
         self.settings = settings.sound();
-        self.late.set_share(self.settings.late);
         self.chosen_for = None;
     }
 
@@ -221,39 +211,28 @@ impl Adaptive {
         }
         self.plan.predicted = self.cost(&terms) + fixed;
         self.plan.budget = budget;
-        let (usable, informed) = (self.unsettled <= LEARNING, self.unsettled == 0);
+        let usable = self.unsettled == 0;
         self.unsettled = self.unsettled.saturating_sub(1);
-        let Self { table, plan: Plan { predicted: whole, .. }, .. } = *self;
-        self.predictions[frame as usize % IN_FLIGHT] =
-            Some(Prediction { frame, target, table, whole, usable, informed });
+        self.predictions[frame as usize % IN_FLIGHT] = Some(Prediction { frame, target, table: self.table, usable });
         self.plan
     }
 
     /// Reports the time that a stage of a frame took, ticks, without the fixed part. Measurements may come late, and in any order.
     pub fn observe(&mut self, frame: u64, stage: usize, took: f64) -> FilterUpdate {
-        let Some(prediction) = self.predictions[frame as usize % IN_FLIGHT] else { return FilterUpdate::Rejected };
-        if prediction.frame != frame || !prediction.usable || stage >= STAGES {
-            return FilterUpdate::Rejected;
+        match self.predictions[frame as usize % IN_FLIGHT] {
+            Some(prediction) if prediction.frame == frame && prediction.usable && stage < STAGES => self.estimators
+                [stage]
+                .observe(prediction.table[stage] as f64 / prediction.target, took / prediction.target),
+            _ => FilterUpdate::Rejected,
         }
-        let before = self.estimators[stage].kappa();
-        let (table, target) = (prediction.table[stage] as f64, prediction.target);
-        let update = self.estimators[stage].observe(table / target, took / target);
-        let slower = update == FilterUpdate::NewRegime && self.estimators[stage].kappa() > before;
-        if slower && prediction.informed && self.late.forgive() {
-            // those in flight do not know of it either
-            self.predictions.iter_mut().flatten().for_each(|prediction| prediction.informed = false);
-        }
-        update
     }
 
-    /// Reports the time that a whole frame took with its fixed part, ticks: for the margin and the trim.
+    /// Reports the time that a whole frame took, ticks: for the miss ladder and the trim.
     pub fn finished(&mut self, frame: u64, took: f64) {
         match self.predictions[frame as usize % IN_FLIGHT] {
             Some(prediction) if prediction.frame == frame && prediction.usable && took.is_finite() => {
-                if prediction.informed {
-                    self.late.observe(prediction.whole, took);
-                }
-                let left_over = 1.0 - self.margin() - took / prediction.target;
+                self.misses.observe(took / prediction.target);
+                let left_over = 1.0 - self.settings.margin - took / prediction.target;
                 self.trim.observe(left_over, self.plan.lambda == 0.0);
             }
             _ => {}
@@ -262,7 +241,7 @@ impl Adaptive {
 
     /// Reports an outside disturbance (a resize, a shader compiled, a hidden window): measurements of the next few frames are ignored.
     pub fn disturb(&mut self) {
-        self.unsettled = UNSETTLED + LEARNING;
+        self.unsettled = UNSETTLED;
         self.predictions = [None; IN_FLIGHT];
     }
 
@@ -294,7 +273,9 @@ impl Adaptive {
     /// The present margin, as a fraction of T.
     #[must_use]
     pub fn margin(&self) -> f64 {
-        self.settings.margin.max(self.late.margin())
+        let used = self.estimators.iter().zip(&self.table).filter(|(_, table)| **table > 0);
+        let sigma = used.map(|(estimator, _)| estimator.sigma()).fold(0.0, f64::max);
+        self.settings.margin.max((self.settings.sigmas + self.misses.extra_sigmas()) * sigma).min(MARGIN_MAX)
     }
 
     fn cost(&self, terms: &Terms) -> f64 {

@@ -24,7 +24,7 @@ const SIGMA_MEMORY: f64 = 0.97;
 /// An error past this many σ is an outlier …
 const OUTLIER: f64 = 4.0;
 /// … unless this many in a row err on the same side: then the machine has changed.
-pub(super) const IN_A_ROW: i8 = 3;
+const IN_A_ROW: i8 = 3;
 /// Range of κ whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
 const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
 

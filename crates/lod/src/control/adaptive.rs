@@ -105,7 +105,7 @@ impl AdaptiveChoice {
     pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) {
         let DrawnChoice { frame, plan, fixed_s } = self.drawn;
         self.law.observe(frame, DRAWING, TICKS * drawn_s);
-        self.law.finished(frame, TICKS * (work_s + others_s));
+        self.law.finished(frame, TICKS * work_s);
         let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
         let spent_s = plan.predicted / TICKS - fixed_s;
         let in_time = work_s <= (1.0 - self.margin()) * target_s;

@@ -126,8 +126,7 @@ pub struct TargetFile {
     /// Gain λ of the corrected law on the error's change, 0 … 1.99. Default: the law's own.
     #[schemars(range(min = gains::LEAD.0, max = gains::LEAD.1))]
     pub lead: Option<f64>,
-    /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02;
-    /// `adaptive` leaves more where times scatter.
+    /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02.
     #[schemars(range(min = gains::MARGIN.0, max = gains::MARGIN.1))]
     pub margin: Option<f64>,
     /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the

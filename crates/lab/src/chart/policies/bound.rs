@@ -163,7 +163,7 @@ fn counter_example() -> Problem {
 
 /// Benefit of the default policy on a problem, without a margin for prediction errors; zero where it exceeds the budget.
 fn ours(problem: &Problem) -> u64 {
-    let mut adaptive = Adaptive::new(Settings { margin: 0.0, late: 1.0, ..Settings::default() });
+    let mut adaptive = Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, ..Settings::default() });
     let droppable = problem.mode() == Mode::AtMostOne;
     for object in 0..problem.len() {
         let offer = |e: &Entry| Offer { cost: e.cost as f64, gain: e.benefit as f64 };
