@@ -1,23 +1,15 @@
 //! What happens between two looks at a world is told all the same.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_core::SimSpan;
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Contact, EventFilter, Happening, Rigid, Scene, Touched, World};
+use metachron_world::{Contact, EventFilter, Happening, Rigid, Scene, Touched, World, static_solid};
 
 fn bouncing(restitution: f64) -> World {
     let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.3, 0.0, 0.55]).restitution(restitution).rate_hz(240.0);
     // of the two coefficients the greater counts
-    let floor = Obstacle {
-        name: "floor".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::NONE,
-    };
+    let floor = Obstacle { restitution: 0.0, ..static_solid("floor", Solid::Plane) };
     let scene = Scene::builder().obstacle(floor).add("ball", ball).build().unwrap();
     World::start(&scene, ExecutorKind::Lockstep).unwrap()
 }
