@@ -22,6 +22,8 @@ pub mod scenes;
 
 pub use metachron_contact as contact;
 pub use metachron_core as core;
+#[cfg(feature = "export")]
+pub use metachron_export as export;
 pub use metachron_geometry as geometry;
 #[cfg(feature = "lab")]
 pub use metachron_lab as lab;

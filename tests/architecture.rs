@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates, and the crates of this workspace that each may depend on.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("agents/core", &[]),
     ("agents/geometry", &["core"]),
     ("agents/contact", &["core", "geometry"]),
@@ -13,6 +13,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("crates/runtime", &["core", "geometry", "contact"]),
     ("crates/world", &["core", "geometry", "contact", "models", "runtime"]),
     ("crates/scene", &["core", "geometry", "contact", "models", "world"]),
+    ("crates/export", &["core", "geometry", "runtime", "world"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry"]),
     ("crates/session", &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render"]),

@@ -1,0 +1,282 @@
+//! MCAP files with Foxglove's scenes: opened by Foxglove, Lichtblick and Rerun.
+//!
+//! In: moments. Out: `/scene` (foxglove.SceneUpdate), `/tf` (foxglove.FrameTransform), `/state` (metachron.State), all in JSON.
+//! Never here: compression, other encodings.
+
+use super::moment::ObjectMoment;
+use super::surface::Surface;
+use super::{ExportError, Moment, MomentWriter};
+use glam::{DQuat, DVec3};
+use mcap::records::MessageHeader;
+use mcap::{McapError, WriteOptions, Writer};
+use metachron_core::{AgentId, Body, SimTime};
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+/// A chunk is closed, and what came before is safe from a crash, after so much simulated time.
+const CHUNK_S: f64 = 1.0;
+/// The frame that all others are in.
+const WORLD: &str = "world";
+
+/// A file in MCAP.
+///
+/// Times are simulated time since the start of the run.
+/// `/scene`: every object as a list of triangles; a rigid body's once, in a frame of its name, which `/tf` moves.
+/// `/state`: `{"name", "time", "snapshot"}` for every object that has a new state, the snapshot with all its fields
+/// (`metachron_core::Snapshot`). A file that was cut short opens up to about its last second.
+pub struct McapFile {
+    path: PathBuf,
+    writer: Writer<BufWriter<File>>,
+    channels: Channels,
+    sequence: u32,
+    flushed: SimTime,
+    /// Bodies whose triangles the file holds already, and the steps of every object's newest state in it.
+    rigid: BTreeSet<AgentId>,
+    steps: BTreeMap<AgentId, u64>,
+    /// What was in the scene a moment ago.
+    shown: BTreeMap<AgentId, std::sync::Arc<str>>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Channels {
+    scene: u16,
+    transforms: u16,
+    states: u16,
+}
+
+impl std::fmt::Debug for McapFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("McapFile").field("path", &self.path).field("messages", &self.sequence).finish_non_exhaustive()
+    }
+}
+
+impl McapFile {
+    /// Begins a file, over one that exists; `fixed` are the solids that never move.
+    ///
+    /// # Errors
+    /// [`ExportError`] where it cannot be written.
+    pub fn create(path: &Path, fixed: &Surface) -> Result<Self, ExportError> {
+        let file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
+        let options = WriteOptions::new().compression(None).library(concat!("metachron ", env!("CARGO_PKG_VERSION")));
+        let at = failed(path);
+        let mut writer = options.create(file).map_err(&at)?;
+        let mut channel = |topic: &str, name: &str, schema: &Value| {
+            let schema = writer.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
+            writer.add_channel(schema, topic, "json", &BTreeMap::new())
+        };
+        let channels = Channels {
+            scene: channel("/scene", "foxglove.SceneUpdate", &scene_schema()).map_err(&at)?,
+            transforms: channel("/tf", "foxglove.FrameTransform", &transform_schema()).map_err(&at)?,
+            states: channel("/state", "metachron.State", &state_schema()).map_err(&at)?,
+        };
+        let (rigid, steps, shown) = Default::default();
+        let path = path.to_owned();
+        let mut it = Self { path, writer, channels, sequence: 0, flushed: SimTime::ZERO, rigid, steps, shown };
+        let start = SimTime::ZERO;
+        let entity = entity("fixed", WORLD, start, fixed);
+        it.put(channels.scene, start, &json!({ "deletions": [], "entities": [entity] }))?;
+        Ok(it)
+    }
+
+    fn put(&mut self, channel_id: u16, time: SimTime, message: &Value) -> Result<(), ExportError> {
+        let header = MessageHeader {
+            channel_id,
+            sequence: self.sequence,
+            log_time: time.as_nanos(),
+            publish_time: time.as_nanos(),
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, message.to_string().as_bytes()).map_err(failed(&self.path))
+    }
+
+    /// The entities of a moment: what bends is sent anew, a rigid body once.
+    fn scene(&mut self, moment: &Moment) -> Value {
+        let mut entities = Vec::new();
+        for object in moment.objects.iter().filter(|object| !object.surface.triangles.is_empty()) {
+            if let Body::Rigid(body) = &object.state.body {
+                if self.rigid.insert(object.id) {
+                    let local = in_axes_of(&object.surface, body.position, body.rotation);
+                    entities.push(entity(&object.name, &object.name, moment.time, &local));
+                }
+            } else {
+                entities.push(entity(&object.name, WORLD, moment.time, &object.surface));
+            }
+        }
+        let now: BTreeMap<_, _> = moment.objects.iter().map(|object| (object.id, object.name.clone())).collect();
+        let gone = self.shown.iter().filter(|(id, _)| !now.contains_key(id));
+        let deletions: Vec<_> =
+            gone.map(|(_, name)| json!({ "timestamp": stamp(moment.time), "type": 0, "id": **name })).collect();
+        self.shown = now;
+        json!({ "deletions": deletions, "entities": entities })
+    }
+
+    fn transform(&mut self, time: SimTime, object: &ObjectMoment) -> Result<(), ExportError> {
+        let Body::Rigid(body) = &object.state.body else { return Ok(()) };
+        let message = json!({
+            "timestamp": stamp(time),
+            "parent_frame_id": WORLD,
+            "child_frame_id": *object.name,
+            "translation": vector(body.position),
+            "rotation": rotation(body.rotation),
+        });
+        self.put(self.channels.transforms, time, &message)
+    }
+
+    fn state(&mut self, time: SimTime, object: &ObjectMoment) -> Result<(), ExportError> {
+        if self.steps.insert(object.id, object.state.steps) == Some(object.state.steps) {
+            return Ok(());
+        }
+        let message =
+            json!({ "name": *object.name, "time": object.state.time.as_secs_f64(), "snapshot": *object.state });
+        self.put(self.channels.states, time, &message)
+    }
+}
+
+impl MomentWriter for McapFile {
+    fn write(&mut self, moment: &Moment) -> Result<(), ExportError> {
+        let scene = self.scene(moment);
+        for object in &moment.objects {
+            self.transform(moment.time, object)?;
+            self.state(moment.time, object)?;
+        }
+        self.put(self.channels.scene, moment.time, &scene)?;
+        if moment.time.secs_after(self.flushed) >= CHUNK_S {
+            self.flushed = moment.time;
+            self.writer.flush().map_err(failed(&self.path))?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), ExportError> {
+        self.writer.finish().map(|_| ()).map_err(failed(&self.path))
+    }
+}
+
+fn failed(path: &Path) -> impl Fn(McapError) -> ExportError {
+    let path = path.to_owned();
+    move |error| {
+        let source = match error {
+            McapError::Io(source) => source,
+            other => std::io::Error::other(other),
+        };
+        ExportError::File { path: path.clone(), source }
+    }
+}
+
+fn stamp(time: SimTime) -> Value {
+    const NANOS: u64 = 1_000_000_000;
+    json!({ "sec": time.as_nanos() / NANOS, "nsec": time.as_nanos() % NANOS })
+}
+
+fn vector(v: DVec3) -> Value {
+    json!({ "x": v.x, "y": v.y, "z": v.z })
+}
+
+fn rotation(q: DQuat) -> Value {
+    json!({ "x": q.x, "y": q.y, "z": q.z, "w": q.w })
+}
+
+fn in_axes_of(surface: &Surface, position: DVec3, rotation: DQuat) -> Surface {
+    let back = rotation.inverse();
+    Surface { points: surface.points.iter().map(|p| back * (*p - position)).collect(), ..surface.clone() }
+}
+
+/// An entity that stays until another of its id comes.
+fn entity(id: &str, frame: &str, time: SimTime, surface: &Surface) -> Value {
+    json!({
+        "timestamp": stamp(time),
+        "frame_id": frame,
+        "id": id,
+        "lifetime": { "sec": 0, "nsec": 0 },
+        "frame_locked": true,
+        "metadata": [],
+        "arrows": [], "cubes": [], "spheres": [], "cylinders": [], "lines": [], "texts": [], "models": [],
+        "triangles": [{
+            "pose": { "position": vector(DVec3::ZERO), "orientation": rotation(DQuat::IDENTITY) },
+            "points": surface.points.iter().map(|p| vector(*p)).collect::<Vec<_>>(),
+            "color": colour(id),
+            "colors": [],
+            "indices": surface.triangles.iter().flatten().collect::<Vec<_>>(),
+        }],
+    })
+}
+
+/// A colour that goes with a name: a hue from its bytes.
+fn colour(name: &str) -> Value {
+    if name == "fixed" {
+        return json!({ "r": 0.6, "g": 0.6, "b": 0.6, "a": 1.0 });
+    }
+    let hash = name.bytes().fold(0_u32, |hash, byte| hash.wrapping_mul(31).wrapping_add(u32::from(byte)));
+    let hue = f64::from(hash % 360) / 60.0;
+    let channel = |shift: f64| 0.35 + 0.55 * (((hue + shift) % 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+    json!({ "r": channel(0.0), "g": channel(4.0), "b": channel(2.0), "a": 1.0 })
+}
+
+fn object_of(properties: &Value) -> Value {
+    json!({ "type": "object", "properties": properties })
+}
+
+fn time_schema() -> Value {
+    object_of(&json!({ "sec": { "type": "integer" }, "nsec": { "type": "integer" } }))
+}
+
+fn vector_schema() -> Value {
+    object_of(&json!({ "x": { "type": "number" }, "y": { "type": "number" }, "z": { "type": "number" } }))
+}
+
+fn rotation_schema() -> Value {
+    let number = json!({ "type": "number" });
+    object_of(&json!({ "x": number, "y": number, "z": number, "w": number }))
+}
+
+fn transform_schema() -> Value {
+    object_of(&json!({
+        "timestamp": time_schema(),
+        "parent_frame_id": { "type": "string" },
+        "child_frame_id": { "type": "string" },
+        "translation": vector_schema(),
+        "rotation": rotation_schema(),
+    }))
+}
+
+fn state_schema() -> Value {
+    object_of(&json!({
+        "name": { "type": "string" },
+        "time": { "type": "number", "description": "the object's own time, seconds" },
+        "snapshot": { "type": "object", "description": "its published state; metres, kilograms, seconds, newtons, joules" },
+    }))
+}
+
+/// Foxglove's schema of scenes; lists that stay empty are declared as lists of anything.
+fn scene_schema() -> Value {
+    let list = |items: Value| json!({ "type": "array", "items": items });
+    let any = list(json!({}));
+    let number = json!({ "type": "number" });
+    let colour = object_of(&json!({ "r": number, "g": number, "b": number, "a": number }));
+    let triangles = object_of(&json!({
+        "pose": object_of(&json!({ "position": vector_schema(), "orientation": rotation_schema() })),
+        "points": list(vector_schema()),
+        "color": colour,
+        "colors": list(colour.clone()),
+        "indices": list(json!({ "type": "integer" })),
+    }));
+    let entity = object_of(&json!({
+        "timestamp": time_schema(),
+        "frame_id": { "type": "string" },
+        "id": { "type": "string" },
+        "lifetime": time_schema(),
+        "frame_locked": { "type": "boolean" },
+        "metadata": any, "arrows": any, "cubes": any, "spheres": any, "cylinders": any, "lines": any,
+        "triangles": list(triangles),
+        "texts": any, "models": any,
+    }));
+    let deletion = object_of(&json!({
+        "timestamp": time_schema(),
+        "type": { "type": "integer" },
+        "id": { "type": "string" },
+    }));
+    object_of(&json!({ "deletions": list(deletion), "entities": list(entity) }))
+}
