@@ -29,6 +29,12 @@ impl CollisionShape {
         Self { kind, friction, restitution: 0.0, traits: ContactTraits::default() }
     }
 
+    /// Whether it is the skin of what has cells: of a sheet or a solid.
+    #[must_use]
+    pub fn has_cells(&self) -> bool {
+        matches!(&self.kind, ShapeKind::Surface(surface) if !surface.triangles.is_empty())
+    }
+
     /// Whether the two collide or sense each other where they meet.
     #[must_use]
     pub const fn meets(&self, other: &Self) -> bool {
@@ -183,7 +189,9 @@ impl PlacedShape<'_> {
         match (&self.form.kind, self.view) {
             (ShapeKind::Solid(solid), ShapePose::Solid { position, .. }) => Aabb::about(position, solid.radius_m),
             (ShapeKind::Tool(tool), ShapePose::Tool { tip, .. }) => Aabb::about(tip, tool.reach_m()),
-            (ShapeKind::Surface(surface), ShapePose::Surface(positions)) => surface.bounds(positions),
+            (ShapeKind::Surface(surface), ShapePose::Surface(positions)) => {
+                surface.bounds(positions).grown(surface.radius_m)
+            }
             (_, ShapePose::Chain { positions, radii_m }) => {
                 Aabb::of(positions).grown(radii_m.iter().copied().fold(0.0, f64::max))
             }
@@ -261,13 +269,11 @@ impl ContactSide {
 }
 
 impl SurfaceShape {
-    /// The box around it where its vertices are at `positions`, with its thickness, metres. A vertex that is in no triangle any more does not
-    /// count.
+    /// The box around its vertices where these are at `positions`, metres: one that is in no triangle any more does not count.
     #[must_use]
     pub fn bounds(&self, positions: &[DVec3]) -> Aabb {
         let at = self.vertices.iter().filter_map(|vertex| positions.get(*vertex as usize));
         at.fold(Aabb::of(&[]), |Aabb { low, high }, p| Aabb { low: low.min(*p), high: high.max(*p) })
-            .grown(self.radius_m)
     }
 }
 

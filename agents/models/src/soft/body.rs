@@ -172,7 +172,7 @@ impl SoftBody {
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
         let Aabb { low, high } = match &self.form.kind {
-            ShapeKind::Surface(surface) => surface.bounds(self.seen()),
+            ShapeKind::Surface(surface) => surface.bounds(self.seen()).grown(surface.radius_m),
             _ => Aabb::of(self.seen()),
         };
         let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
