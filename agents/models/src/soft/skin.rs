@@ -155,10 +155,23 @@ impl Skin {
 
     /// What carries the point of the skin with these shares of three of its points.
     pub fn carried_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Carried {
+        let (material_m, inward) = self.material_at(vertices, shares);
+        self.carrier.carry(material_m, inward)
+    }
+
+    /// The cell of a cage that carries the same point, by its number; none of a lattice.
+    pub fn cell_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Option<u32> {
+        let Carrier::Cage(cage) = &self.carrier else { return None };
+        let (material_m, inward) = self.material_at(vertices, shares);
+        Some(cage.cell_under(material_m, inward) as u32)
+    }
+
+    /// Where the same point is in material coordinates, and the direction into the body there.
+    fn material_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> (DVec3, DVec3) {
         let mean = |of: &[DVec3]| vertices.into_iter().zip(shares).map(|(v, share)| of[v as usize] * share).sum();
         // a place on an edge has two vertices alone
         let inward = into_body(vertices.map(|vertex| self.rest[vertex as usize])).try_normalize();
-        self.carrier.carry(mean(&self.material), inward.unwrap_or_else(|| mean(&self.inward)))
+        (mean(&self.material), inward.unwrap_or_else(|| mean(&self.inward)))
     }
 
     /// The point of the skin that stands for a node.
