@@ -100,6 +100,7 @@ fn kind(what: &Happening) -> &'static str {
         Happening::Left => "left",
         Happening::AttachmentGave => "attachment_gave",
         Happening::RateMissed => "rate_missed",
+        Happening::Carved(_) => "carved",
         _ => "unknown",
     }
 }

@@ -272,6 +272,13 @@ impl World {
         self.send(&object, Command::velocity(velocity.0, spin.0))
     }
 
+    /// Removes the cells of a solid or a sheet within a radius of a line, m; of a point where it has no other end.
+    #[pyo3(signature = (object, start, radius, end = None))]
+    fn carve(&self, object: Named<'_>, start: Vector, radius: f64, end: Option<Vector>) -> PyResult<()> {
+        let to = end.map_or(start.0, |Vector(end)| end);
+        self.send(&object, Command::carve(start.0, to, radius))
+    }
+
     /// Drives a joint, by name or by its number in the scene; without a goal, no longer.
     #[pyo3(signature = (joint, **keywords))]
     fn motor(&self, joint: NamedJoint, keywords: Option<&Given<'_>>) -> PyResult<()> {

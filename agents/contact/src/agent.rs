@@ -8,7 +8,8 @@ use crate::stepper::ClusterMember;
 use crate::{Law, Link};
 use glam::{DQuat, DVec3};
 use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport,
+    AgentId, Anchor, Archive, ArchiveError, Body, Removed, Resolution, SimSpan, SimTime, Snapshot, StepError,
+    StepReport,
 };
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
@@ -54,6 +55,13 @@ pub trait Agent: Send {
         false
     }
 
+    /// Removes the cells whose middles are within `carving`, between two steps: what went; `None`, and no change, where there are none, where
+    /// none would be left, and for a model without cells.
+    fn carve(&mut self, carving: &Carving) -> Option<Removed> {
+        let _ = carving;
+        None
+    }
+
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 
@@ -74,7 +82,8 @@ pub trait Agent: Send {
     /// Total mass in kilograms; zero for a model that has none.
     fn mass_kg(&self) -> f64;
 
-    /// The contact shape, constant over the agent's life; `None` where nothing can touch it.
+    /// The contact shape; `None` where nothing can touch it. It is the same until [`Self::carve`] or [`Self::archive`] makes another, of the
+    /// same kind, with the same traits and numbers of vertices.
     fn form(&self) -> Option<Arc<CollisionShape>> {
         None
     }
@@ -186,6 +195,33 @@ impl SetMotion {
         let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
         let turns = |q: DQuat| q.is_finite() && q.length_squared() > 0.25;
         vectors.into_iter().flatten().all(DVec3::is_finite) && self.rotation.is_none_or(turns)
+    }
+}
+
+/// A region of space, world axes: all that is within a radius of a line. A ball where both its ends are one point.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Carving {
+    /// One end of the line, metres.
+    pub from_m: DVec3,
+    /// The other end, metres.
+    pub to_m: DVec3,
+    /// The radius, metres, > 0.
+    pub radius_m: f64,
+}
+
+impl Carving {
+    /// Whether every number is finite, and the radius above zero.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.from_m.is_finite() && self.to_m.is_finite() && self.radius_m.is_finite() && self.radius_m > 0.0
+    }
+
+    /// Whether a point is in it.
+    #[must_use]
+    pub fn holds(&self, point_m: DVec3) -> bool {
+        let (line, to) = (self.to_m - self.from_m, point_m - self.from_m);
+        let share = if line == DVec3::ZERO { 0.0 } else { (to.dot(line) / line.length_squared()).clamp(0.0, 1.0) };
+        (to - line * share).length_squared() <= self.radius_m * self.radius_m
     }
 }
 

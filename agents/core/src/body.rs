@@ -32,7 +32,7 @@ pub enum Body {
     Soft(SoftState),
 }
 
-/// The vertices of a soft body. What joins them never changes (`metachron_geometry::SurfaceShape`).
+/// The vertices of a soft body. What joins them is the agent's shape (`metachron_geometry::SurfaceShape`).
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct SoftState {
     /// Positions, metres, world axes.

@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, SensorTouch};
+use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, Removed, SensorTouch};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -58,6 +58,8 @@ pub struct Snapshot {
     pub events: Vec<AttachmentEvent>,
     /// What touched a sensor, or sensed it, since the start; each pair is reported by one of its two agents.
     pub sensed: Vec<SensorTouch>,
+    /// What was taken out of it since the start.
+    pub removed: Removed,
 }
 
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
@@ -82,7 +84,7 @@ impl Snapshot {
         self.touches.clear();
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
-        self.drift_m = 0.0;
+        (self.drift_m, self.removed) = (0.0, Removed::default());
         self.pairs.clear();
         self.contacts.clear();
         self.cluster = None;

@@ -298,12 +298,15 @@ impl Cage {
     /// Takes cells away, not all of them; those that are left are numbered anew in the same order, nodes keep their numbers, and what was in a
     /// cell that is gone belongs to the nearest one that is left.
     pub fn remove(&mut self, is_gone: &[bool]) {
-        let mut left = 0..;
-        let number: Vec<u32> =
-            is_gone.iter().map(|gone| if *gone { NONE } else { left.next().unwrap_or(NONE) }).collect();
         let mut gone = is_gone.iter();
         self.cells.retain(|_| !gone.next().copied().unwrap_or_default());
-        self.cell_at.iter_mut().for_each(|cell| *cell = number[*cell as usize]);
+        // from the cells alone: whatever went first, the same are left
+        self.cell_at.fill(NONE);
+        for (number, cell) in (0..).zip(&self.cells) {
+            let place = (self.nodes_m[cell.corners[0] as usize] - self.low) / self.cell_m;
+            let [i, j, k] = place.to_array().map(|at| at.round() as usize);
+            self.cell_at[i + self.counts[0] * (j + self.counts[1] * k)] = number;
+        }
         self.spread_cells();
     }
 

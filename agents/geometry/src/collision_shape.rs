@@ -1,6 +1,6 @@
 //! The shape of an agent as others need it for contact, and its placement.
 //!
-//! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, fixed for an agent's life and shared, and [`PlacedShape`] ones.
+//! In: solids, tubes, tools, soft surfaces. Out: [`CollisionShape`]s, which never change and are shared, and [`PlacedShape`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
 
 use super::narrow_phase::{TouchKey, VoronoiRegions};
@@ -27,6 +27,12 @@ impl CollisionShape {
     #[must_use]
     pub fn new(kind: ShapeKind, friction: f64) -> Self {
         Self { kind, friction, restitution: 0.0, traits: ContactTraits::default() }
+    }
+
+    /// Whether it is the skin of what has cells: of a sheet or a solid.
+    #[must_use]
+    pub fn has_cells(&self) -> bool {
+        matches!(&self.kind, ShapeKind::Surface(surface) if !surface.triangles.is_empty())
     }
 
     /// Whether the two collide or sense each other where they meet.
@@ -84,7 +90,7 @@ pub enum ShapeKind {
     Surface(SurfaceShape),
 }
 
-/// The topology of a soft body's skin; it never changes.
+/// The topology of a soft body's skin; where matter is taken out of the body, it is another one between the same vertices.
 #[derive(Debug, Clone)]
 pub struct SurfaceShape {
     /// The vertices of the skin, by rising numbers.
@@ -183,7 +189,9 @@ impl PlacedShape<'_> {
         match (&self.form.kind, self.view) {
             (ShapeKind::Solid(solid), ShapePose::Solid { position, .. }) => Aabb::about(position, solid.radius_m),
             (ShapeKind::Tool(tool), ShapePose::Tool { tip, .. }) => Aabb::about(tip, tool.reach_m()),
-            (ShapeKind::Surface(surface), ShapePose::Surface(positions)) => Aabb::of(positions).grown(surface.radius_m),
+            (ShapeKind::Surface(surface), ShapePose::Surface(positions)) => {
+                surface.bounds(positions).grown(surface.radius_m)
+            }
             (_, ShapePose::Chain { positions, radii_m }) => {
                 Aabb::of(positions).grown(radii_m.iter().copied().fold(0.0, f64::max))
             }
@@ -257,6 +265,15 @@ impl ContactSide {
     #[must_use]
     pub const fn point() -> Self {
         Self { outward: DVec3::ZERO, sign: 1.0 }
+    }
+}
+
+impl SurfaceShape {
+    /// The box around its vertices where these are at `positions`, metres: one that is in no triangle any more does not count.
+    #[must_use]
+    pub fn bounds(&self, positions: &[DVec3]) -> Aabb {
+        let at = self.vertices.iter().filter_map(|vertex| positions.get(*vertex as usize));
+        at.fold(Aabb::of(&[]), |Aabb { low, high }, p| Aabb { low: low.min(*p), high: high.max(*p) })
     }
 }
 

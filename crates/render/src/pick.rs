@@ -154,9 +154,10 @@ fn hit_mesh(mesh: &PrimitiveMesh, size: Rounding, ray: Ray) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scene_view::{Actor, Appearance, Material, States};
+    use super::super::scene_view::{Actor, Appearance, Material, SkinForm, States};
     use super::*;
     use metachron_core::{RigidState, SimTime, Snapshot};
+    use metachron_geometry::{CollisionShape, ShapeKind};
     use std::sync::Arc;
 
     fn scene_view(forms: Vec<(Form, Body)>) -> SceneView {
@@ -206,5 +207,35 @@ mod tests {
         let hit = scene_view.pick(Ray { origin: DVec3::new(0.0, 0.63, 0.0), direction: DVec3::X }).unwrap();
         let Anchor::Arc(arc) = hit.anchor else { panic!("{hit:?}") };
         assert!((arc - 0.63).abs() < 1e-12 && (hit.distance_m - 1.95).abs() < 1e-12, "{hit:?}");
+    }
+
+    #[test]
+    fn a_ray_goes_through_where_a_skin_has_lost_its_triangles() {
+        let corner = |k: u32| DVec3::new(2.0 + f64::from(k >> 2), f64::from(k & 1) - 0.5, f64::from(k >> 1 & 1) - 0.4);
+        let positions: Vec<DVec3> = (0..8).map(corner).collect();
+        let surface = |triangles: &[[u32; 3]]| SurfaceShape {
+            vertices: (0..8).collect(),
+            edges: [].into(),
+            triangles: triangles.into(),
+            fans: Arc::default(),
+            radius_m: 0.0,
+            edge_m: 1.0,
+            closed: true,
+        };
+        let [near, far] = [[[0, 2, 1], [1, 2, 3]], [[4, 5, 6], [5, 7, 6]]];
+        let whole = surface(&[near, far].concat());
+        let soft = SoftState { velocities: vec![DVec3::ZERO; 8], positions };
+        let form = Form::Skin(SkinForm::new(whole, &soft.positions));
+        let mut scene_view = scene_view(vec![(form, Body::Soft(soft))]);
+        let distance_m = |view: &SceneView| {
+            let hit = view.pick(Ray { origin: DVec3::ZERO, direction: DVec3::X });
+            hit.map(|hit| hit.distance_m)
+        };
+        assert_eq!(distance_m(&scene_view), Some(2.0));
+        let shape = |triangles: &[[u32; 3]]| CollisionShape::new(ShapeKind::Surface(surface(triangles)), 0.0);
+        scene_view.set_shape(AgentId(0), &shape(&far));
+        assert_eq!(distance_m(&scene_view), Some(3.0));
+        scene_view.set_shape(AgentId(0), &shape(&[]));
+        assert_eq!(distance_m(&scene_view), None);
     }
 }

@@ -13,7 +13,7 @@ use super::view::{Camera, Size};
 use super::visibility::{Survey, Visibility};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
-use metachron_geometry::SurfaceShape;
+use metachron_geometry::{Aabb, CollisionShape, ShapeKind, SurfaceShape};
 use metachron_geometry::{
     Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
 };
@@ -119,6 +119,17 @@ impl SkinForm {
             edges: SkinEdges::of(&surface.triangles),
             surface,
         }
+    }
+
+    /// Takes other triangles between the same vertices.
+    fn set_surface(&mut self, surface: &SurfaceShape) {
+        if Arc::ptr_eq(&self.surface.triangles, &surface.triangles) {
+            return;
+        }
+        if self.surface.triangles != surface.triangles {
+            self.edges = SkinEdges::of(&surface.triangles);
+        }
+        self.surface = surface.clone();
     }
 }
 
@@ -232,6 +243,14 @@ impl Bounds {
         Self { centre, radius_m, half_m: DVec3::splat(radius_m) }
     }
 
+    /// Bounds of what is in a box; of nothing where that is empty.
+    fn within(Aabb { low, high }: Aabb) -> Self {
+        if high.cmplt(low).any() {
+            return Self::default();
+        }
+        Self { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high), half_m: 0.5 * (high - low) }
+    }
+
     /// Bounds of points, with a skin of this thickness.
     fn of(points: &[DVec3], skin_m: f64) -> Self {
         let corners = points.iter().copied().reduce(DVec3::min).zip(points.iter().copied().reduce(DVec3::max));
@@ -276,13 +295,25 @@ impl SceneView {
     /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
     /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
     pub fn set_snapshot(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
+        if let Some(track) = self.track_mut(id) {
+            track.set_snapshot(newest, awake);
+        }
+    }
+
+    /// Receives the newest contact shape of an agent: the skin of a sheet or a solid is drawn and picked by it from now on.
+    pub fn set_shape(&mut self, id: AgentId, shape: &CollisionShape) {
+        let ShapeKind::Surface(surface) = &shape.kind else { return };
+        if let Some(Track { actor: Actor { form: Form::Skin(skin), .. }, .. }) = self.track_mut(id) {
+            skin.set_surface(surface);
+        }
+    }
+
+    fn track_mut(&mut self, id: AgentId) -> Option<&mut Track> {
         // the index of an actor is mostly its agent's number
         let here = |track: &Track| track.actor.id == id;
         let at = id.0 as usize;
         let at = if self.tracks.get(at).is_some_and(here) { Some(at) } else { self.tracks.iter().position(here) };
-        if let Some(track) = at.and_then(|at| self.tracks.get_mut(at)) {
-            track.set_snapshot(newest, awake);
-        }
+        at.and_then(|at| self.tracks.get_mut(at))
     }
 
     /// Poses every object at the frame's time by the rule of `states`, except those that rest and are shown at rest; returns the number
@@ -393,7 +424,11 @@ impl Track {
                 Bounds::ball(tool.tip - tool.rotation * DVec3::Z * half, 1.2 * half)
             }
             Body::Curve(curve) => Bounds::of(&curve.positions, curve.radii_m.iter().copied().fold(0.0, f64::max)),
-            Body::Soft(soft) => Bounds::of(&soft.positions, 0.0),
+            Body::Soft(soft) => match &self.actor.form {
+                // a vertex that its skin has no more is anywhere
+                Form::Skin(skin) => Bounds::within(skin.surface.bounds(&soft.positions)),
+                _ => Bounds::of(&soft.positions, 0.0),
+            },
         }
     }
 }

@@ -13,6 +13,7 @@ use super::agent_clock::{AgentClock, LAG_CAP, Start};
 use super::cluster::{ClusterSeat, Leap, Led, Span};
 use super::events::{AgentEvent, EventKind};
 use super::faults::Faults;
+use super::form_slot::FormWriter;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::helpers::Helped;
@@ -21,7 +22,7 @@ use super::metrics::{MetricsWriter, SMOOTHING};
 use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
-use metachron_contact::{Agent, Link, SetMotion};
+use metachron_contact::{Agent, Carving, Link, SetMotion};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -39,6 +40,10 @@ pub(super) struct AgentRunner {
     pub governor: Option<Box<dyn Governor>>,
     pub faults: Faults,
     pub writer: SlotWriter<Snapshot>,
+    /// Of its shapes after the first.
+    pub form: FormWriter,
+    /// Matter was taken out of it since its cluster last stepped.
+    pub carved: bool,
     pub observer: Observer,
     pub links: Vec<Link>,
     /// What users do to it; `None` of an agent to which nothing was ever done.
@@ -281,6 +286,7 @@ impl AgentRunner {
         }
         // even if it waits: the awaited agents may wait for one that it leads
         let alone = self.gather(timeline, wall, Leap { start: &start, jumped });
+        self.forget_features();
         if self.waits(wall) || self.should_join() {
             return Ok((None, Effort { work: 0.0, steps: alone }));
         }
@@ -365,7 +371,21 @@ impl AgentRunner {
         if let Some(pressure_pa) = pending.pressure_pa {
             self.agent.set_pressure_pa(pressure_pa);
         }
+        self.carve(&pending.carvings);
         pending.motion.map_or(Ok(()), |motion| self.set_motion(&motion))
+    }
+
+    /// Removes the cells in some regions; others touch and see it without them from now on.
+    fn carve(&mut self, carvings: &[Carving]) {
+        for carving in carvings {
+            if let Some(removed) = self.agent.carve(carving) {
+                self.carved = true;
+                self.tell(EventKind::Carved(removed));
+            }
+        }
+        if self.carved {
+            self.publish_form();
+        }
     }
 
     /// Publishes that nothing of it is left, where nobody finds it.

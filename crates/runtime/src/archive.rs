@@ -14,6 +14,7 @@ impl AgentRunner {
     /// Writes or reads it, without the agents that it leads.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.agent.archive(archive)?;
+        self.publish_form();
         archive_values!(archive, self.pace, self.loads, self.open, self.was_near, self.withheld)?;
         archive_values!(archive, self.announced, self.turn_period)?;
         self.led.archive(archive)?;

@@ -168,6 +168,11 @@ impl ClusterSeat {
         }
     }
 
+    /// Forgets what contacts on edges and triangles of skins have borne.
+    pub fn forget_features(&mut self) {
+        self.memory.forget_features();
+    }
+
     /// Writes or reads what the next turns need of those before.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.memory, self.grips, self.pairs, self.contacts, self.events)?;

@@ -12,7 +12,7 @@
 use super::mailbox::{Command, Keyed};
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::Motor;
-use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, SetMotion, SetMotor};
 use metachron_core::{Anchor, SimSpan};
 
 impl Command {
@@ -69,6 +69,13 @@ impl Command {
             spin_rad_s: Some(spin_rad_s),
             ..SetMotion::default()
         })
+    }
+
+    /// Removes the cells of a solid or a sheet whose middles are within `radius_m`, m, of the line from `from_m` to `to_m`, m, where they are at
+    /// its next step; a ball where both ends are one point. Nothing happens where there are none, or where none would be left.
+    #[must_use]
+    pub const fn carve(from_m: DVec3, to_m: DVec3, radius_m: f64) -> Self {
+        Self::Carve(Carving { from_m, to_m, radius_m })
     }
 
     /// The same under another key, 0 … 7, of a spring or a force; others have none.

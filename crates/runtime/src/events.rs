@@ -9,7 +9,7 @@ use super::sync::atomic::{
     Ordering::{Acquire, Relaxed, Release},
 };
 use glam::DVec3;
-use metachron_core::{AgentId, ContactPartner, SimTime};
+use metachron_core::{AgentId, ContactPartner, Removed, SimTime};
 use std::sync::OnceLock;
 
 /// How many events of one agent are kept for readers.
@@ -50,6 +50,8 @@ pub enum EventKind {
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
+    /// Cells of it were removed.
+    Carved(Removed),
 }
 
 /// A contact when it began, in its first step, when it grew, or when it ended.
@@ -136,6 +138,13 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::ContactGrew(contact) => (9, Some(contact)),
         EventKind::Gone => (10, None),
         EventKind::RateMissed => (8, None),
+        EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
+            words[1] = 11 | u64::from(cells) << 32;
+            words[2] = u64::from(triangles);
+            let numbers = [mass_kg, momentum.x, momentum.y, momentum.z];
+            words[3..].iter_mut().zip(numbers).for_each(|(word, number)| *word = number.to_bits());
+            return words;
+        }
     };
     words[1] = kind;
     if let Some(ContactEvent { with, point_m, normal, force_n }) = other {
@@ -167,6 +176,12 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         8 => EventKind::RateMissed,
         9 => EventKind::ContactGrew(contact),
         10 => EventKind::Gone,
+        11 => EventKind::Carved(Removed {
+            cells: id,
+            triangles: words[2] as u32,
+            mass_kg: f64::from_bits(words[3]),
+            momentum: vector(4),
+        }),
         _ => return None,
     };
     Some(AgentEvent { at: SimTime::from_nanos(words[0]), kind })
@@ -190,6 +205,7 @@ mod tests {
             EventKind::AttachmentGave,
             EventKind::RateMissed,
             EventKind::Gone,
+            EventKind::Carved(Removed { cells: 10, triangles: 24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }
 

@@ -4,6 +4,7 @@
 
 use super::cluster::Handover;
 use super::events::{AgentEvent, EventRing};
+use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
@@ -27,7 +28,7 @@ pub(super) struct Shared {
     pub motored: Box<[u32]>,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
-    pub form: Option<Arc<CollisionShape>>,
+    pub form: FormSlot,
     pub mail: Mailbox,
     pub events: EventRing,
     pub slot: Arc<LatestSlot<Snapshot>>,
@@ -107,10 +108,11 @@ impl AgentHandle {
         Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
     }
 
-    /// Its contact shape, which never changes; `None` where nothing can touch it.
+    /// Its newest contact shape; `None` where nothing can touch it. It is another one, with the same kind, traits and vertices, where matter was
+    /// taken out of it ([`Command::Carve`]).
     #[must_use]
-    pub fn form(&self) -> Option<&CollisionShape> {
-        self.shared.form.as_deref()
+    pub fn form(&self) -> Option<Arc<CollisionShape>> {
+        self.shared.form.latest()
     }
 
     /// State of its execution.

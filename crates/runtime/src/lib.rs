@@ -39,6 +39,7 @@ mod events;
 #[cfg(test)]
 mod executor_tests;
 mod faults;
+mod form_slot;
 mod governor;
 mod handle;
 mod helpers;

@@ -3,7 +3,7 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, SetMotion, SetMotor};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
@@ -31,6 +31,8 @@ pub enum Command {
     SetMotion(SetMotion),
     /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
     SetPressure(f64),
+    /// Its cells in a region of space are removed before its next step; an agent that has none there, or no others, stays as it is.
+    Carve(Carving),
     /// Wake up from rest.
     Wake,
     /// Leave the run for good: nothing of it is left but its number.
@@ -55,7 +57,7 @@ impl<T> Keyed<T> {
     }
 }
 
-/// The most springs, the most forces, and the most points with impulses of one step that an agent takes.
+/// The most springs, the most forces, and the most points with impulses and regions carved in one step that an agent takes.
 pub const KEYS: u32 = 8;
 
 /// Reason why a command was not delivered.
@@ -66,10 +68,14 @@ pub enum SendError {
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
     /// The command holds a number that is not finite or outside its range.
-    #[error("every number must be finite, stiffness and damping not negative, a motor's effort above zero")]
+    #[error(
+        "every number must be finite, stiffness and damping not negative, a motor's effort and a radius above zero"
+    )]
     BadNumber,
-    /// A key that is too large, or impulses at too many points before the agent has taken a step.
-    #[error("an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points a step; keys are 0 to 7")]
+    /// A key that is too large, or impulses at too many points or too many regions before the agent has taken a step.
+    #[error(
+        "an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points and {KEYS} carved regions a step; keys are 0 to 7"
+    )]
     TooMany,
     /// There is no joint of that number that can have a motor and whose first agent this is.
     #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]
@@ -105,6 +111,8 @@ pub(super) struct PendingCommands {
     pub impulses: Vec<AnchorForce>,
     /// The newest place and velocity.
     pub motion: Option<SetMotion>,
+    /// The regions to be carved, in their order.
+    pub carvings: Vec<Carving>,
     /// It is to leave the run.
     pub leaves: bool,
     /// The newest requested pressure, Pa.
@@ -137,6 +145,7 @@ impl Mailbox {
             Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany)?,
             Command::SetMotion(motion) => pending.move_by(motion),
             Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
+            Command::Carve(carving) => pending.carve(carving).ok_or(SendError::TooMany)?,
             Command::Leave => pending.leaves = true,
             Command::Wake => {}
         }
@@ -195,6 +204,11 @@ impl PendingCommands {
         Some(())
     }
 
+    /// Adds a region to be carved; `None` where there are too many.
+    fn carve(&mut self, carving: Carving) -> Option<()> {
+        (self.carvings.len() < KEYS as usize).then(|| self.carvings.push(carving))
+    }
+
     /// Takes a place and a velocity: what the new one leaves open stays as the older one wants it.
     fn move_by(&mut self, new: SetMotion) {
         let old = self.motion.unwrap_or_default();
@@ -244,6 +258,7 @@ fn is_sound(command: &Command) -> bool {
             what.as_ref().and_then(|set| set.motor).is_none_or(|motor| motor.check().is_ok())
         }
         Command::SetMotion(motion) => motion.is_sound(),
+        Command::Carve(carving) => carving.is_sound(),
     }
 }
 

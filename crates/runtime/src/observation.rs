@@ -8,7 +8,7 @@ use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
 use super::cluster::Membership;
 use super::handle::Shared;
 use super::helpers::Helpers;
-use super::slot::{LatestSlot, SlotWriter};
+use super::slot::SlotWriter;
 use metachron_contact::Neighbour;
 use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
@@ -52,9 +52,17 @@ pub(super) struct Observer {
 /// Source of one neighbour's states.
 #[derive(Debug)]
 struct Source {
-    slot: Arc<LatestSlot<Snapshot>>,
+    shared: Arc<Shared>,
     /// It steps as one with the agent: their problem is common, and no law determines their interaction.
     is_member: bool,
+}
+
+impl Source {
+    /// Brings a neighbour to its newest state and shape.
+    fn bring(&self, neighbour: &mut Neighbour) {
+        neighbour.snapshot = self.shared.slot.latest();
+        self.shared.form.renew(&mut neighbour.form);
+    }
 }
 
 impl std::fmt::Debug for Peer {
@@ -75,19 +83,19 @@ impl Peer {
 
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
-        let (Some(mine), Some(theirs)) = (&self.shared.form, &other.shared.form) else { return false };
+        let (Some(mine), Some(theirs)) = (self.shared.form.first(), other.shared.form.first()) else { return false };
         mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
     /// The neighbour `other` as seen by this agent.
     fn neighbour(&self, other: &Self) -> Neighbour {
         // a tool needs the form to grasp it, even if it passes through it
-        let known = self.touches(other) || self.shared.form.as_deref().is_some_and(is_led);
+        let known = self.touches(other) || self.shared.form.first().is_some_and(is_led);
         Neighbour {
             id: other.shared.id,
             step_s: other.shared.wanted_hz.recip(),
             snapshot: other.shared.slot.latest(),
-            form: if known { other.shared.form.clone() } else { None },
+            form: if known { other.shared.form.latest() } else { None },
             law: self.law(other.shared.id),
             computed_here: computes(self.clock(), other.clock()),
         }
@@ -197,7 +205,7 @@ impl Observer {
     /// Reads the newest states of the present neighbours, without searching for others.
     pub fn refresh(&mut self) {
         for (neighbour, source) in self.neighbours.iter_mut().zip(&self.sources) {
-            neighbour.snapshot = source.slot.latest();
+            source.bring(neighbour);
         }
     }
 
@@ -219,7 +227,7 @@ impl Observer {
                 source.is_member = is_member;
                 set_member(neighbour, peers, me, is_member);
             }
-            neighbour.snapshot = source.slot.latest();
+            source.bring(neighbour);
         }
     }
 
@@ -238,7 +246,7 @@ impl Observer {
             if wanted[..near].binary_search(&neighbour.id).is_ok() {
                 continue;
             }
-            neighbour.snapshot = source.slot.latest();
+            neighbour.snapshot = source.shared.slot.latest();
             if !newest(writer, |mine| is_settled(me, mine, neighbour)) {
                 wanted.push(neighbour.id);
             }
@@ -273,7 +281,7 @@ impl Observer {
     fn list(&mut self, peers: &Peers, id: AgentId) {
         let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.neighbour_of(self.me, id)) else { return };
         self.neighbours.push(neighbour);
-        self.sources.push(Source { slot: Arc::clone(&theirs.shared.slot), is_member: false });
+        self.sources.push(Source { shared: Arc::clone(&theirs.shared), is_member: false });
     }
 }
 
@@ -297,7 +305,7 @@ const fn is_led(form: &CollisionShape) -> bool {
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
         // a tool needs the form of what it may grasp, whoever steps both
-        let is_tool = peers.get(me).and_then(|peer| peer.shared.form.as_deref()).is_some_and(is_led);
+        let is_tool = peers.get(me).and_then(|peer| peer.shared.form.first()).is_some_and(is_led);
         let form = neighbour.form.take().filter(|_| is_tool);
         (neighbour.form, neighbour.law) = (form, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {

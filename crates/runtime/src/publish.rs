@@ -57,6 +57,12 @@ impl AgentRunner {
         }
     }
 
+    /// Publishes the contact shape, where it is another one.
+    pub fn publish_form(&mut self) {
+        let form = self.agent.form();
+        self.shared.form.publish(&mut self.form, form);
+    }
+
     /// Publishes a withheld state: the last state of an agent is never withheld.
     pub fn show_withheld(&mut self) {
         if std::mem::take(&mut self.withheld) && self.writer.publish() {

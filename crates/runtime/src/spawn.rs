@@ -10,6 +10,7 @@ use super::broad_phase::BroadPhase;
 use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
 use super::events::EventRing;
 use super::faults::Faults;
+use super::form_slot::FormSlot;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
@@ -310,7 +311,7 @@ fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
 
 /// Whether any two agents could touch.
 fn may_any_touch(all: &[Peer]) -> bool {
-    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.is_some()).collect();
+    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.first().is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
@@ -342,7 +343,7 @@ fn shared(
         wanted_hz: spawn.rate_hz,
         motored: motored(id, spawn),
         gauges: Metrics::default(),
-        form: spawn.agent.form(),
+        form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
         events: EventRing::default(),
         slot: writer.slot(),
@@ -392,6 +393,8 @@ fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
         governor: spawn.governor,
         faults,
         writer,
+        form: None,
+        carved: false,
         observer: peers.observer(id, &links),
         links: spawn.attached,
         loads: None,

@@ -474,6 +474,7 @@ impl Session {
         let (scene_view, couplings) = (&mut self.scene_view, &mut self.couplings);
         self.reader.read(self.world.agents(), now, |agent, newest, awake| {
             scene_view.set_snapshot(agent.id(), newest, awake);
+            agent.form().iter().for_each(|form| scene_view.set_shape(agent.id(), form));
             couplings.mark_changed(agent.id());
         });
         self.scene_view.pose(now, states(self.scene.states));

@@ -5,7 +5,7 @@
 use super::object::{Object, Touched, WorldTag};
 use super::world::World;
 use glam::DVec3;
-use metachron_core::{ContactPartner, SimTime};
+use metachron_core::{ContactPartner, Removed, SimTime};
 use metachron_runtime::{AgentEvent, ContactEvent, EventKind};
 
 /// Something that happened.
@@ -41,6 +41,8 @@ pub enum Happening {
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
+    /// Cells of it were removed.
+    Carved(Removed),
 }
 
 /// A contact that begins or ends.
@@ -201,6 +203,7 @@ fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
         EventKind::Left => Happening::Left,
         EventKind::AttachmentGave => Happening::AttachmentGave,
         EventKind::RateMissed => Happening::RateMissed,
+        EventKind::Carved(removed) => Happening::Carved(removed),
         _ => Happening::Rests,
     };
     Event { object, at: event.at, what }

@@ -154,7 +154,7 @@ impl World {
             let Some(form) = agent.form() else { continue };
             let mut matter = Matter::default();
             let known = matter.bring(&agent.latest().body, 0.0);
-            if known && matter.placed(form).is_some_and(|placed| placed.bounds().meets(*within)) {
+            if known && matter.placed(&form).is_some_and(|placed| placed.bounds().meets(*within)) {
                 near.push(Near { what: Touched::Object(self.tag().object(agent.id())), matter });
             }
         }
@@ -220,8 +220,8 @@ impl Probe {
                 world.surroundings().statics().get(number as usize)?.touches(&mine, reach_m, scratch, found);
             }
             Touched::Object(object) => {
-                let form = world.agents().of(object.id())?.form()?;
-                touches(&mine, &near.matter.placed(form)?, reach_m, scratch, found);
+                let shape = world.agents().of(object.id())?.form()?;
+                touches(&mine, &near.matter.placed(&shape)?, reach_m, scratch, found);
             }
         }
         let best = found.iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;

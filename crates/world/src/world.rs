@@ -284,6 +284,9 @@ impl World {
                 }
             }
             Command::Spring(Keyed { what: Some(spring), .. }) => self.check_point(object, &state, spring.anchor)?,
+            Command::Carve(_) if !agent.form().is_some_and(|form| form.has_cells()) => {
+                return Err(refused("only solids and sheets have cells that can be removed".to_owned()));
+            }
             _ => {}
         }
         agent.send(command).map_err(|error| refused(error.to_string()))

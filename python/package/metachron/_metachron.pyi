@@ -174,6 +174,9 @@ class World:
     def velocity(self, object: str | Object, velocity: Numbers, spin: Numbers = ...) -> None:
         """Another velocity, m/s, and spin, rad/s, of all its matter."""
 
+    def carve(self, object: str | Object, start: Numbers, radius: float, end: Numbers | None = ...) -> None:
+        """Removes the cells of a solid or a sheet within a radius of a line, m; of a point where it has no other end."""
+
     def motor(self, joint: str | int, **keywords: Unpack[_Motor]) -> None:
         """Drives a joint, by name or by its number in the scene; without a goal, no longer."""
 
@@ -277,6 +280,7 @@ class Event:
         "left",
         "attachment_gave",
         "rate_missed",
+        "carved",
         "unknown",
     ]: ...
     @property

@@ -83,6 +83,13 @@ pub trait ClusterMember: Send {
     /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
     fn side(&self, place: &Place, contact: ContactSide) -> Side;
 
+    /// The cell that carries the point `place` of its skin, by its number: all points of one move with the same few blocks. `None` where each
+    /// moves by itself.
+    fn cell_of(&self, place: &Place) -> Option<u32> {
+        let _ = place;
+        None
+    }
+
     /// By how much its skin at `place` lies inside the shape that [`Self::skin`] gives, metres: of a section that is not round, whose shape
     /// is the round one about it.
     fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {

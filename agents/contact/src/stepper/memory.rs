@@ -7,7 +7,7 @@ use super::spin_friction::Spin;
 use super::yielding::Slip;
 use glam::DVec3;
 use metachron_core::{AgentId, ContactPartner, SensorTouch, SimSpan, SimTime};
-use metachron_geometry::narrow_phase::TouchKey;
+use metachron_geometry::narrow_phase::{TouchKey, TouchKind};
 
 /// A pair that bears less than this share of the most that its places have borne is relieved.
 const RELIEVED_SHARE: f64 = 0.125;
@@ -272,9 +272,10 @@ impl ContactMemory {
         }
     }
 
-    /// Forgets all pairs, where the body was divided anew; what has torn or slipped stays so.
-    pub fn forget(&mut self) {
-        self.pairs.clear();
+    /// Forgets places that are named by edges and triangles of skins, where one has lost some and others have their numbers now.
+    pub fn forget_features(&mut self) {
+        let lasts = |place: &Remembered| !matches!(place.key.kind, TouchKind::Edge | TouchKind::Triangle);
+        self.pairs.iter_mut().for_each(|pair| pair.places.retain(lasts));
     }
 }
 
@@ -332,10 +333,21 @@ mod tests {
         memory.turn(SimTime::ZERO);
         memory.tear(joint);
         memory.tear(joint);
-        memory.forget();
         let copy = memory.clone();
         assert!(copy.has_torn(joint) && !copy.has_torn(other) && copy.pairs.is_empty());
         assert_eq!((copy.recall(joint, TouchKey::default()).force_n, copy.torn.len()), (DVec3::ZERO, 1));
+    }
+
+    #[test]
+    fn vertices_are_remembered_where_the_numbers_of_edges_and_triangles_have_changed() {
+        let mut memory = ContactMemory::default();
+        let partner = Partner::Static(0);
+        let kinds = [TouchKind::Vertex, TouchKind::Edge, TouchKind::Triangle];
+        let keys = kinds.map(|kind| TouchKey::new(kind, [3, 0]));
+        memory.pair(partner).next.extend(keys.map(|key| Remembered::new(key, DVec3::Z)));
+        memory.turn(SimTime::ZERO);
+        memory.forget_features();
+        assert_eq!(keys.map(|key| memory.recall(partner, key).force_n.z), [1.0, 0.0, 0.0]);
     }
 
     #[test]

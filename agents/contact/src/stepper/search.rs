@@ -6,6 +6,7 @@
 mod boxes;
 mod sense;
 mod sweep;
+mod thinning;
 
 use super::domain::Domain;
 use super::memory::Partner;
@@ -20,6 +21,7 @@ use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
 pub(super) use sense::Sensed;
 use sweep::{FAR_M, Meeting, Sought, Sweep, Sweeping};
+use thinning::Thinning;
 
 /// A place is taken up if its gap may close below this within the step, metres.
 const LOOK_M: f64 = 4e-4;
@@ -150,6 +152,7 @@ pub(super) struct Search {
     again: Vec<[usize; 2]>,
     boxes: Boxes,
     sweep: Sweep,
+    thinning: Thinning,
     touches: Vec<Touch>,
     scratch: NarrowPhaseScratch,
     sorted: Vec<Named>,
@@ -207,6 +210,7 @@ impl Search {
         self.owners.clear();
         self.near.clear();
         self.looks.clear();
+        self.thinning.begin();
         self.boxes.place(all, |member| {
             let (body, state) = (&all[member].member, &progress[member]);
             body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
@@ -347,7 +351,9 @@ impl Search {
 
     /// Takes up those of the touches found that may close.
     fn take(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, found: Found<'_>) {
-        let Self { contacts, owners, touches, looks, known, moved, .. } = self;
+        let Self { contacts, owners, touches, looks, known, moved, thinning, .. } = self;
+        thinning.begin_pair();
+        let from = contacts.len();
         let Found { owner, skins, at: Meeting { after_s, ways }, mut clear_m } = found;
         let swept = after_s > 0.0;
         for touch in touches.iter() {
@@ -377,13 +383,14 @@ impl Search {
                     Ok(_) => false,
                 },
             };
-            if taken {
+            if taken && thinning.note(round, pair, &owner, &touch) {
                 owners.push(owner);
                 contacts.push(taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins }));
-            } else {
+            } else if !taken {
                 clear_m = clear_m.min(gap_m);
             }
         }
+        thinning.thin(from, contacts, owners);
         if round.foresees() {
             looks.push(Look { member: owner.member, partner: owner.partner, clear_m });
         }
@@ -411,7 +418,8 @@ impl Search {
 
     /// Contacts in the order of their names: sums are then the same whatever found them first.
     fn sort(&mut self) {
-        let Self { looks, owners, contacts, sorted, .. } = self;
+        let Self { looks, owners, contacts, sorted, thinning, .. } = self;
+        thinning.sort();
         looks.sort_unstable_by_key(|look| (look.member, look.partner));
         if owners.is_sorted_by_key(Owner::name) {
             return;

@@ -3,16 +3,15 @@
 //! In: an archive. Out: the nodes and the state on them, all to the bit. Never here: what a body is built from.
 
 use super::body::SoftBody;
-use super::carrier::Carrier;
+use super::division::{Division, form};
 use metachron_core::{Archive, ArchiveError, archive_values};
 
 impl SoftBody {
-    /// Writes or reads the state, on the cage or lattice that it was divided into last.
+    /// Writes or reads the state, on the cage or lattice that it was divided into last, without the cells that were removed.
     pub(super) fn archive_state(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let mut eps_m = self.eps_m;
-        archive_values!(archive, eps_m, self.level)?;
-        self.divide_for(eps_m)?;
-        // cells that were removed are not saved
+        let (mut eps_m, mut gone) = (self.eps_m, self.gone.clone());
+        archive_values!(archive, eps_m, gone, self.removed, self.level)?;
+        self.divide_for(eps_m, &gone)?;
         archive.fixed("the number of cells", self.cells())?;
         let nodes = self.positions.len();
         let mut turns: Vec<_> = self.mesh.turns().collect();
@@ -30,23 +29,36 @@ impl SoftBody {
         unknowns.archive(archive)
     }
 
-    /// Takes the nodes of another ε, without a state on them.
-    fn divide_for(&mut self, eps_m: f64) -> Result<(), ArchiveError> {
-        if eps_m.to_bits() == self.eps_m.to_bits() {
+    /// Takes the nodes of another ε and the cells but for those that are `gone`, without a state on them. A skin from which nothing is gone
+    /// before or after stays the same.
+    fn divide_for(&mut self, eps_m: f64, gone: &[bool]) -> Result<(), ArchiveError> {
+        if eps_m.to_bits() == self.eps_m.to_bits() && gone == self.gone {
             return Ok(());
         }
+        let mismatch =
+            |what: &'static str, found: String, expected: String| Err(ArchiveError::Mismatch { what, found, expected });
         let range = self.spec.resolutions().map(|range| range.eps_m);
-        let is_taken = range.is_some_and(|(finest_m, coarsest_m)| (finest_m..=coarsest_m).contains(&eps_m));
-        let carrier = is_taken.then(|| Carrier::new(&self.spec, eps_m)).flatten();
-        let (Some(carrier), Some(skin)) = (carrier, &mut self.skin) else {
-            let (found, expected) = (format!("{eps_m} m"), format!("one of {range:?}"));
-            return Err(ArchiveError::Mismatch { what: "the spacing ε of nodes", found, expected });
+        let is_taken = eps_m.to_bits() == self.eps_m.to_bits()
+            || range.is_some_and(|(finest_m, coarsest_m)| (finest_m..=coarsest_m).contains(&eps_m));
+        let division = if is_taken { Division::of(&self.spec, eps_m).ok() } else { None };
+        let Some(Division { mesh, surface, skin }) = division else {
+            return mismatch("the spacing ε of nodes", format!("{eps_m} m"), format!("one of {range:?}"));
         };
-        self.mesh = carrier.mesh(&self.spec);
-        skin.set_carrier(carrier);
+        if !(gone.is_empty() && self.gone.is_empty()) {
+            self.form = form(&self.spec, surface);
+        }
+        (self.mesh, self.skin, self.eps_m) = (mesh, skin, eps_m);
         self.positions.clone_from(&self.mesh.rest);
-        self.system = self.mesh.system(&self.positions);
-        self.eps_m = eps_m;
+        self.gone.clear();
+        if gone.is_empty() {
+            self.system = self.mesh.system(&self.positions);
+            return Ok(());
+        }
+        let cells = self.cells();
+        if gone.len() != cells || !gone.contains(&false) {
+            return mismatch("the number of cells that there were", gone.len().to_string(), cells.to_string());
+        }
+        self.leave_out(gone);
         Ok(())
     }
 }

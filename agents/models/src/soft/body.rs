@@ -4,7 +4,8 @@
 //! Theory: docs/theory/soft.md.
 
 use super::anchor_springs::VertexSpring;
-use super::carrier::{Carrier, SkinPoints};
+use super::carrier::Carrier;
+use super::division::{Division, form};
 use super::fe_mesh::FeMesh;
 use super::member::Unknowns;
 use super::skin::Skin;
@@ -15,10 +16,10 @@ use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, SetMotion, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Carving, SetMotion, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
-    check_span,
+    Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, SoftState, StepError,
+    StepReport, check_span,
 };
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -30,11 +31,13 @@ pub struct SoftBody {
     pub(super) system: System,
     /// What others see of it, where that is not its vertices.
     pub(super) skin: Option<Skin>,
-    /// Whether cells of it were removed.
-    pub(super) is_cut: bool,
-    /// The level n that was asked for: its picture's.
+    /// For each cell that it was divided into, whether it was removed; empty while it has all of them.
+    pub(super) gone: Vec<bool>,
+    /// What was removed since the start.
+    pub(super) removed: Removed,
     /// The ε for which its cage or lattice was made, metres; no meaning where its vertices are its skin.
     pub(super) eps_m: f64,
+    /// The level n that was asked for: its picture's.
     pub(super) level: u8,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
@@ -63,30 +66,22 @@ impl SoftBody {
     /// [`SoftError`] for a number outside its range, a side it does not have, a surface without an inside.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
-        let mut skin = None;
-        let (mut mesh, surface) = if let Some(spacing) = spec.spacing() {
-            let fitting = |eps_m: f64| Carrier::new(&spec, eps_m).ok_or(SoftError::FineCage { eps_m });
-            fitting(spacing.range_m.0)?;
-            let (carrier, points) = (fitting(spacing.eps_m)?, SkinPoints::of(&spec));
-            let of_carrier = (carrier.mesh(&spec), points.surface.clone());
-            skin = Some(Skin::new(points, carrier));
-            of_carrier
-        } else {
-            let mesh = FeMesh::new(&spec.shape, &spec);
-            let surface = mesh.surface();
-            (mesh, surface)
-        };
+        let eps_m = spec.spacing().map_or(0.0, |spacing| spacing.eps_m);
+        if let Some(spacing) = spec.spacing() {
+            let eps_m = spacing.range_m.0;
+            Carrier::new(&spec, eps_m).ok_or(SoftError::FineCage { eps_m })?;
+        }
+        let Division { mut mesh, surface, skin } = Division::of(&spec, eps_m)?;
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let form = CollisionShape::new(ShapeKind::Surface(surface), spec.friction);
-        let form = CollisionShape { traits: spec.traits, ..form };
         let system = mesh.system(&positions);
         let mut body = Self {
             system,
             skin,
-            is_cut: false,
-            eps_m: spec.spacing().map_or(0.0, |spacing| spacing.eps_m),
+            gone: vec![],
+            removed: Removed::default(),
+            eps_m,
             level: 0,
             impulses: vec![],
             free: positions.clone(),
@@ -94,7 +89,7 @@ impl SoftBody {
             positions,
             velocities,
             mesh,
-            form: Arc::new(form),
+            form: form(&spec, surface),
             ties: vec![],
             grips: vec![],
             acceleration: spec.gravity,
@@ -176,13 +171,12 @@ impl SoftBody {
 
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
-        let Aabb { low, high } = Aabb::of(self.seen());
-        let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
-        let radius_m = match &self.form.kind {
-            ShapeKind::Surface(surface) => surface.radius_m,
-            _ => 0.0,
+        let Aabb { low, high } = match &self.form.kind {
+            ShapeKind::Surface(surface) => surface.bounds(self.seen()).grown(surface.radius_m),
+            _ => Aabb::of(self.seen()),
         };
-        Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
+        let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        Bounds { low, high, speed_m_s: speed }
     }
 
     /// Lists this step's springs: the user's, and those of tools that grasp it.
@@ -257,7 +251,7 @@ impl Agent for SoftBody {
     /// A body of which parts are held stays where it is, and takes velocities.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
         let whole = WholeMotion::new(set, self.mesh.mass_kg.iter().copied().zip(self.positions.iter().copied()));
-        if whole.shifts() && self.mesh.held.contains(&true) {
+        if whole.shifts() && self.mesh.is_held() {
             return false;
         }
         let Self { positions, velocities, mesh, .. } = self;
@@ -272,6 +266,10 @@ impl Agent for SoftBody {
     /// A body with a skin of its own is divided anew; the division of any other is fixed by its scene.
     fn set_resolution(&mut self, wanted: Resolution) {
         self.divide_anew(wanted);
+    }
+
+    fn carve(&mut self, carving: &Carving) -> Option<Removed> {
+        self.remove_within(carving)
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {

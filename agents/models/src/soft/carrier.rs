@@ -55,6 +55,31 @@ impl Carrier {
         }
     }
 
+    /// The sheet or rope with the segments that are its cells; `None` of a cage.
+    pub const fn lattice(&self) -> Option<&SoftShape> {
+        match self {
+            Self::Cage(_) => None,
+            Self::Lattice(lattice) => Some(lattice.shape()),
+        }
+    }
+
+    /// The number of the cell that a point of the skin belongs to, on the side of the unit vector `inward`, among those that are left; `None`
+    /// where that of a lattice is gone.
+    pub fn cell_under(&self, material_m: DVec3, inward: DVec3) -> Option<usize> {
+        match self {
+            Self::Cage(cage) => Some(cage.cell_under(material_m, inward)),
+            Self::Lattice(lattice) => lattice.triangle_at(material_m),
+        }
+    }
+
+    /// Takes cells away, by their numbers among those that are left: these are numbered anew in the same order.
+    pub fn remove(&mut self, is_gone: &[bool]) {
+        match self {
+            Self::Cage(cage) => cage.remove(is_gone),
+            Self::Lattice(lattice) => lattice.remove(is_gone),
+        }
+    }
+
     /// The nodes in material coordinates, metres.
     pub fn nodes_m(&self) -> &[DVec3] {
         match self {

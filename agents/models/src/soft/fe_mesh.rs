@@ -12,7 +12,7 @@ use super::shell_bending::ShellBending;
 use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::system::System;
 use super::tetrahedron::Tetrahedron;
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DQuat, DVec3};
 use metachron_geometry::narrow_phase::VoronoiRegions;
 use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles, near_triangle};
 
@@ -30,7 +30,7 @@ pub(super) struct FeMesh {
     pub held: Vec<bool>,
     bars: Vec<Bar>,
     pub(super) membranes: Vec<Membrane>,
-    bending: Vec<BendingElement>,
+    pub(super) bending: Vec<BendingElement>,
     pub(super) shells: Vec<ShellBending>,
     pub(super) tetrahedra: Vec<Tetrahedron>,
     /// The materials of the tetrahedra.
@@ -128,68 +128,13 @@ impl FeMesh {
         mesh
     }
 
-    fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, matter: &SoftMatter) {
-        let [nx, ny, _] = grid.cells;
-        let step = DVec2::new(size_m[0] / nx as f64, size_m[1] / ny as f64);
-        for place in grid.places() {
-            let flat = DVec2::new(place[0] as f64, place[1] as f64) * step;
-            self.rest[grid.at(place) as usize] = flat.extend(0.0);
-        }
-        for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
-            let [a, b, c, d] = [[i, j, 0], [i + 1, j, 0], [i + 1, j + 1, 0], [i, j + 1, 0]].map(|place| grid.at(place));
-            // alternating diagonals favour no direction
-            let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
-            for corners in halves {
-                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, matter);
-                let third = membrane.volume_m3() * matter.density_kg_m3 / 3.0;
-                corners.iter().for_each(|vertex| self.mass_kg[*vertex as usize] += third);
-                self.membranes.push(membrane);
-                self.triangles.push(corners);
-            }
-        }
-        let rigidity = matter.young_pa * thickness_m.powi(3) / (12.0 * (1.0 - matter.poisson * matter.poisson));
-        self.bend(grid, step, rigidity, matter.poisson);
-        self.list_edges();
-        self.radius_m = 0.5 * thickness_m;
-    }
-
-    fn flat<const N: usize>(&self, corners: [u32; N]) -> [DVec2; N] {
-        corners.map(|vertex| self.rest[vertex as usize].truncate())
-    }
-
-    /// Lists the bending elements of a flat grid of cells of `step` metres: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
-    fn bend(&mut self, grid: &Grid, step: DVec2, rigidity_n_m: f64, poisson: f64) {
-        let cell = step.x * step.y;
-        let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
-        for [i, j, _] in grid.places() {
-            let [inner_x, inner_y] = [(i, grid.cells[0]), (j, grid.cells[1])].map(|(at, last)| at > 0 && at < last);
-            let here = grid.at([i, j, 0]);
-            let along_x = || [grid.at([i - 1, j, 0]), grid.at([i + 1, j, 0])];
-            let along_y = || [grid.at([i, j - 1, 0]), grid.at([i, j + 1, 0])];
-            if inner_x && inner_y {
-                let ([a, b], [c, d]) = (along_x(), along_y());
-                for (sign, share) in [(1.0, 0.5 * (1.0 + poisson)), (-1.0, 0.5 * (1.0 - poisson))] {
-                    let (x, y) = (far[0], sign * far[1]);
-                    let terms = [(a, x), (b, x), (c, y), (d, y), (here, -2.0 * (x + y))];
-                    self.bending.push(BendingElement::new(&terms, share * rigidity_n_m * cell));
-                }
-            } else if inner_x != inner_y {
-                // at a free edge the sheet bends freely across it
-                let ([a, b], w) = if inner_x { (along_x(), far[0]) } else { (along_y(), far[1]) };
-                let stiffness = 0.5 * (1.0 - poisson * poisson) * rigidity_n_m * cell;
-                self.bending.push(BendingElement::new(&[(a, w), (b, w), (here, -2.0 * w)], stiffness));
-            }
-            if i < grid.cells[0] && j < grid.cells[1] {
-                let w = 1.0 / cell;
-                let square = [(here, w), (grid.at([i + 1, j, 0]), -w), (grid.at([i, j + 1, 0]), -w)];
-                let terms = [square[0], square[1], square[2], (grid.at([i + 1, j + 1, 0]), w)];
-                self.bending.push(BendingElement::new(&terms, 2.0 * (1.0 - poisson) * rigidity_n_m * cell));
-            }
-        }
+    /// Whether anything holds it: what has no mass any more does not count.
+    pub fn is_held(&self) -> bool {
+        self.held.iter().zip(&self.mass_kg).any(|(held, mass)| *held && *mass > 0.0)
     }
 
     /// Lists the edges of all triangles.
-    fn list_edges(&mut self) {
+    pub(super) fn list_edges(&mut self) {
         self.edges = edges_of(&self.triangles);
     }
 

@@ -54,6 +54,8 @@ pub(super) struct Lattice {
     /// Length of a cell along each axis, metres; 0 along the second of a rope.
     cell_m: DVec2,
     nodes_m: Vec<DVec3>,
+    /// The number of each triangle of a sheet among those that are left; `None` where it is gone.
+    triangles: Vec<Option<u32>>,
 }
 
 impl Lattice {
@@ -68,7 +70,9 @@ impl Lattice {
             let at = DVec2::new(place[0] as f64, place[1] as f64);
             nodes_m[grid.at(place) as usize] = (at * cell_m).extend(0.0);
         }
-        Some(Self { shape, grid, cell_m, nodes_m })
+        let [along, across, _] = grid.cells;
+        let triangles = (0..2 * (along * across) as u32).map(Some).collect();
+        Some(Self { shape, grid, cell_m, nodes_m, triangles })
     }
 
     /// The sheet or rope with the segments that are its cells.
@@ -104,18 +108,42 @@ impl Lattice {
         let y = Share::of(at_m.y, self.cell_m.y, self.grid.cells[1]);
         let (i, j, u, v) = (x.cell, y.cell, x.share, y.share);
         let nodes = [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(|[i, j]| self.grid.at([i, j, 0]));
-        // the diagonals of the elements: `FeMesh::sheet`
-        let weights = if (i + j) % 2 == 0 {
-            if u >= v { [1.0 - u, u - v, v, 0.0] } else { [1.0 - v, 0.0, u, v - u] }
-        } else if u + v <= 1.0 {
-            [1.0 - u - v, u, 0.0, v]
-        } else {
-            [0.0, 1.0 - v, u + v - 1.0, 1.0 - u]
+        let weights = match (is_rising(i, j), is_second([i, j], [u, v])) {
+            (true, false) => [1.0 - u, u - v, v, 0.0],
+            (true, true) => [1.0 - v, 0.0, u, v - u],
+            (false, false) => [1.0 - u - v, u, 0.0, v],
+            (false, true) => [0.0, 1.0 - v, u + v - 1.0, 1.0 - u],
         };
         Carried { nodes, weights }
     }
+
+    /// The number of the triangle of a sheet that a material point is in among those that are left; `None` where it is gone.
+    pub fn triangle_at(&self, at_m: DVec3) -> Option<usize> {
+        let [along, across, _] = self.grid.cells;
+        let (x, y) = (Share::of(at_m.x, self.cell_m.x, along), Share::of(at_m.y, self.cell_m.y, across.max(1)));
+        let half = usize::from(is_second([x.cell, y.cell], [x.share, y.share]));
+        // in the order of the elements: `FeMesh::sheet`
+        self.triangles.get(2 * (x.cell * across + y.cell) + half).copied().flatten().map(|number| number as usize)
+    }
+
+    /// Takes triangles of a sheet away, by their numbers among those that are left: these are numbered anew in the same order.
+    pub fn remove(&mut self, is_gone: &[bool]) {
+        let mut left = 0..;
+        for number in &mut self.triangles {
+            *number = number.filter(|number| !is_gone[*number as usize]).and_then(|_| left.next());
+        }
+    }
 }
 
+/// Whether the diagonal of a cell of a sheet goes from its origin: the diagonals of the elements (`FeMesh::sheet`).
+const fn is_rising(i: usize, j: usize) -> bool {
+    (i + j).is_multiple_of(2)
+}
+
+/// Whether a point at these shares of a cell is in the second of its triangles.
+fn is_second([i, j]: [usize; 2], [u, v]: [f64; 2]) -> bool {
+    if is_rising(i, j) { u < v } else { u + v > 1.0 }
+}
 /// A place along one axis: a cell, and the share of it that is before the place.
 struct Share {
     cell: usize,

@@ -176,6 +176,11 @@ impl ClusterMember for SoftBody {
         }
     }
 
+    fn cell_of(&self, place: &Place) -> Option<u32> {
+        let Place::Surface { vertices, shares } = *place else { return None };
+        self.skin.as_ref()?.cell_at(vertices, shares)
+    }
+
     fn led_m_s(&self, place: &Place) -> DVec3 {
         let (Place::Surface { vertices, shares }, Some(skin)) = (place, &self.skin) else { return DVec3::ZERO };
         vertices.iter().zip(shares).map(|(vertex, share)| skin.easing_m_s(*vertex) * *share).sum()

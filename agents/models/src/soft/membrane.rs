@@ -16,6 +16,8 @@ pub(super) struct Membrane {
     gradients: [DVec2; 3],
     /// Volume at rest, m³.
     volume_m3: f64,
+    /// The mass that it gives each vertex, kg.
+    mass_kg: [f64; 3],
     /// Plane stress: μ and λ, Pa.
     lame_pa: [f64; 2],
 }
@@ -37,12 +39,18 @@ impl Membrane {
         let (b, c) = (inverse.row(0), inverse.row(1));
         let volume_m3 = 0.5 * sides.determinant().abs() * thickness_m;
         let lame_pa = [0.5 * young_pa / (1.0 + poisson), young_pa * poisson / (1.0 - poisson * poisson)];
-        Self { vertices, gradients: [-b - c, b, c], volume_m3, lame_pa }
+        let mass_kg = [volume_m3 * matter.density_kg_m3 / 3.0; 3];
+        Self { vertices, gradients: [-b - c, b, c], volume_m3, mass_kg, lame_pa }
     }
 
-    /// Its volume at rest, m³.
-    pub fn volume_m3(&self) -> f64 {
-        self.volume_m3
+    /// Its vertices.
+    pub const fn vertices(&self) -> &[u32; 3] {
+        &self.vertices
+    }
+
+    /// The mass that it gives each vertex, kg.
+    pub const fn mass_kg(&self) -> &[f64; 3] {
+        &self.mass_kg
     }
 
     fn strained(&self, positions: &[DVec3]) -> Strained {

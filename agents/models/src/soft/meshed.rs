@@ -42,24 +42,28 @@ impl FeMesh {
         let mut division = Self::of_points(&surface.points);
         division.radius_m = 0.5 * thickness_m;
         division.triangles.clone_from(&surface.triangles);
-        let bent = ShellMatter::new(&spec.matter, thickness_m);
-        // the corner across each side of a triangle, in the direction of the neighbour
-        let mut across: HashMap<[u32; 2], u32> = HashMap::with_capacity(3 * surface.triangles.len());
-        for [a, b, c] in &surface.triangles {
-            across.extend([([*b, *a], *c), ([*c, *b], *a), ([*a, *c], *b)]);
-        }
         for corners in &surface.triangles {
-            let [a, b, c] = *corners;
             let element = Membrane::new(*corners, flattened(&surface.points, *corners), thickness_m, &spec.matter);
-            let third = element.volume_m3() * spec.matter.density_kg_m3 / 3.0;
-            corners.iter().for_each(|corner| division.mass_kg[*corner as usize] += third);
+            corners.iter().zip(element.mass_kg()).for_each(|(at, mass)| division.mass_kg[*at as usize] += mass);
             division.membranes.push(element);
-            let over = [[b, c], [c, a], [a, b]].map(|side| across.get(&side).copied());
-            division.shells.push(ShellBending::new(*corners, over, &surface.points, &bent));
         }
+        division.bend_shell(thickness_m, &spec.matter);
         division.edges = edges_of(&division.triangles);
         division.hold(&spec.held);
         division
+    }
+
+    /// Lists how the triangles of a shell bend with those across their sides.
+    pub fn bend_shell(&mut self, thickness_m: f64, matter: &SoftMatter) {
+        let bent = ShellMatter::new(matter, thickness_m);
+        // the corner across each side of a triangle, in the direction of the neighbour
+        let mut across: HashMap<[u32; 2], u32> = HashMap::with_capacity(3 * self.triangles.len());
+        for [a, b, c] in &self.triangles {
+            across.extend([([*b, *a], *c), ([*c, *b], *a), ([*a, *c], *b)]);
+        }
+        let over = |[a, b, c]: [u32; 3]| [[b, c], [c, a], [a, b]].map(|side| across.get(&side).copied());
+        let all = self.triangles.iter().map(|corners| ShellBending::new(*corners, over(*corners), &self.rest, &bent));
+        self.shells = all.collect();
     }
 
     fn of_points(points: &[DVec3]) -> Self {

@@ -15,6 +15,7 @@ impl SoftBody {
         into.energy_j = self.energy_j();
         into.drift_m = self.doubling.watch.error_m();
         into.residual_m = self.mesh.residual_m(&self.positions) + into.drift_m;
+        into.removed = self.removed;
         into.grips.clone_from(&self.grips);
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(self.bounds());

@@ -44,7 +44,7 @@ impl SoftBody {
         let (Some(range), Some(skin)) = (self.spec.resolutions(), &self.skin) else { return };
         let wanted = range.clamp(wanted);
         self.level = wanted.n;
-        if self.is_cut || skin.carrier.is_as_wanted(&self.spec, wanted.eps_m) {
+        if !self.gone.is_empty() || skin.carrier.is_as_wanted(&self.spec, wanted.eps_m) {
             return;
         }
         if let Some(carrier) = Carrier::new(&self.spec, wanted.eps_m) {

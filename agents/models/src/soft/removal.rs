@@ -1,31 +1,22 @@
-//! Removal of cells of a solid while it runs: what cutting is built upon.
+//! Removal of cells of a solid or a sheet while it runs: what cutting is built upon.
 //!
-//! In: a body and which of its cells. Out: the body without them, and what went with them. Never here: which cells a cut meets.
+//! In: a body and which of its cells. Out: the body without them, and what went with them. Never here: what cuts.
 //! Theory: docs/theory/soft.md, section 11.
 
 use super::body::SoftBody;
+use super::division::form;
 use super::fe_mesh::{FeMesh, edges_of};
-use super::spec::SoftError;
+use super::spec::{SoftError, SoftMatter, SoftShape};
 use glam::DVec3;
+use metachron_contact::Carving;
+use metachron_core::Removed;
 use metachron_geometry::narrow_phase::VoronoiRegions;
-use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape, Tetrahedra, lone_faces};
-use std::sync::Arc;
+use metachron_geometry::{ShapeKind, SurfaceShape, Tetrahedra, lone_faces};
 
 /// The faces of a cell whose corners' bits are x, y, z, counter-clockwise seen from outside.
 const QUADS: [[usize; 4]; 6] = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 
-/// What went with the cells that were removed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RemovedCells {
-    /// Their mass, kg.
-    pub mass_kg: f64,
-    /// Their momentum, kg·m/s.
-    pub momentum: DVec3,
-    /// How many triangles of the skin went with them.
-    pub triangles: usize,
-}
-
-/// An element that fills a volume.
+/// An element that has matter.
 struct Cell<'a> {
     vertices: &'a [u32],
     /// The mass that it gives each vertex, kg.
@@ -33,18 +24,30 @@ struct Cell<'a> {
 }
 
 impl FeMesh {
-    /// The cells of a cage or a lattice, or the tetrahedra.
+    /// The cells of a cage or a lattice, the tetrahedra, or the triangles of a sheet.
     fn cells(&self) -> impl Iterator<Item = Cell<'_>> {
         let cells = self.hexahedra.iter().map(|cell| Cell { vertices: &cell.vertices, mass_kg: &cell.mass_kg });
         let all = self.tetrahedra.iter();
-        cells.chain(all.map(|element| Cell { vertices: &element.vertices, mass_kg: &element.mass_kg }))
+        let solid = cells.chain(all.map(|element| Cell { vertices: &element.vertices, mass_kg: &element.mass_kg }));
+        let sheet = self.membranes.iter();
+        solid.chain(sheet.map(|element| Cell { vertices: element.vertices(), mass_kg: element.mass_kg() }))
     }
 
-    /// Removes cells; what no cell has any more is held, without mass.
-    fn remove(&mut self, is_gone: &[bool]) {
-        let mut gone = is_gone.iter();
-        self.hexahedra.retain(|_| !gone.next().copied().unwrap_or_default());
-        self.tetrahedra.retain(|_| !gone.next().copied().unwrap_or_default());
+    /// Removes cells of a body of `shape`; what no cell has any more is held, without mass.
+    fn remove(&mut self, is_gone: &[bool], shape: &SoftShape, matter: &SoftMatter) {
+        let mut gone = is_gone.iter().copied();
+        let mut is_left = || !gone.next().unwrap_or_default();
+        self.hexahedra.retain(|_| is_left());
+        self.tetrahedra.retain(|_| is_left());
+        let is_left: Vec<bool> = self.membranes.iter().map(|_| is_left()).collect();
+        if !is_left.is_empty() {
+            let mut left = is_left.iter();
+            self.membranes.retain(|_| left.next() == Some(&true));
+            let mut left = is_left.iter();
+            self.triangles.retain(|_| left.next() == Some(&true));
+            self.list_edges();
+            self.bend_anew(shape, matter);
+        }
         let mut mass_kg = vec![0.0; self.rest.len()];
         for cell in self.cells() {
             cell.vertices.iter().zip(cell.mass_kg).for_each(|(vertex, mass)| mass_kg[*vertex as usize] += mass);
@@ -57,8 +60,11 @@ impl FeMesh {
         self.rows.retain(|(row, _)| row.iter().all(|vertex| is_alive[*vertex as usize]));
     }
 
-    /// The faces that one cell alone has, as triangles counter-clockwise seen from outside.
+    /// The faces that one cell alone has, as triangles counter-clockwise seen from outside; of a sheet all that are left.
     fn outside(&self) -> Vec<[u32; 3]> {
+        if !self.is_solid() {
+            return self.triangles.clone();
+        }
         let quads = self.hexahedra.iter().flat_map(|cell| QUADS.map(|quad| quad.map(|at| cell.vertices[at])));
         let halves = quads.flat_map(|[a, b, c, d]| {
             // the diagonal of the least vertex: both cells at a face divide it alike
@@ -73,7 +79,7 @@ impl FeMesh {
 }
 
 impl SoftBody {
-    /// How many cells there are of its cage or lattice, or tetrahedra; none of a sheet or a rope.
+    /// How many cells there are of its cage or lattice, tetrahedra, or triangles of a sheet; none of a rope.
     #[must_use]
     pub fn cells(&self) -> usize {
         self.mesh.cells().count()
@@ -87,12 +93,20 @@ impl SoftBody {
         Some(sum / cell.vertices.len() as f64)
     }
 
+    /// Removes the cells whose middles are in a region between two steps; `None`, and no change, where there are none and where none would be
+    /// left.
+    pub(super) fn remove_within(&mut self, carving: &Carving) -> Option<Removed> {
+        let is_within = |cell: &usize| self.cell_middle(*cell).is_some_and(|middle| carving.holds(middle));
+        let cells: Vec<usize> = (0..self.cells()).filter(is_within).collect();
+        if cells.is_empty() { None } else { self.remove_cells(&cells).ok() }
+    }
+
     /// Removes cells by their numbers between two steps, with the triangles of the skin in them; the cells that are left are numbered anew, in the
     /// same order. What is left moves on as it was, in as many pieces as there are; a body that has lost cells keeps its ε.
     ///
     /// # Errors
     /// [`SoftError::NoCell`] for a number without a cell, [`SoftError::AllCells`] where none would be left; nothing is changed then.
-    pub fn remove_cells(&mut self, cells: &[usize]) -> Result<RemovedCells, SoftError> {
+    pub fn remove_cells(&mut self, cells: &[usize]) -> Result<Removed, SoftError> {
         let count = self.cells();
         let mut is_gone = vec![false; count];
         for &cell in cells {
@@ -101,43 +115,47 @@ impl SoftBody {
         if !is_gone.contains(&false) {
             return Err(SoftError::AllCells);
         }
-        let (mass_kg, momentum) = self.mesh.cells().zip(&is_gone).filter(|(_, gone)| **gone).fold(
-            (0.0, DVec3::ZERO),
-            |(mass_kg, momentum), (cell, _)| {
-                let of = |(vertex, mass): (&u32, &f64)| self.velocities[*vertex as usize] * *mass;
-                (
-                    mass_kg + cell.mass_kg.iter().sum::<f64>(),
-                    momentum + cell.vertices.iter().zip(cell.mass_kg).map(of).sum::<DVec3>(),
-                )
-            },
-        );
-        let embedded = self.skin_without(&is_gone);
-        self.mesh.remove(&is_gone);
+        let before = self.skin_triangles();
+        let went = self.mesh.cells().zip(&is_gone).filter(|(_, gone)| **gone).map(|(cell, _)| {
+            let of = |(vertex, mass): (&u32, &f64)| self.velocities[*vertex as usize] * *mass;
+            let momentum = cell.vertices.iter().zip(cell.mass_kg).map(of).sum();
+            Removed { cells: 1, triangles: 0, mass_kg: cell.mass_kg.iter().sum(), momentum }
+        });
+        let went = went.fold(Removed::default(), Removed::and);
+        self.leave_out(&is_gone);
         for (velocity, mass) in self.velocities.iter_mut().zip(&self.mesh.mass_kg) {
             if *mass == 0.0 {
                 *velocity = DVec3::ZERO;
             }
         }
-        let before = self.skin_triangles();
-        let triangles = embedded.unwrap_or_else(|| {
-            let outside = self.mesh.outside();
-            self.mesh.edges = edges_of(&outside);
-            outside
-        });
-        self.set_skin(triangles);
-        self.system = self.mesh.system(&self.positions);
-        self.is_cut = true;
         self.woken();
-        Ok(RemovedCells { mass_kg, momentum, triangles: before.saturating_sub(self.skin_triangles()) })
+        let triangles = before.saturating_sub(self.skin_triangles()) as u32;
+        let went = Removed { triangles, ..went };
+        self.removed = self.removed.and(went);
+        Ok(went)
     }
 
-    /// The triangles of an embedded skin that are in no cell that is gone, its points carried by what is left; `None` where its vertices are
-    /// its skin.
-    fn skin_without(&mut self, is_gone: &[bool]) -> Option<Vec<[u32; 3]>> {
-        let skin = self.skin.as_mut()?;
-        let ShapeKind::Surface(surface) = &self.form.kind else { return None };
-        let kept = skin.without_cells(is_gone, &surface.triangles);
-        Some(kept)
+    /// Takes cells out of the mesh and of the skin, by their numbers among those that are left.
+    pub(super) fn leave_out(&mut self, is_gone: &[bool]) {
+        let Self { skin, mesh, form, spec, .. } = self;
+        let shape = skin.as_ref().and_then(|skin| skin.carrier.lattice()).unwrap_or(&spec.shape);
+        mesh.remove(is_gone, shape, &spec.matter);
+        let triangles = match (skin, &form.kind) {
+            (Some(skin), ShapeKind::Surface(surface)) => {
+                let is_left: Vec<bool> = mesh.mass_kg.iter().map(|mass| *mass > 0.0).collect();
+                skin.without_cells(is_gone, &is_left, &surface.triangles)
+            }
+            _ => {
+                let outside = mesh.outside();
+                mesh.edges = edges_of(&outside);
+                outside
+            }
+        };
+        self.set_skin(triangles);
+        self.system = self.mesh.system(&self.positions);
+        let mut again = is_gone.iter().copied();
+        self.gone.resize(self.gone.len().max(is_gone.len()), false);
+        self.gone.iter_mut().filter(|gone| !**gone).for_each(|gone| *gone = again.next().unwrap_or_default());
     }
 
     fn skin_triangles(&self) -> usize {
@@ -157,8 +175,6 @@ impl SoftBody {
             triangles: triangles.into(),
             ..before.clone()
         };
-        let traits = self.form.traits;
-        self.form =
-            Arc::new(CollisionShape { traits, ..CollisionShape::new(ShapeKind::Surface(surface), self.form.friction) });
+        self.form = form(&self.spec, surface);
     }
 }

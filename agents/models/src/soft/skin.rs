@@ -78,19 +78,20 @@ impl Skin {
         self.nearest = most.into_iter().map(|(point, _)| point).collect();
     }
 
-    /// Takes cells away from its cage, and gives their points to those that are left; returns the triangles whose middles were in none of
-    /// these cells.
-    pub fn without_cells(&mut self, is_gone: &[bool], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-        let Carrier::Cage(cage) = &mut self.carrier else { return triangles.to_vec() };
-        let material = &self.material;
+    /// Takes cells away from what carries it, whose nodes with any cell are `is_left`; returns the triangles that are left: those whose middles were
+    /// in none of these cells, and that nodes with a cell carry. The nearest cell of a cage that is left carries what was in one that is gone.
+    pub fn without_cells(&mut self, is_gone: &[bool], is_left: &[bool], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+        let Self { material, carrier, .. } = &*self;
         let is_kept = |corners: &[u32; 3]| {
             let [a, b, c] = corners.map(|corner| material[corner as usize]);
             let inward = into_body([a, b, c]).normalize_or_zero();
-            !is_gone[cage.cell_under((a + b + c) / 3.0, inward)]
+            carrier.cell_under((a + b + c) / 3.0, inward).is_some_and(|cell| !is_gone[cell])
         };
-        let kept = triangles.iter().copied().filter(is_kept).collect();
-        cage.remove(is_gone);
+        let mut kept: Vec<[u32; 3]> = triangles.iter().copied().filter(is_kept).collect();
+        self.carrier.remove(is_gone);
         self.bind();
+        let carried = |corner: &u32| self.carried[*corner as usize].terms().all(|(node, _)| is_left[node]);
+        kept.retain(|corners| corners.iter().all(carried));
         kept
     }
 
@@ -154,10 +155,23 @@ impl Skin {
 
     /// What carries the point of the skin with these shares of three of its points.
     pub fn carried_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Carried {
+        let (material_m, inward) = self.material_at(vertices, shares);
+        self.carrier.carry(material_m, inward)
+    }
+
+    /// The cell of a cage that carries the same point, by its number; none of a lattice.
+    pub fn cell_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Option<u32> {
+        let Carrier::Cage(cage) = &self.carrier else { return None };
+        let (material_m, inward) = self.material_at(vertices, shares);
+        Some(cage.cell_under(material_m, inward) as u32)
+    }
+
+    /// Where the same point is in material coordinates, and the direction into the body there.
+    fn material_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> (DVec3, DVec3) {
         let mean = |of: &[DVec3]| vertices.into_iter().zip(shares).map(|(v, share)| of[v as usize] * share).sum();
         // a place on an edge has two vertices alone
         let inward = into_body(vertices.map(|vertex| self.rest[vertex as usize])).try_normalize();
-        self.carrier.carry(mean(&self.material), inward.unwrap_or_else(|| mean(&self.inward)))
+        (mean(&self.material), inward.unwrap_or_else(|| mean(&self.inward)))
     }
 
     /// The point of the skin that stands for a node.

@@ -13,7 +13,7 @@ mod skins;
 mod spaced;
 mod statics;
 
-use super::{MaterialLaw, RegionMatter, RemovedCells, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
+use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};

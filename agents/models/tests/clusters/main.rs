@@ -3,6 +3,7 @@
 mod alike;
 mod bodies;
 mod errors;
+mod fine_skin;
 mod grasp;
 mod hands;
 mod heaps;

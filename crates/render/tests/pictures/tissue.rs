@@ -4,7 +4,7 @@ use crate::adapter::gpu;
 use glam::DVec3;
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, Resolution, SimTime, Snapshot, SoftState};
-use metachron_geometry::{Generator, SurfaceShape, generate_surface};
+use metachron_geometry::{CollisionShape, Generator, ShapeKind, SurfaceShape, generate_surface};
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading,
     Size, SkinForm, States, Style,
@@ -15,6 +15,16 @@ const SIZE: Size = Size { width: 160, height: 160 };
 
 /// A soft ball of a material, moved from where it is at rest.
 fn draw(gpu: &Gpu, material: Material, shading: Shading, moved: DVec3) -> RgbaImage {
+    draw_part(gpu, Level { shading, ..Resolution { eps_m: 0.01, n: 3 }.into() }, (material, moved), |_| true)
+}
+
+/// The same without the triangles at whose middles `is_left` is not true.
+fn draw_part(
+    gpu: &Gpu,
+    level: Level,
+    (material, moved): (Material, DVec3),
+    is_left: impl Fn(DVec3) -> bool,
+) -> RgbaImage {
     let made = generate_surface(Generator::Sphere, 0, 3000);
     let surface = SurfaceShape {
         vertices: (0..made.points.len() as u32).collect(),
@@ -25,9 +35,13 @@ fn draw(gpu: &Gpu, material: Material, shading: Shading, moved: DVec3) -> RgbaIm
         edge_m: 0.1,
         closed: true,
     };
+    let middle = |corners: &&[u32; 3]| corners.iter().map(|at| made.points[*at as usize]).sum::<DVec3>() / 3.0;
+    let left = surface.triangles.iter().filter(|corners| is_left(middle(corners))).copied().collect();
+    let carved = SurfaceShape { triangles: left, ..surface.clone() };
     let form = Form::Skin(SkinForm::new(surface, &made.points));
     let appearance = Appearance { colour: [150, 60, 55], material };
     let mut stage = SceneView::new(vec![Actor { id: AgentId(0), form, appearance }], vec![]);
+    stage.set_shape(AgentId(0), &CollisionShape::new(ShapeKind::Surface(carved), 0.0));
     stage.set_environment(Environment::Endoscope);
     let positions: Vec<DVec3> = made.points.iter().map(|p| *p + moved).collect();
     let body = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions });
@@ -35,7 +49,6 @@ fn draw(gpu: &Gpu, material: Material, shading: Shading, moved: DVec3) -> RgbaIm
     stage.pose(SimTime::ZERO, States::Latest);
     let camera = Camera::looking(moved + DVec3::new(0.6, -3.0, 1.0), moved, 0.6);
     stage.survey(&camera, SIZE);
-    let level = Level { shading, ..Resolution { eps_m: 0.01, n: 3 }.into() };
     let options = RendererOptions { samples: 1, shadow_px: 256, shadow_taps: 1, lean: true };
     let mut offscreen = Offscreen::new(gpu.clone(), SIZE, options).expect("a small target");
     offscreen.render(stage.compose(&camera, &[level], Style::default(), None), &camera).expect("a picture");
@@ -71,4 +84,16 @@ fn the_texture_of_a_soft_body_moves_with_it() {
     let worst = here.as_raw().iter().zip(there.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
     // positions are relative to whole metres: the same numbers
     assert!(worst.is_some_and(|worst| worst <= 2), "{worst:?}");
+}
+
+#[test]
+fn a_body_from_which_matter_was_taken_is_drawn_without_its_triangles() {
+    let Some(gpu) = gpu() else { return };
+    let level = Level { shading: Shading::PerPixel, ..Resolution { eps_m: 0.01, n: 0 }.into() };
+    let drawn = |least_m: f64| draw_part(&gpu, level, (Material::Plastic, DVec3::ZERO), |middle| middle.z > least_m);
+    let [whole, upper, none] = [-2.0, 0.0, 2.0].map(drawn);
+    let same = |a: &RgbaImage, b: &RgbaImage, y: u32| (60..100).all(|x| a.get_pixel(x, y) == b.get_pixel(x, y));
+    // the camera looks a little from above: the upper half is above the middle, below it there is nothing but what is behind
+    assert!(same(&whole, &upper, 50) && !same(&whole, &none, 50), "the upper half");
+    assert!(same(&upper, &none, 135) && !same(&whole, &none, 135), "the lower half");
 }

@@ -53,6 +53,18 @@ impl AgentRunner {
         steps
     }
 
+    /// Forgets what contacts of it and of those it leads have borne on edges and triangles, where one of them has lost some: others have their
+    /// numbers now.
+    pub fn forget_features(&mut self) {
+        let Self { led, cluster, carved, .. } = self;
+        let mut any = std::mem::take(carved);
+        led.each(|actor| any |= std::mem::take(&mut actor.carved));
+        if any {
+            cluster.iter_mut().for_each(|seat| seat.forget_features());
+            led.each(|actor| actor.cluster.iter_mut().for_each(|seat| seat.forget_features()));
+        }
+    }
+
     /// Steps alone up to `time`; how many steps that took.
     fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
         let mut steps = 0;

@@ -79,6 +79,8 @@ pub fn probes(scene: &Scene, handles: &Agents) -> Vec<ProbeOutcome> {
 mod tests {
     use super::*;
     use metachron_core::SimTime;
+    use metachron_render::{Size, Style};
+    use metachron_runtime::Command;
     use metachron_scene::Source;
 
     #[test]
@@ -94,5 +96,29 @@ mod tests {
         let outcome = session.end(None, false);
         let (start_up_s, wall_s) = (outcome.start_up_s, outcome.wall_s);
         assert!(start_up_s >= 0.03 && wall_s <= opened.elapsed().as_secs_f64() - 0.03, "{start_up_s} s, {wall_s} s");
+    }
+
+    #[test]
+    fn a_body_from_which_matter_is_taken_is_drawn_without_its_triangles() {
+        let text = b"format = 1\nexecutor = \"lockstep\"\n[[object]]\nname = \"liver\"\nmodel = \"solid\"\n\
+            shape = \"mesh\"\ngenerate = \"liver\"\nscale = 0.1\ntriangles = 600\nposition_m = [0.0, 0.0, 0.1]\neps_m = 0.03\nyoung_pa = 5e3\n\
+            hold = [\"bottom\"]\n";
+        let scene = metachron_scene::load(&Source::memory("liver", text).unwrap(), &[]).unwrap();
+        let mut session = Session::open(scene).unwrap();
+        let (camera, size) = (session.scene_camera(), Size { width: 200, height: 200 });
+        session.begin();
+        let mut drawn = |session: &mut Session, milliseconds: u64| {
+            session.wait_until(Duration::from_millis(milliseconds));
+            session.compose(&camera, size, Style::default(), None).skins.triangles.len()
+        };
+        let whole = drawn(&mut session, 50);
+        let liver = session.world.object("liver").unwrap();
+        let bounds = session.world.latest(liver).unwrap().bounds.unwrap();
+        session.world.command(liver, Command::carve(bounds.low, bounds.high, 0.04)).unwrap();
+        let left = drawn(&mut session, 100);
+        let removed = session.world.latest(liver).unwrap().removed;
+        assert!(removed.triangles > 20 && whole > left, "{removed:?}: {whole}, {left}");
+        // each triangle is divided into as many parts
+        assert_eq!((whole - left) % removed.triangles as usize, 0, "{removed:?}: {whole}, {left}");
     }
 }

@@ -1,0 +1,42 @@
+//! A soft body as its specification and an ε divide it, with all of its cells.
+//!
+//! In: a specification. Out: elements between nodes, the skin that others touch, what carries it. Never here: states, cells removed.
+
+use super::carrier::{Carrier, SkinPoints};
+use super::fe_mesh::FeMesh;
+use super::skin::Skin;
+use super::spec::{SoftError, SoftSpec};
+use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape};
+use std::sync::Arc;
+
+/// A divided body at rest.
+pub(super) struct Division {
+    pub mesh: FeMesh,
+    /// Its skin as others touch it.
+    pub surface: SurfaceShape,
+    /// What carries it, where that is not its vertices.
+    pub skin: Option<Skin>,
+}
+
+impl Division {
+    /// The body of `spec` with cells of at most `eps_m`, which has no meaning where its shape divides it.
+    ///
+    /// # Errors
+    /// [`SoftError::FineCage`] where these are too many.
+    pub fn of(spec: &SoftSpec, eps_m: f64) -> Result<Self, SoftError> {
+        if spec.spacing().is_none() {
+            let mesh = FeMesh::new(&spec.shape, spec);
+            return Ok(Self { surface: mesh.surface(), mesh, skin: None });
+        }
+        let carrier = Carrier::new(spec, eps_m).ok_or(SoftError::FineCage { eps_m })?;
+        let points = SkinPoints::of(spec);
+        let (mesh, surface) = (carrier.mesh(spec), points.surface.clone());
+        Ok(Self { mesh, surface, skin: Some(Skin::new(points, carrier)) })
+    }
+}
+
+/// A skin with what `spec` says of its contacts.
+pub(super) fn form(spec: &SoftSpec, surface: SurfaceShape) -> Arc<CollisionShape> {
+    let form = CollisionShape::new(ShapeKind::Surface(surface), spec.friction);
+    Arc::new(CollisionShape { traits: spec.traits, ..form })
+}
