@@ -12,6 +12,31 @@ pub enum ContactPartner {
     Agent(AgentId),
 }
 
+/// What others give a body by contact: a force, and a torque about its centre of mass, world axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Wrench {
+    /// N.
+    pub force_n: DVec3,
+    /// N·m.
+    pub torque_n_m: DVec3,
+}
+
+impl Wrench {
+    /// Adds a force on the point `arm_m` from the centre of mass.
+    pub fn add(&mut self, force_n: DVec3, arm_m: DVec3) {
+        self.force_n += force_n;
+        self.torque_n_m += arm_m.cross(force_n);
+    }
+}
+
+impl std::ops::Mul<f64> for Wrench {
+    type Output = Self;
+
+    fn mul(self, by: f64) -> Self {
+        Self { force_n: self.force_n * by, torque_n_m: self.torque_n_m * by }
+    }
+}
+
 /// A contact with all its places. It is published by the agent, of two by that of the lower number.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactState {

@@ -25,6 +25,8 @@ pub(super) struct Shared {
     pub wanted_hz: f64,
     /// The joints whose first body it is and that can have a motor.
     pub motored: Box<[u32]>,
+    /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
+    pub takes_poses: bool,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: Option<Arc<CollisionShape>>,
@@ -63,6 +65,12 @@ impl AgentHandle {
     #[must_use]
     pub fn model(&self) -> &'static str {
         self.shared.model
+    }
+
+    /// Whether it is kinematic: poses lead it, and no force moves it.
+    #[must_use]
+    pub fn takes_poses(&self) -> bool {
+        self.shared.takes_poses
     }
 
     /// Its newest state. There is one from the start on.
@@ -128,6 +136,9 @@ impl AgentHandle {
             && !self.shared.motored.contains(&joint)
         {
             return Err(SendError::NoMotor { agent: self.id(), joint });
+        }
+        if matches!(command, Command::Pose(_)) && !self.shared.takes_poses {
+            return Err(SendError::NotKinematic(self.id()));
         }
         self.shared.mail.send(command)?;
         self.shared.sleep.wake(self.shared.id);

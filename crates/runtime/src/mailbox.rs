@@ -3,7 +3,7 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::{AnchorForce, AnchorSpring, SetMotion, SetMotor};
+use metachron_contact::{AnchorForce, AnchorSpring, PoseGoal, SetMotion, SetMotor};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
@@ -27,6 +27,8 @@ pub enum Command {
     /// A motor drives the joint whose number is the key, instead of the motor that the scene gives it; `None` is the scene's again.
     /// For the joint's first agent.
     Motor(Keyed<SetMotor>),
+    /// A kinematic body is led to a pose; `None` lets it go its own way again.
+    Pose(Keyed<PoseGoal>),
     /// Another place or velocity, before its next step; an agent that cannot take it stays as it is.
     SetMotion(SetMotion),
     /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
@@ -71,6 +73,9 @@ pub enum SendError {
     /// A key that is too large, or impulses at too many points before the agent has taken a step.
     #[error("an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points a step; keys are 0 to 7")]
     TooMany,
+    /// Poses lead only what is not moved by forces.
+    #[error("agent {} is moved by what acts on it; only a kinematic body is led by poses", .0.0)]
+    NotKinematic(AgentId),
     /// There is no joint of that number that can have a motor and whose first agent this is.
     #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]
     NoMotor {
@@ -101,6 +106,7 @@ pub(super) struct PendingCommands {
     pub springs: Vec<Keyed<AnchorSpring>>,
     pub forces: Vec<Keyed<AnchorForce>>,
     pub motors: Vec<Keyed<SetMotor>>,
+    pub poses: Vec<Keyed<PoseGoal>>,
     /// One for each point, N·s and N·m·s.
     pub impulses: Vec<AnchorForce>,
     /// The newest place and velocity.
@@ -134,6 +140,7 @@ impl Mailbox {
             Command::Spring(spring) => renew(&mut pending.springs, spring),
             Command::Force(force) => renew(&mut pending.forces, force),
             Command::Motor(motor) => renew(&mut pending.motors, motor),
+            Command::Pose(pose) => renew(&mut pending.poses, pose),
             Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany)?,
             Command::SetMotion(motion) => pending.move_by(motion),
             Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
@@ -178,8 +185,9 @@ impl Mailbox {
 impl PendingCommands {
     /// Whether any of them is something that is done to the agent for a while.
     pub fn has_loads(&self) -> bool {
-        let Self { springs, forces, motors, impulses, .. } = self;
-        !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
+        let Self { springs, forces, motors, poses, impulses, .. } = self;
+        let is_led = !poses.is_empty();
+        is_led || !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
     }
 
     /// Adds an impulse; `None` where there are too many points.
@@ -243,6 +251,7 @@ fn is_sound(command: &Command) -> bool {
         Command::Motor(Keyed { what, .. }) => {
             what.as_ref().and_then(|set| set.motor).is_none_or(|motor| motor.check().is_ok())
         }
+        Command::Pose(Keyed { what, .. }) => what.as_ref().is_none_or(PoseGoal::is_sound),
         Command::SetMotion(motion) => motion.is_sound(),
     }
 }

@@ -339,6 +339,7 @@ fn shared(
         id,
         name: std::mem::take(&mut spawn.name).into(),
         model: spawn.agent.model(),
+        takes_poses: spawn.agent.takes_poses(),
         wanted_hz: spawn.rate_hz,
         motored: motored(id, spawn),
         gauges: Metrics::default(),

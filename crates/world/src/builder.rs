@@ -13,7 +13,7 @@ use metachron_contact::Agent;
 use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
-use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
+use metachron_models::rigid::{Joint, JointError, JointKind, Keyframe, RigidSpec};
 use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
 use std::sync::Arc;
 
@@ -183,6 +183,12 @@ impl Rigid {
         Self::new(Solid::Ball { radius_m })
     }
 
+    /// A capsule along z of this radius and this half length of its straight part, metres.
+    #[must_use]
+    pub fn capsule(radius_m: f64, half_height_m: f64) -> Self {
+        Self::new(Solid::Capsule { radius_m, half_height_m })
+    }
+
     /// A box with these half edges, metres.
     #[must_use]
     pub fn cuboid(half_extents_m: [f64; 3]) -> Self {
@@ -235,6 +241,34 @@ impl Rigid {
     #[must_use]
     pub const fn contact(mut self, traits: ContactTraits) -> Self {
         self.spec.traits = traits;
+        self
+    }
+
+    /// Kinematic: it moves as [`metachron_runtime::Command::pose`] and its keyframes lead it, and gives way to nothing. What touches it pushes
+    /// back, which [`metachron_core::Snapshot::contact_wrench`] has. Its mass and velocity have no meaning.
+    #[must_use]
+    pub fn kinematic(mut self) -> Self {
+        self.spec.led.get_or_insert_default();
+        self
+    }
+
+    /// Kinematic, with one more keyframe: at `at_s` seconds of its time, later than the one before, the origin of its shape is at `position_m`,
+    /// metres, turned by `rotation`. It starts in the first.
+    #[must_use]
+    pub fn keyframe(mut self, at_s: f64, position_m: [f64; 3], rotation: DQuat) -> Self {
+        let led = self.spec.led.get_or_insert_default();
+        let key = Keyframe { at_s, tip_m: position_m.into(), rotation, jaw: 0.0 };
+        if led.keyframes.is_empty() {
+            (self.spec.position, self.spec.rotation) = (key.tip_m, rotation);
+        }
+        led.keyframes.push(key);
+        self
+    }
+
+    /// Whether its keyframes start again after the last.
+    #[must_use]
+    pub fn repeating(mut self) -> Self {
+        self.spec.led.get_or_insert_default().repeat = true;
         self
     }
 

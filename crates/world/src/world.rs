@@ -276,6 +276,9 @@ impl World {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
         let state = agent.latest();
+        if agent.takes_poses() && matches!(command, Command::Force(_) | Command::Impulse(_) | Command::Spring(_)) {
+            return Err(refused("it is kinematic: no force moves it; lead it by poses".to_owned()));
+        }
         match command {
             Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => {
                 self.check_point(object, &state, force.anchor)?;

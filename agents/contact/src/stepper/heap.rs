@@ -11,7 +11,7 @@ use super::progress::Progress;
 use super::search::Search;
 use super::{ClusterReport, ClusterScene, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
 use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
@@ -165,7 +165,7 @@ impl Heap {
     }
 
     /// Steps the members of the heap by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
-    /// What pairs gave is added to `totals`.
+    /// What pairs gave is added to `totals`, and to the wrenches of both.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where rapier3d has no finite answer.
@@ -174,7 +174,7 @@ impl Heap {
         all: &[Participant<'_>],
         progress: &mut [Progress],
         h_s: f64,
-        totals: &mut Vec<PairTotal>,
+        (totals, wrenches): (&mut Vec<PairTotal>, &mut [Wrench]),
     ) -> Result<HeapReport, StepError> {
         let Self { world: Some(world), domains } = self else { return Ok(HeapReport::default()) };
         world.take(all, domains, progress, h_s);
@@ -204,6 +204,12 @@ impl Heap {
         for Given { member, partner, impulse_n_s, depth_m, counts } in world.given.drain(..) {
             let total = total_of(totals, member, partner);
             total.add(impulse_n_s, depth_m);
+            wrenches[member].force_n += impulse_n_s;
+            if let Partner::Agent(id) = partner
+                && let Ok(other) = all.binary_search_by_key(&id, |one| one.id)
+            {
+                wrenches[other].force_n -= impulse_n_s;
+            }
             // a place is counted once, not in every step of rapier3d
             total.contacts -= u32::from(!counts);
         }

@@ -1,5 +1,6 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
+use crate::trajectory::Keyframe;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
@@ -28,6 +29,18 @@ pub struct RigidSpec {
     pub gravity: DVec3,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
+    /// How it is led, of a kinematic body ([`super::KinematicBody`]), whose mass, velocity, spin and gravity have no meaning; `None` for a
+    /// body that moves by what acts on it.
+    pub led: Option<Led>,
+}
+
+/// How a kinematic body moves where no command leads it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Led {
+    /// Poses of the origin of its axes, times rising; jaws have no meaning. None for one that stays where it is.
+    pub keyframes: Vec<Keyframe>,
+    /// Whether the motion starts again after the last keyframe.
+    pub repeat: bool,
 }
 
 /// Why a rigid body cannot be built.
@@ -61,6 +74,9 @@ pub enum RigidError {
 /// The largest coordinate or speed accepted, metres or m/s: beyond it a contact solver in single precision would lose all resolution.
 pub(super) const REACH_MAX: f64 = 1e6;
 
+/// The longest script, seconds (11 days).
+const SCRIPT_MAX_S: f64 = 1e6;
+
 impl RigidSpec {
     /// A solid of `mass_kg` at `position` on which nothing acts: zero velocity, no gravity, friction 0.5, no bounce;
     /// it never reports rest.
@@ -78,7 +94,14 @@ impl RigidSpec {
             traits: ContactTraits::default(),
             gravity: DVec3::ZERO,
             sleep: false,
+            led: None,
         }
+    }
+
+    /// Shifts its start and its keyframes, metres.
+    pub fn shift(&mut self, by_m: DVec3) {
+        self.position += by_m;
+        self.led.iter_mut().flat_map(|led| &mut led.keyframes).for_each(|key| key.tip_m += by_m);
     }
 
     /// Whether every number is in its range.
@@ -93,7 +116,25 @@ impl RigidSpec {
         vector("the velocity", self.velocity)?;
         vector("the spin", self.spin)?;
         vector("the gravity", self.gravity)?;
-        rotation("the rotation", self.rotation)
+        rotation("the rotation", self.rotation)?;
+        self.led.as_ref().map_or(Ok(()), Led::check)
+    }
+}
+
+impl Led {
+    fn check(&self) -> Result<(), RigidError> {
+        let mut before_s = 0.0;
+        for (at, key) in self.keyframes.iter().enumerate() {
+            let rises = if at == 0 { key.at_s >= before_s } else { key.at_s > before_s };
+            if !(rises && key.at_s <= SCRIPT_MAX_S) {
+                let (what, wanted) = ("the time of a keyframe", "later than the one before, 0 to 1e6 s");
+                return Err(RigidError::BadNumber { what, value: key.at_s, wanted });
+            }
+            before_s = key.at_s;
+            vector("the position of a keyframe", key.tip_m)?;
+            rotation("the rotation of a keyframe", key.rotation)?;
+        }
+        Ok(())
     }
 }
 

@@ -50,6 +50,9 @@ const SPEED_MAX: f64 = 1e4;
 /// Greatest angle of a rotation to either side, degrees: past it double precision leaves less than a billionth of a turn.
 const ROTATION_MAX_DEG: f64 = 1e6;
 
+/// Most keyframes of a script.
+const KEYFRAMES_MAX: usize = 10_000;
+
 /// Sizes of solids, rigid or soft.
 const LENGTH: Allowed = allowed(1e-6..=1e4, "m");
 

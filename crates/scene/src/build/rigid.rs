@@ -4,13 +4,13 @@ use super::mesh;
 use super::mesh::Mesh;
 use super::object::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
-use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
+use super::{FRICTION, KEYFRAMES_MAX, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
 use metachron_geometry::{ContactTraits, Obstacle, Solid, generate_surface};
-use metachron_models::rigid::RigidSpec;
+use metachron_models::rigid::{Keyframe, Led, RigidSpec};
 use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.
@@ -48,6 +48,10 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
             c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
         }
     }
+    let led = [("kinematic", file.kinematic == Some(true)), ("keyframe", file.keyframe.is_some())];
+    for (key, _) in led.into_iter().filter(|(_, given)| *given) {
+        c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
+    }
     let solid = solid(c, place, file, source)?;
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
@@ -70,8 +74,12 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     // a wrong shape gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
     let (position, rotation) = pose(c, place, file);
+    let led = led(c, place, file, rotation);
+    let start = led.as_ref().and_then(|led| led.keyframes.first());
+    let (position, rotation) = start.map_or((position, rotation), |key| (key.tip_m, key.rotation));
     let (restitution, friction) = surface(c, place, file);
     Some(RigidSpec {
+        led,
         solid,
         position,
         rotation,
@@ -84,6 +92,49 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
         gravity: context.gravity,
         sleep: context.sleep,
     })
+}
+
+/// How a kinematic object is led; `None` for one that moves by what acts on it.
+fn led(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Option<Led> {
+    let is_led = file.kinematic == Some(true);
+    for (key, given) in [("keyframe", file.keyframe.is_some()), ("repeat", file.repeat.is_some())] {
+        if given && !is_led {
+            c.wrong(place, key, "is for objects that are led", "expected `kinematic = true`");
+        }
+    }
+    if !is_led {
+        return None;
+    }
+    let moved = [("velocity_m_s", file.velocity_m_s.is_some()), ("spin_rad_s", file.spin_rad_s.is_some())];
+    let placed = ("position_m", file.position_m.is_some() && file.keyframe.is_some());
+    for (key, _) in moved.into_iter().chain([placed]).filter(|(_, given)| *given) {
+        let expected = "expected `[[object.keyframe]]` to say where it is";
+        c.wrong(place, key, "has no effect on a kinematic object that keyframes or commands lead", expected);
+    }
+    Some(Led { keyframes: keyframes(c, place, file, rotation), repeat: file.repeat.unwrap_or(false) })
+}
+
+fn keyframes(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Vec<Keyframe> {
+    let files = file.keyframe.as_deref().unwrap_or_default();
+    if files.len() > KEYFRAMES_MAX {
+        let expected = format!("expected at most {KEYFRAMES_MAX}");
+        c.wrong(place, "keyframe", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    let mut keys: Vec<Keyframe> = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let (place, before) = (place.entry("keyframe", i), keys.last().copied());
+        let at_s = c.optional(&place, "at_s", file.at_s, &TIME).unwrap_or(0.0);
+        if let Some(before) = before.filter(|before| at_s <= before.at_s) {
+            let what = file.at_s.map_or("is missing".to_owned(), |at_s| format!("is {at_s}"));
+            c.wrong(&place, "at_s", what, format!("expected a time after the keyframe before, {} s", before.at_s));
+        }
+        let start = before.map_or(rotation, |before| before.rotation);
+        let turned = file.rotation_deg.map(|deg| c.point(&place, "rotation_deg", deg, ROTATION_MAX_DEG));
+        let tip_m = c.point(&place, "position_m", file.position_m, POSITION_MAX_M);
+        keys.push(Keyframe { at_s, tip_m, rotation: turned.map_or(start, self::rotation), jaw: 0.0 });
+    }
+    keys
 }
 
 pub(super) fn point_or_zero(

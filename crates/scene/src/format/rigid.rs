@@ -49,6 +49,27 @@ pub struct RigidFile {
     pub friction: Option<f64>,
     /// Whether it never moves. Default false; a plane is always fixed.
     pub fixed: Option<bool>,
+    /// Whether it moves as keyframes and commands lead it, and gives way to nothing; mass and density have no effect then. Default false.
+    pub kinematic: Option<bool>,
+    /// Poses of a kinematic object, at most 10000; it starts in the first. Default: it stays at `position_m` until a command leads it.
+    #[schemars(length(max = 10_000))]
+    pub keyframe: Option<Vec<PoseKeyFile>>,
+    /// Whether the motion along `keyframe` starts again after the last, to which it returns from there in as long as its last leg took. Default
+    /// false.
+    pub repeat: Option<bool>,
+}
+
+/// Pose of a kinematic object at one time.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PoseKeyFile {
+    /// Seconds from the start, 0 … 1e6, later than the keyframe before. Default 0 for the first.
+    pub at_s: Option<f64>,
+    /// Position of the origin of the shape's axes, metres.
+    pub position_m: Point,
+    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default: that of the keyframe before; for the first, the
+    /// object's `rotation_deg`.
+    pub rotation_deg: Option<Point>,
 }
 
 /// The shape of a rigid body.
