@@ -1,4 +1,4 @@
-//! What touches an agent now, as its state publishes it.
+//! What touches an agent and holds it now, as its state publishes it.
 
 use crate::{AgentId, SimTime};
 use glam::DVec3;
@@ -35,6 +35,15 @@ impl std::ops::Mul<f64> for Wrench {
     fn mul(self, by: f64) -> Self {
         Self { force_n: self.force_n * by, torque_n_m: self.torque_n_m * by }
     }
+}
+
+/// What a joint's motor and its stops give together along the way that it leaves free.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct JointEffort {
+    /// The joint's number in the scene.
+    pub joint: u32,
+    /// N·m about a hinge's axis, or N along a slide's: of the first body on the second.
+    pub effort: f64,
 }
 
 /// A contact with all its places. It is published by the agent, of two by that of the lower number.

@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, SensorTouch, Wrench};
+use crate::{AttachmentEvent, ContactState, JointEffort, Ledger, LocalModel, PairState, SensorTouch, Wrench};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -53,6 +53,8 @@ pub struct Snapshot {
     /// What all that it touches in that cluster gave it, in the mean of the last step, about its centre of mass; zero of a body that bends. Of
     /// heaps that rapier3d steps it has what acts along normals, without torque.
     pub contact_wrench: Wrench,
+    /// What its hinges and slides gave in the mean of the last step, of those whose first body it is.
+    pub efforts: Vec<JointEffort>,
     /// Its part in a contact cluster; `None` where it steps by itself.
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
@@ -89,6 +91,7 @@ impl Snapshot {
         self.pairs.clear();
         self.contacts.clear();
         self.contact_wrench = Wrench::default();
+        self.efforts.clear();
         self.cluster = None;
         self.bonds.clear();
         self.events.clear();

@@ -35,7 +35,7 @@ use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
     AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets,
-    Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
+    Grip, JointEffort, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
 };
 use std::sync::Arc;
 
@@ -55,6 +55,8 @@ pub(super) struct ClusterSeat {
     contacts: Vec<ContactState>,
     /// What contacts gave it in the last step, N and N·m.
     wrench: Wrench,
+    /// What its joints gave in the last step.
+    efforts: Vec<JointEffort>,
     /// What happened to attachments, of those that it tells of.
     events: Vec<AttachmentEvent>,
     /// Agents that belong into the same cluster, as it sees them.
@@ -135,6 +137,7 @@ impl ClusterSeat {
             pairs: Vec::new(),
             contacts: Vec::new(),
             wrench: Wrench::default(),
+            efforts: Vec::new(),
             events: Vec::new(),
             bonds: Vec::new(),
             sleepers: Vec::new(),
@@ -159,6 +162,7 @@ impl ClusterSeat {
         into.pairs.clone_from(&self.pairs);
         into.contacts.clone_from(&self.contacts);
         into.contact_wrench = self.wrench;
+        into.efforts.clone_from(&self.efforts);
         into.events.clone_from(&self.events);
         into.sensed.clear();
         into.sensed.extend_from_slice(self.memory.sensed());
@@ -174,7 +178,16 @@ impl ClusterSeat {
 
     /// Writes or reads what the next turns need of those before.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.memory, self.grips, self.pairs, self.contacts, self.wrench, self.events)?;
+        archive_values!(
+            archive,
+            self.memory,
+            self.grips,
+            self.pairs,
+            self.contacts,
+            self.wrench,
+            self.efforts,
+            self.events
+        )?;
         archive_values!(archive, self.bonds, self.sleepers)?;
         archive_values!(archive, self.work, self.work_s, self.schedule, self.drift_m, self.state, self.solves)?;
         archive.option(&mut self.stepper, Box::default, |stepper, archive| stepper.archive(archive))?;
@@ -510,6 +523,9 @@ impl AgentRunner {
                 }
             }
             seat.wrench = stepper.wrench_of(me) * dt_s.recip();
+            let own = stepper.efforts().iter().filter(|total| total.member == me);
+            seat.efforts.clear();
+            seat.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
             seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.events);
             seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;

@@ -3,6 +3,10 @@
 //! In: parts with their measures, by name. Out: a [`Scene`] with the defaults that scene files have.
 //! Never here: files; whether a model can be built is found at [`crate::World::start`].
 
+mod rigid;
+mod sensors;
+mod tube;
+
 use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
@@ -13,9 +17,12 @@ use metachron_contact::Agent;
 use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
-use metachron_models::rigid::{Joint, JointError, JointKind, Keyframe, RigidSpec};
-use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
+use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
+pub use rigid::Rigid;
+pub use sensors::SensorOn;
+use sensors::{Mounted, Mounts};
 use std::sync::Arc;
+pub use tube::Tube;
 
 /// Default step rate of a part, Hz.
 const RATE_DEFAULT_HZ: f64 = 240.0;
@@ -23,14 +30,6 @@ const RATE_DEFAULT_HZ: f64 = 240.0;
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Friction and restitution of rigid bodies and static solids where a part does not say otherwise.
 const SURFACE: (f64, f64) = (0.5, 0.2);
-/// Friction of a tube's skin where it does not say otherwise.
-const TUBE_FRICTION: f64 = 0.2;
-/// Equal parts of a tube where it does not say otherwise.
-const SEGMENTS_DEFAULT: usize = 40;
-/// Poisson's ratio and density (kg/m³) of a tube where it does not say otherwise: soft tissue.
-const TISSUE: (f64, f64) = (0.45, 1050.0);
-/// Shear coefficient of thin walls.
-const SHEAR_FACTOR: f64 = 27.0 / 28.0;
 
 /// Why a scene cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -47,6 +46,16 @@ pub enum SceneBuildError {
     NoBody {
         /// The name.
         name: String,
+    },
+    /// A sensor names what there is not.
+    #[error("the sensor \"{sensor}\" is on \"{on}\", which is no {what} of the scene")]
+    NoMount {
+        /// The sensor.
+        sensor: String,
+        /// What it names.
+        on: String,
+        /// What it can be on.
+        what: &'static str,
     },
     /// A joint cannot be.
     #[error("the joint of \"{name}\" cannot be: {reason}")]
@@ -74,11 +83,13 @@ pub struct SceneBuilder {
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
     joints: Vec<Joined>,
+    sensors: Vec<Mounted>,
 }
 
 /// A joint by the names of its bodies; no second one is the world.
 #[derive(Debug, Clone)]
 struct Joined {
+    name: String,
     a: String,
     b: Option<String>,
     kind: JointKind,
@@ -135,27 +146,6 @@ impl From<Custom> for Part {
     }
 }
 
-/// A rigid body before it is added.
-#[derive(Debug, Clone)]
-pub struct Rigid {
-    spec: RigidSpec,
-    rate_hz: f64,
-}
-
-/// A tube before it is added.
-#[derive(Debug, Clone)]
-pub struct Tube {
-    path_m: Vec<DVec3>,
-    radius_m: f64,
-    wall_m: Option<f64>,
-    young_pa: f64,
-    density_kg_m3: f64,
-    segments: usize,
-    clamp: [bool; 2],
-    damping_per_s: f64,
-    rate_hz: f64,
-}
-
 impl From<Rigid> for Part {
     fn from(rigid: Rigid) -> Self {
         Self::Rigid(rigid)
@@ -168,221 +158,16 @@ impl From<Tube> for Part {
     }
 }
 
-impl Rigid {
-    /// A body of this shape: 1 kg at the origin, at rest.
-    #[must_use]
-    pub fn new(solid: Solid) -> Self {
-        let (friction, restitution) = SURFACE;
-        let spec = RigidSpec { friction, restitution, sleep: true, ..RigidSpec::free(solid, DVec3::ZERO, 1.0) };
-        Self { spec, rate_hz: RATE_DEFAULT_HZ }
-    }
-
-    /// A ball of this radius, metres.
-    #[must_use]
-    pub fn ball(radius_m: f64) -> Self {
-        Self::new(Solid::Ball { radius_m })
-    }
-
-    /// A capsule along z of this radius and this half length of its straight part, metres.
-    #[must_use]
-    pub fn capsule(radius_m: f64, half_height_m: f64) -> Self {
-        Self::new(Solid::Capsule { radius_m, half_height_m })
-    }
-
-    /// A box with these half edges, metres.
-    #[must_use]
-    pub fn cuboid(half_extents_m: [f64; 3]) -> Self {
-        Self::new(Solid::Box { half_extents_m: half_extents_m.into() })
-    }
-
-    /// Its mass, kilograms, 1e-9 … 1e9.
-    #[must_use]
-    pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
-        self.spec.mass_kg = mass_kg;
-        self
-    }
-
-    /// Position of its shape's origin, metres.
-    #[must_use]
-    pub fn at(mut self, position_m: [f64; 3]) -> Self {
-        self.spec.position = position_m.into();
-        self
-    }
-
-    /// Rotation from its shape's axes to the world's.
-    #[must_use]
-    pub const fn turned(mut self, rotation: DQuat) -> Self {
-        self.spec.rotation = rotation;
-        self
-    }
-
-    /// Velocity at the start, m/s.
-    #[must_use]
-    pub fn velocity_m_s(mut self, velocity: [f64; 3]) -> Self {
-        self.spec.velocity = velocity.into();
-        self
-    }
-
-    /// Coefficient of restitution, 0 … 1.
-    #[must_use]
-    pub const fn restitution(mut self, restitution: f64) -> Self {
-        self.spec.restitution = restitution;
-        self
-    }
-
-    /// Coulomb friction coefficient, ≥ 0.
-    #[must_use]
-    pub const fn friction(mut self, friction: f64) -> Self {
-        self.spec.friction = friction;
-        self
-    }
-
-    /// What it says about its contacts: what it collides with, rules of pairs, whether it only senses.
-    #[must_use]
-    pub const fn contact(mut self, traits: ContactTraits) -> Self {
-        self.spec.traits = traits;
-        self
-    }
-
-    /// Kinematic: it moves as [`metachron_runtime::Command::pose`] and its keyframes lead it, and gives way to nothing. What touches it pushes
-    /// back, which [`metachron_core::Snapshot::contact_wrench`] has. Its mass and velocity have no meaning.
-    #[must_use]
-    pub fn kinematic(mut self) -> Self {
-        self.spec.led.get_or_insert_default();
-        self
-    }
-
-    /// Kinematic, with one more keyframe: at `at_s` seconds of its time, later than the one before, the origin of its shape is at `position_m`,
-    /// metres, turned by `rotation`. It starts in the first.
-    #[must_use]
-    pub fn keyframe(mut self, at_s: f64, position_m: [f64; 3], rotation: DQuat) -> Self {
-        let led = self.spec.led.get_or_insert_default();
-        let key = Keyframe { at_s, tip_m: position_m.into(), rotation, jaw: 0.0 };
-        if led.keyframes.is_empty() {
-            (self.spec.position, self.spec.rotation) = (key.tip_m, rotation);
-        }
-        led.keyframes.push(key);
-        self
-    }
-
-    /// Whether its keyframes start again after the last.
-    #[must_use]
-    pub fn repeating(mut self) -> Self {
-        self.spec.led.get_or_insert_default().repeat = true;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
-    }
-}
-
-impl Tube {
-    /// A tube along these points, metres: of soft tissue, 1 cm in radius, solid, both ends free.
-    #[must_use]
-    pub fn along(path_m: &[[f64; 3]]) -> Self {
-        Self {
-            path_m: path_m.iter().map(|point| DVec3::from_array(*point)).collect(),
-            radius_m: 0.01,
-            wall_m: None,
-            young_pa: 1e6,
-            density_kg_m3: TISSUE.1,
-            segments: SEGMENTS_DEFAULT,
-            clamp: [false; 2],
-            damping_per_s: 0.0,
-            rate_hz: RATE_DEFAULT_HZ,
-        }
-    }
-
-    /// Outer radius, metres, > 0.
-    #[must_use]
-    pub const fn radius_m(mut self, radius_m: f64) -> Self {
-        self.radius_m = radius_m;
-        self
-    }
-
-    /// Thickness of its wall, metres, above 0 and at most its radius; without it the tube is solid.
-    #[must_use]
-    pub const fn wall_m(mut self, wall_m: f64) -> Self {
-        self.wall_m = Some(wall_m);
-        self
-    }
-
-    /// Young's modulus, Pa, > 0.
-    #[must_use]
-    pub const fn young_pa(mut self, young_pa: f64) -> Self {
-        self.young_pa = young_pa;
-        self
-    }
-
-    /// Density, kg/m³, > 0.
-    #[must_use]
-    pub const fn density_kg_m3(mut self, density_kg_m3: f64) -> Self {
-        self.density_kg_m3 = density_kg_m3;
-        self
-    }
-
-    /// Number of equal parts, 2 … 4096.
-    #[must_use]
-    pub const fn segments(mut self, segments: usize) -> Self {
-        self.segments = segments;
-        self
-    }
-
-    /// Which ends are held in position and direction: start, end.
-    #[must_use]
-    pub const fn clamp(mut self, ends: [bool; 2]) -> Self {
-        self.clamp = ends;
-        self
-    }
-
-    /// Mass-proportional damping, 1/s, ≥ 0.
-    #[must_use]
-    pub const fn damping_per_s(mut self, damping_per_s: f64) -> Self {
-        self.damping_per_s = damping_per_s;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
-    }
-
-    fn spec(self, gravity: DVec3) -> TubeSpec {
-        let material = Elastic {
-            young_pa: self.young_pa,
-            poisson: TISSUE.0,
-            density_kg_m3: self.density_kg_m3,
-            shear_factor: SHEAR_FACTOR,
-        };
-        let section = Section::hollow(self.radius_m, self.wall_m.unwrap_or(self.radius_m), material);
-        TubeSpec {
-            clamp: self.clamp,
-            damping_per_s: self.damping_per_s,
-            self_contact: true,
-            friction: TUBE_FRICTION,
-            gravity,
-            sleep: true,
-            ..TubeSpec::free(self.path_m, section, self.segments)
-        }
-    }
-}
-
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
     pub(super) const fn new() -> Self {
-        let joints = Vec::new();
         Self {
             gravity: GRAVITY_DEFAULT,
             contact_depth_m: DEPTH_DEFAULT_M,
             fixed: Vec::new(),
             parts: Vec::new(),
-            joints,
+            joints: Vec::new(),
+            sensors: Vec::new(),
         }
     }
 
@@ -424,7 +209,29 @@ impl SceneBuilder {
     /// the axes of a's shape. Springs and ropes, which have two ends, are not for this.
     #[must_use]
     pub fn joint(mut self, a: &str, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
-        self.joints.push(Joined { a: a.to_owned(), b: b.map(str::to_owned), kind, at_m: at_m.into() });
+        self.joints.push(Joined {
+            name: String::new(),
+            a: a.to_owned(),
+            b: b.map(str::to_owned),
+            kind,
+            at_m: at_m.into(),
+        });
+        self
+    }
+
+    /// Names the joint that was added last, so that [`super::World::joint`] and sensors find it.
+    #[must_use]
+    pub fn joint_name(mut self, name: impl Into<String>) -> Self {
+        if let Some(joint) = self.joints.last_mut() {
+            joint.name = name.into();
+        }
+        self
+    }
+
+    /// Adds a sensor, which [`super::World::sensor`] reads.
+    #[must_use]
+    pub fn sensor(mut self, name: impl Into<String>, on: SensorOn) -> Self {
+        self.sensors.push(Mounted { name: name.into(), on });
         self
     }
 
@@ -440,18 +247,18 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
-        let Self { gravity, contact_depth_m, fixed, parts, joints } = self;
-        let names: Vec<&String> =
-            fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
-        if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
-            return Err(SceneBuildError::SameName { name: (*name).clone() });
-        }
+        self.check_names()?;
+        let Self { gravity, contact_depth_m, fixed, parts, joints, sensors } = self;
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
         let agents = agents?;
+        let joint_names: Vec<_> = joints.iter().map(|joined| joined.name.clone()).collect();
         let joints: Result<Arc<[_]>, _> = joints.iter().map(|joined| joined.between(&agents)).collect();
+        let mounts = Mounts { agents: &agents, fixed: &obstacles, joints: &joint_names };
+        let sensors: Result<Vec<_>, _> = sensors.into_iter().map(|mounted| mounts.sensor(mounted)).collect();
+        let sensors = sensors?;
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -484,6 +291,8 @@ impl SceneBuilder {
             contacts: true,
             contact_depth_m,
             joints: joints?,
+            joint_names,
+            sensors,
             couplings: Vec::new(),
             probes: Vec::new(),
             overlaps: Vec::new(),
@@ -491,6 +300,21 @@ impl SceneBuilder {
         };
         scene.resolve_initial_overlaps();
         Ok(scene)
+    }
+}
+
+impl SceneBuilder {
+    /// Whether all names of a kind differ.
+    fn check_names(&self) -> Result<(), SceneBuildError> {
+        let differ = |names: &[&String]| match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+            Some((_, name)) => Err(SceneBuildError::SameName { name: (*name).clone() }),
+            None => Ok(()),
+        };
+        let fixed = self.fixed.iter().map(|solid| &solid.name);
+        differ(&fixed.chain(self.parts.iter().map(|(name, _)| name)).collect::<Vec<_>>())?;
+        let joints = self.joints.iter().map(|joint| &joint.name).filter(|name| !name.is_empty());
+        differ(&joints.collect::<Vec<_>>())?;
+        differ(&self.sensors.iter().map(|sensor| &sensor.name).collect::<Vec<_>>())
     }
 }
 

@@ -12,6 +12,7 @@ use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
 use super::object::{Object, WorldTag};
+use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
@@ -80,6 +81,22 @@ pub enum WorldError {
         /// Why.
         reason: String,
     },
+    /// The world has no joint of that name.
+    #[error("the world has no joint \"{name}\"; its joints with names are [{known}]")]
+    NoJoint {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// The world has no sensor of that name.
+    #[error("the world has no sensor \"{name}\"; its sensors are [{known}]")]
+    NoSensor {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// A query that asks for nothing that can be found.
     #[error("{0}")]
     BadQuery(String),
@@ -109,6 +126,7 @@ struct Shared {
     gravity: DVec3,
     /// The static solids and joints.
     surroundings: Arc<ClusterScene>,
+    instruments: Instruments,
     executor: ExecutorKind,
     /// By what checkpoints of its scene are known again.
     identity: SceneIdentity,
@@ -166,7 +184,9 @@ impl World {
         }
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock };
+        let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
+        let instruments = Instruments { joint_names, joints, sensors: scene.sensors.clone() };
+        let shared = Shared { tag, state, agents, gravity, surroundings, instruments, executor, identity, clock };
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -438,6 +458,10 @@ impl World {
 
     pub(super) fn tag(&self) -> WorldTag {
         self.shared.tag
+    }
+
+    pub(super) fn instruments(&self) -> &Instruments {
+        &self.shared.instruments
     }
 
     pub(super) fn surroundings(&self) -> &ClusterScene {

@@ -24,7 +24,7 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
+        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -68,6 +68,7 @@ impl ClusterStepper {
             let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
+        joints.note_efforts(ties, &solution.rows_n_s, efforts);
         yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);

@@ -50,6 +50,7 @@ use blows::Rebounds;
 pub use doubling::StepDoubling;
 use glam::DVec3;
 use heap::Heap;
+pub use joints::JointTotal;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
@@ -189,6 +190,7 @@ pub struct ClusterStepper {
     totals: Vec<PairTotal>,
     /// What contacts gave each participant in the macro step, N·s and N·m·s.
     wrenches: Vec<Wrench>,
+    efforts: Vec<JointTotal>,
     tearing: Tearing,
     yielding: Yielding,
     /// What participants remembered when the macro step began.
@@ -222,6 +224,7 @@ impl Default for ClusterStepper {
             members: Vec::new(),
             totals: Vec::new(),
             wrenches: Vec::new(),
+            efforts: Vec::new(),
             tearing: Tearing::default(),
             yielding: Yielding::default(),
             kept: Vec::new(),
@@ -341,6 +344,7 @@ impl ClusterStepper {
         }
         self.totals.clear();
         self.wrenches.clear();
+        self.efforts.clear();
         self.wrenches.resize(all.len(), Wrench::default());
         self.tearing.begin();
         self.yielding.begin();
@@ -471,6 +475,11 @@ impl ClusterStepper {
     #[must_use]
     pub fn wrench_of(&self, member: usize) -> Wrench {
         self.wrenches.get(member).copied().unwrap_or_default()
+    }
+
+    /// What hinges and slides gave in the last macro step along the ways that they leave free.
+    pub fn efforts(&self) -> &[JointTotal] {
+        &self.efforts
     }
 
     /// What tore in the last macro step, by participants: no later step knows it.

@@ -21,6 +21,7 @@ mod obj;
 mod object;
 mod rigid;
 mod scenery;
+mod sensor;
 mod soft;
 mod soft_mesh;
 mod stage;
@@ -39,6 +40,7 @@ pub(super) use coupling::couplings;
 pub(super) use group::groups;
 pub(super) use joint::joints;
 pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};
+pub(super) use sensor::{joint_names, sensors};
 pub(super) use stage::{camera, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.

@@ -11,6 +11,7 @@ mod joint;
 mod rigid;
 mod scene;
 mod scenery;
+mod sensor;
 mod soft;
 mod synthetic;
 mod tool;
@@ -28,6 +29,7 @@ pub use scene::{
     TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
+pub use sensor::{SensorFile, SensorFileKind};
 pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tool::{KeyframeFile, ToolFile};
