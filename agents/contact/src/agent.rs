@@ -54,6 +54,15 @@ pub trait Agent: Send {
         false
     }
 
+    /// Takes another state between two steps, as its snapshots publish it: what they do not have, such as spins of a tube's parts, is at rest.
+    ///
+    /// # Errors
+    /// What does not fit; nothing is changed then.
+    fn set_state(&mut self, state: &Body) -> Result<(), String> {
+        let _ = state;
+        Err(format!("a {} takes no state", self.model()))
+    }
+
     /// Whether it is led by poses ([`StepContext::pose`]): it then moves as they say, whatever touches it.
     fn takes_poses(&self) -> bool {
         false

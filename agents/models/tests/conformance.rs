@@ -6,7 +6,7 @@ use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange, SimSpan, Snap
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::conformance::fall_deviation;
 use metachron_models::conformance::{Suite, check};
-use metachron_models::rigid::{KinematicBody, Led, RigidBody, RigidSpec};
+use metachron_models::rigid::{KinematicBody, Led, Restraint, RigidBody, RigidSpec};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
@@ -51,6 +51,7 @@ fn brick() -> RigidSpec {
         traits: ContactTraits::default(),
         gravity: GRAVITY,
         sleep: true,
+        restraint: Restraint::default(),
         led: None,
     }
 }

@@ -21,7 +21,7 @@ use super::metrics::{MetricsWriter, SMOOTHING};
 use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
-use metachron_contact::{Agent, Link, SetMotion};
+use metachron_contact::{Agent, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -365,7 +365,10 @@ impl AgentRunner {
         if let Some(pressure_pa) = pending.pressure_pa {
             self.agent.set_pressure_pa(pressure_pa);
         }
-        pending.motion.map_or(Ok(()), |motion| self.set_motion(&motion))
+        let state = pending.state.as_ref().is_some_and(|state| self.agent.set_state(state).is_ok());
+        let moved = pending.motion.is_some_and(|motion| self.agent.set_motion(&motion));
+        // others find it where it is now
+        if state || moved { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Publishes that nothing of it is left, where nobody finds it.
@@ -382,11 +385,6 @@ impl AgentRunner {
             broad_phase.publish_nowhere(self.id(), time);
         }
         self.shared.gauges.leave();
-    }
-
-    /// Moves it, and writes its state anew, so that others find it where it is now.
-    fn set_motion(&mut self, motion: &SetMotion) -> Result<(), String> {
-        if self.agent.set_motion(motion) { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.

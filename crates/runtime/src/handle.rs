@@ -10,7 +10,7 @@ use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
-use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -143,6 +143,18 @@ impl AgentHandle {
         self.shared.mail.send(command)?;
         self.shared.sleep.wake(self.shared.id);
         Ok(())
+    }
+
+    /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
+    pub fn set_state(&self, state: Body) {
+        self.shared.mail.set_state(state);
+        self.shared.sleep.wake(self.shared.id);
+    }
+
+    /// Lets it leave the run at its next turn.
+    pub(super) fn leave(&self) {
+        self.shared.mail.leave();
+        self.shared.sleep.wake(self.shared.id);
     }
 
     /// Begins to keep its events for readers; the number of the next one.

@@ -4,7 +4,7 @@
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
 use metachron_contact::{AnchorForce, AnchorSpring, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -35,8 +35,6 @@ pub enum Command {
     SetPressure(f64),
     /// Wake up from rest.
     Wake,
-    /// Leave the run for good: nothing of it is left but its number.
-    Leave,
 }
 
 /// Something that is done to an agent until it is taken back, or until its time is over.
@@ -111,6 +109,8 @@ pub(super) struct PendingCommands {
     pub impulses: Vec<AnchorForce>,
     /// The newest place and velocity.
     pub motion: Option<SetMotion>,
+    /// The newest whole state.
+    pub state: Option<Box<Body>>,
     /// It is to leave the run.
     pub leaves: bool,
     /// The newest requested pressure, Pa.
@@ -132,21 +132,29 @@ impl Mailbox {
         if command == Command::Wake {
             return Ok(());
         }
+        self.put(|pending| pending.take(command))
+    }
+
+    /// The agent is to take this state before its next step.
+    pub fn set_state(&self, state: Body) {
+        let _ = self.put(|pending| {
+            pending.state = Some(Box::new(state));
+            Ok(())
+        });
+    }
+
+    /// The agent is to leave the run for good: nothing of it is left but its number.
+    pub fn leave(&self) {
+        let _ = self.put(|pending| {
+            pending.leaves = true;
+            Ok(())
+        });
+    }
+
+    fn put(&self, what: impl FnOnce(&mut PendingCommands) -> Result<(), SendError>) -> Result<(), SendError> {
         let pending = self.pending.get_or_init(Box::default);
         let mut pending = pending.lock().unwrap_or_else(PoisonError::into_inner);
-        match command {
-            Command::Retune(resolution) => pending.set_resolution = Some(resolution),
-            Command::SetDt(dt) => pending.dt = Some(dt),
-            Command::Spring(spring) => renew(&mut pending.springs, spring),
-            Command::Force(force) => renew(&mut pending.forces, force),
-            Command::Motor(motor) => renew(&mut pending.motors, motor),
-            Command::Pose(pose) => renew(&mut pending.poses, pose),
-            Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany)?,
-            Command::SetMotion(motion) => pending.move_by(motion),
-            Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
-            Command::Leave => pending.leaves = true,
-            Command::Wake => {}
-        }
+        what(&mut pending)?;
         self.full.store(true, Release);
         drop(pending);
         Ok(())
@@ -188,6 +196,23 @@ impl PendingCommands {
         let Self { springs, forces, motors, poses, impulses, .. } = self;
         let is_led = !poses.is_empty();
         is_led || !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
+    }
+
+    /// Stores a command in the place of its kind.
+    fn take(&mut self, command: Command) -> Result<(), SendError> {
+        match command {
+            Command::Retune(resolution) => self.set_resolution = Some(resolution),
+            Command::SetDt(dt) => self.dt = Some(dt),
+            Command::Spring(spring) => renew(&mut self.springs, spring),
+            Command::Force(force) => renew(&mut self.forces, force),
+            Command::Motor(motor) => renew(&mut self.motors, motor),
+            Command::Pose(pose) => renew(&mut self.poses, pose),
+            Command::Impulse(impulse) => self.add(impulse).ok_or(SendError::TooMany)?,
+            Command::SetMotion(motion) => self.move_by(motion),
+            Command::SetPressure(pressure_pa) => self.pressure_pa = Some(pressure_pa),
+            Command::Wake => {}
+        }
+        Ok(())
     }
 
     /// Adds an impulse; `None` where there are too many points.
@@ -238,7 +263,7 @@ fn is_sound(command: &Command) -> bool {
     match command {
         Command::Retune(wanted) => wanted.eps_m.is_finite(),
         Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
-        Command::SetDt(_) | Command::Wake | Command::Leave => true,
+        Command::SetDt(_) | Command::Wake => true,
         Command::Spring(Keyed { what, .. }) => what.as_ref().is_none_or(|pull| {
             let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
             is_finite(pull.anchor)

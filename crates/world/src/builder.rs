@@ -5,6 +5,7 @@
 
 mod rigid;
 mod sensors;
+mod soft;
 mod tube;
 
 use super::couplings::Faults;
@@ -21,6 +22,7 @@ use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 pub use rigid::Rigid;
 pub use sensors::SensorOn;
 use sensors::{Mounted, Mounts};
+pub use soft::Soft;
 use std::sync::Arc;
 pub use tube::Tube;
 
@@ -45,6 +47,12 @@ pub enum SceneBuildError {
     #[error("a joint names \"{name}\", which is no rigid body of the scene")]
     NoBody {
         /// The name.
+        name: String,
+    },
+    /// The finest spacing of a soft body gives more cells than a step can take.
+    #[error("the finest ε of \"{name}\" is too fine for its size")]
+    TooFine {
+        /// The part.
         name: String,
     },
     /// A sensor names what there is not.
@@ -96,13 +104,15 @@ struct Joined {
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], or an agent of your own ([`Custom`]).
+/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]).
 #[derive(Debug, Clone)]
 pub enum Part {
     /// A rigid body.
     Rigid(Rigid),
     /// A soft tube, cable or rod.
     Tube(Tube),
+    /// A sheet, solid or rope.
+    Soft(Soft),
     /// An agent of somebody else's.
     Custom(Custom),
 }
@@ -149,6 +159,12 @@ impl From<Custom> for Part {
 impl From<Rigid> for Part {
     fn from(rigid: Rigid) -> Self {
         Self::Rigid(rigid)
+    }
+}
+
+impl From<Soft> for Part {
+    fn from(soft: Soft) -> Self {
+        Self::Soft(soft)
     }
 }
 
@@ -367,19 +383,26 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
         Part::Tube(tube) => tube.rate_hz,
+        Part::Soft(soft) => soft.rate_hz,
         Part::Custom(custom) => custom.rate_hz,
     };
     let dt = SimSpan::from_secs_f64(1.0 / rate_hz).filter(|_| (1.0..=1e5).contains(&rate_hz));
     let Some(dt) = dt else { return Err(SceneBuildError::BadRate { name, rate_hz: rate_hz.to_string() }) };
+    let mut eps_m = None;
     let (spec, start) = match part {
         Part::Rigid(rigid) => {
-            let spec = RigidSpec { gravity, ..rigid.spec };
+            let spec = RigidSpec { gravity: gravity * rigid.gravity_scale, ..rigid.spec };
             (Spec::Rigid(spec), Resolution { eps_m: 1.0, n: N_MAX })
         }
         Part::Tube(tube) => {
             let spec = tube.spec(gravity);
             let start = spec.resolution;
             (Spec::Tube(spec), start)
+        }
+        Part::Soft(soft) => {
+            let Some((spec, range_m)) = soft.spec(gravity) else { return Err(SceneBuildError::TooFine { name }) };
+            eps_m = range_m;
+            (Spec::Soft(spec), Resolution { eps_m: range_m.map_or(1.0, |range| range.0), n: N_MAX })
         }
         Part::Custom(custom) => (Spec::Custom(custom), Resolution { eps_m: 1.0, n: 1 }),
     };
@@ -390,7 +413,7 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
         spec,
         pace: PaceWish { rate_hz, dt, dt_range: (dt, dt) },
         tolerance_m: None,
-        simulation: ResolutionRange::fixed(start),
+        simulation: eps_m.map_or(ResolutionRange::fixed(start), |eps_m| ResolutionRange { eps_m, n: (1, start.n) }),
         start,
         picture,
         links: Vec::new(),

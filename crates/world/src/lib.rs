@@ -44,7 +44,7 @@ mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};
-pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Tube, static_solid};
+pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid};
 pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};

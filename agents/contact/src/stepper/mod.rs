@@ -54,7 +54,7 @@ pub use joints::JointTotal;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
+pub use member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
 use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, Wrench, check_span};

@@ -1,5 +1,6 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
+use super::mass_properties::MassDistribution;
 use crate::trajectory::Keyframe;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
@@ -29,9 +30,52 @@ pub struct RigidSpec {
     pub gravity: DVec3,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
+    /// What slows it down and where it cannot move.
+    pub restraint: Restraint,
     /// How it is led, of a kinematic body ([`super::KinematicBody`]), whose mass, velocity, spin and gravity have no meaning; `None` for a
     /// body that moves by what acts on it.
     pub led: Option<Led>,
+}
+
+/// What slows a rigid body down wherever it is, and the axes of the world along and about which it does not move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Restraint {
+    /// Its velocity decays by this rate, 1/s, 0 … 1e6.
+    pub linear_damping_per_s: f64,
+    /// Its angular momentum likewise.
+    pub angular_damping_per_s: f64,
+    /// Whether it is kept from moving along x, y, z.
+    pub locked_translation: [bool; 3],
+    /// Whether it is kept from turning about x, y, z. Of a body that turns about two axes, gyroscopic torques are left out.
+    pub locked_rotation: [bool; 3],
+}
+
+impl Restraint {
+    /// What is left of a velocity, m/s.
+    pub(super) fn translation(&self, v: DVec3) -> DVec3 {
+        left(self.locked_translation, v)
+    }
+
+    /// What is left of a spin, rad/s.
+    pub(super) fn rotation(&self, w: DVec3) -> DVec3 {
+        left(self.locked_rotation, w)
+    }
+
+    /// Whether it locks an axis of rotation.
+    pub(super) const fn locks_rotation(&self) -> bool {
+        let [x, y, z] = self.locked_rotation;
+        x || y || z
+    }
+
+    /// Whether it locks any axis.
+    pub(super) const fn locks(&self) -> bool {
+        let [x, y, z] = self.locked_translation;
+        x || y || z || self.locks_rotation()
+    }
+}
+
+fn left(locked: [bool; 3], v: DVec3) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|i| if locked[i] { 0.0 } else { v[i] }))
 }
 
 /// How a kinematic body moves where no command leads it.
@@ -94,8 +138,15 @@ impl RigidSpec {
             traits: ContactTraits::default(),
             gravity: DVec3::ZERO,
             sleep: false,
+            restraint: Restraint::default(),
             led: None,
         }
+    }
+
+    /// Its centre of mass in the axes of its shape, metres; their origin where the shape is none.
+    #[must_use]
+    pub fn com_local(&self) -> DVec3 {
+        MassDistribution::of(&self.solid, self.mass_kg).map_or(DVec3::ZERO, |spread| spread.com)
     }
 
     /// Shifts its start and its keyframes, metres.
@@ -112,6 +163,9 @@ impl RigidSpec {
         number("the mass", self.mass_kg, (1e-9, 1e9), "between 1e-9 and 1e9 kg")?;
         number("the restitution", self.restitution, (0.0, 1.0), "between 0 and 1")?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
+        let Restraint { linear_damping_per_s, angular_damping_per_s, .. } = self.restraint;
+        number("the linear damping", linear_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
+        number("the angular damping", angular_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
         vector("the spin", self.spin)?;

@@ -2,6 +2,7 @@
 
 mod alike;
 mod bodies;
+mod compounds;
 mod errors;
 mod grasp;
 mod hands;
@@ -10,6 +11,7 @@ mod hung;
 mod joints;
 mod large;
 mod links;
+mod locked;
 mod motors;
 mod organ;
 mod own_model;

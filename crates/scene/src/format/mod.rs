@@ -23,7 +23,7 @@ pub use common::{COMMON_KEYS, CommonFile, HoldKind};
 pub use contact::{CombineRuleName, ContactFile};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use joint::{JointFile, JointKind, MotorFile};
-pub use rigid::{PoseKeyFile, RigidFile, Shape};
+pub use rigid::{Axis, PartFile, PoseKeyFile, RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
     TargetFile, WorldFile,

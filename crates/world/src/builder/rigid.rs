@@ -4,13 +4,14 @@
 
 use super::{RATE_DEFAULT_HZ, SURFACE};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ContactTraits, Solid};
+use metachron_geometry::{CompoundPart, ContactTraits, Solid};
 use metachron_models::rigid::{Keyframe, RigidSpec};
 
 /// A rigid body before it is added.
 #[derive(Debug, Clone)]
 pub struct Rigid {
     pub(super) spec: RigidSpec,
+    pub(super) gravity_scale: f64,
     pub(super) rate_hz: f64,
 }
 
@@ -20,13 +21,20 @@ impl Rigid {
     pub fn new(solid: Solid) -> Self {
         let (friction, restitution) = SURFACE;
         let spec = RigidSpec { friction, restitution, sleep: true, ..RigidSpec::free(solid, DVec3::ZERO, 1.0) };
-        Self { spec, rate_hz: RATE_DEFAULT_HZ }
+        Self { spec, gravity_scale: 1.0, rate_hz: RATE_DEFAULT_HZ }
     }
 
     /// A ball of this radius, metres.
     #[must_use]
     pub fn ball(radius_m: f64) -> Self {
         Self::new(Solid::Ball { radius_m })
+    }
+
+    /// Several solids as one body: each with where its axes are in those of the body, metres, and turned. All are equally dense; see
+    /// [`CompoundPart::density`].
+    #[must_use]
+    pub fn compound(parts: impl IntoIterator<Item = CompoundPart>) -> Self {
+        Self::new(Solid::Compound { parts: parts.into_iter().collect() })
     }
 
     /// A capsule along z of this radius and this half length of its straight part, metres.
@@ -80,6 +88,35 @@ impl Rigid {
     #[must_use]
     pub const fn friction(mut self, friction: f64) -> Self {
         self.spec.friction = friction;
+        self
+    }
+
+    /// How many times as strong gravity is for it; below zero it rises.
+    #[must_use]
+    pub const fn gravity_scale(mut self, gravity_scale: f64) -> Self {
+        self.gravity_scale = gravity_scale;
+        self
+    }
+
+    /// By which rates its velocity and its angular momentum decay, 1/s, 0 … 1e6.
+    #[must_use]
+    pub const fn damping_per_s(mut self, linear_per_s: f64, angular_per_s: f64) -> Self {
+        let restraint = &mut self.spec.restraint;
+        (restraint.linear_damping_per_s, restraint.angular_damping_per_s) = (linear_per_s, angular_per_s);
+        self
+    }
+
+    /// Along which axes of the world it does not move: x, y, z.
+    #[must_use]
+    pub const fn lock_translation(mut self, axes: [bool; 3]) -> Self {
+        self.spec.restraint.locked_translation = axes;
+        self
+    }
+
+    /// About which axes of the world it does not turn: x, y, z.
+    #[must_use]
+    pub const fn lock_rotation(mut self, axes: [bool; 3]) -> Self {
+        self.spec.restraint.locked_rotation = axes;
         self
     }
 
