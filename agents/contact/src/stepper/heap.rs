@@ -53,6 +53,14 @@ pub(super) struct HeapReport {
     pub depth_m: f64,
 }
 
+/// Where the heap adds what its contacts gave.
+pub(super) struct Sums<'a> {
+    /// Of pairs.
+    pub totals: &'a mut Vec<PairTotal>,
+    /// Of participants, by their places.
+    pub wrenches: &'a mut [Wrench],
+}
+
 /// The bodies of a heap in rapier3d.
 struct World {
     physics: PhysicsWorld,
@@ -165,7 +173,7 @@ impl Heap {
     }
 
     /// Steps the members of the heap by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
-    /// What pairs gave is added to `totals`, and to the wrenches of both.
+    /// What pairs gave is added to sums.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where rapier3d has no finite answer.
@@ -174,9 +182,10 @@ impl Heap {
         all: &[Participant<'_>],
         progress: &mut [Progress],
         h_s: f64,
-        (totals, wrenches): (&mut Vec<PairTotal>, &mut [Wrench]),
+        into: Sums<'_>,
     ) -> Result<HeapReport, StepError> {
         let Self { world: Some(world), domains } = self else { return Ok(HeapReport::default()) };
+        let Sums { totals, wrenches } = into;
         world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
         let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);

@@ -49,7 +49,7 @@ use crate::law::Law;
 use blows::Rebounds;
 pub use doubling::StepDoubling;
 use glam::DVec3;
-use heap::Heap;
+use heap::{Heap, Sums};
 pub use joints::JointTotal;
 use joints::Joints;
 pub use local::LocalQuery;
@@ -395,7 +395,9 @@ impl ClusterStepper {
 
     /// Steps a heap from the velocities that its members have without contact.
     fn step_heap(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        self.heap.step(all, &mut self.progress, h_s, (&mut self.totals, &mut self.wrenches))?.add_to(report);
+        self.heap
+            .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
+            .add_to(report);
         Ok(())
     }
 

@@ -32,13 +32,13 @@ pub struct KinematicBody {
     /// Velocity of its middle and spin in the step begun, and where that ends.
     led_m_s: DVec3,
     led_rad_s: DVec3,
-    to: Place6,
+    to: BodyPose,
     kept: Option<Now>,
 }
 
 /// Where its middle is, metres, and its rotation to the world's axes.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Place6 {
+struct BodyPose {
     position: DVec3,
     rotation: DQuat,
 }
@@ -47,7 +47,7 @@ struct Place6 {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Now {
     time: SimTime,
-    at: Place6,
+    at: BodyPose,
     /// Of its middle and about it, in the last step.
     velocity: DVec3,
     spin: DVec3,
@@ -73,7 +73,7 @@ impl KinematicBody {
         let script = keys.map(|led| Script::new(&led.keyframes, led.repeat));
         let start = script.as_ref().map(|script| script.at(0.0));
         let (origin, rotation) = start.map_or((spec.position, spec.rotation.normalize()), |at| (at.tip, at.rotation));
-        let at = Place6 { position: origin + rotation * com_local, rotation };
+        let at = BodyPose { position: origin + rotation * com_local, rotation };
         let (velocity, spin) = (DVec3::ZERO, DVec3::ZERO);
         let now = Now { time: SimTime::ZERO, at, velocity, spin, goal: None, at_rest: false, steps: 0 };
         let (led_m_s, led_rad_s) = (velocity, spin);
@@ -82,9 +82,10 @@ impl KinematicBody {
     }
 
     /// Where it is led in a step of `h_s` seconds from now.
-    fn led_to(&self, h_s: f64) -> Place6 {
+    fn led_to(&self, h_s: f64) -> BodyPose {
         let Now { time, at, velocity, goal, .. } = self.now;
-        let middle = |origin: DVec3, rotation: DQuat| Place6 { position: origin + rotation * self.com_local, rotation };
+        let middle =
+            |origin: DVec3, rotation: DQuat| BodyPose { position: origin + rotation * self.com_local, rotation };
         if let Some(goal) = goal {
             let PoseGoal { position_m, rotation, .. } = goal.after(h_s);
             return middle(position_m, rotation);
@@ -105,7 +106,7 @@ impl KinematicBody {
 
     /// Whether it is where its script has it.
     fn is_on(&self, script: &Pace) -> bool {
-        let Place6 { position, rotation } = self.now.at;
+        let BodyPose { position, rotation } = self.now.at;
         let off_m = position - rotation * self.com_local - script.tip;
         off_m.length() < ARRIVED_M && rotation.dot(script.rotation).abs() > 1.0 - SAME_TURN
     }
@@ -144,7 +145,7 @@ impl ClusterMember for KinematicBody {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        let Place6 { position, rotation } = self.now.at;
+        let BodyPose { position, rotation } = self.now.at;
         Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
     }
 
@@ -163,7 +164,7 @@ impl ClusterMember for KinematicBody {
     }
 
     fn pose(&self, _v: &[DVec3], t_s: f64) -> Option<Pose> {
-        let Place6 { position, rotation } = self.now.at;
+        let BodyPose { position, rotation } = self.now.at;
         let (led_rad_s, centre_m) = (self.led_rad_s, position + self.led_m_s * t_s);
         let rotation = if t_s > 0.0 { DQuat::from_scaled_axis(led_rad_s * t_s) * rotation } else { rotation };
         let origin_m = centre_m - rotation * self.com_local;
@@ -244,10 +245,10 @@ impl Agent for KinematicBody {
 
     /// Only elsewhere: how it moves is for what leads it.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
-        let Place6 { position, rotation } = self.now.at;
+        let BodyPose { position, rotation } = self.now.at;
         let origin_m = set.position_m.unwrap_or(position - rotation * self.com_local);
         let rotation = set.rotation.map_or(rotation, DQuat::normalize);
-        let to = Place6 { position: origin_m + rotation * self.com_local, rotation };
+        let to = BodyPose { position: origin_m + rotation * self.com_local, rotation };
         if to.position.abs().max_element() > super::spec::REACH_MAX || to == self.now.at {
             return false;
         }
@@ -261,7 +262,7 @@ impl Agent for KinematicBody {
 
     /// Its estimate of its own error is the rounding of its coordinates.
     fn write_snapshot(&self, into: &mut Snapshot) {
-        let Now { at: Place6 { position, rotation }, velocity, spin, at_rest, steps, .. } = self.now;
+        let Now { at: BodyPose { position, rotation }, velocity, spin, at_rest, steps, .. } = self.now;
         into.clear();
         into.steps = steps;
         into.resolution = None;

@@ -324,18 +324,21 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
         c.wrong(place, "part", format_args!("has {} entries", parts.len()), expected);
         return None;
     }
-    let default = file.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
-    let parts = parts.iter().enumerate().map(|(i, file)| part(c, &place.entry("part", i), file, (source, default)));
+    let among = PartContext { source, density_kg_m3: file.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3) };
+    let parts = parts.iter().enumerate().map(|(i, file)| part(c, &place.entry("part", i), file, among));
     Some(Solid::Compound { parts: parts.collect::<Option<Vec<_>>>()?.into() })
 }
 
-/// A part of a compound, with its density against the `default` one.
-fn part(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    file: &PartFile,
-    (source, default): (&Source, f64),
-) -> Option<CompoundPart> {
+/// What the parts of a compound share.
+#[derive(Clone, Copy)]
+struct PartContext<'a> {
+    source: &'a Source,
+    /// Of parts that have none of their own.
+    density_kg_m3: f64,
+}
+
+/// A part of a compound, with its density against that of others.
+fn part(c: &mut Checker<'_, '_>, place: &Place, file: &PartFile, among: PartContext<'_>) -> Option<CompoundPart> {
     if matches!(file.shape, Shape::Plane | Shape::Compound) {
         c.wrong(place, "shape", "cannot be a part", "expected a solid that is neither a plane nor a compound");
         return None;
@@ -344,6 +347,7 @@ fn part(
     if !keys.check(c, place) {
         return None;
     }
+    let PartContext { source, density_kg_m3: default } = among;
     let solid = keys.solid(c, place, source)?;
     let position_m = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
     let rotation = rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG));
