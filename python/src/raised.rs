@@ -20,7 +20,10 @@ pub fn in_world(number: usize, error: &WorldError) -> PyErr {
 
 fn exception(error: &WorldError, message: String) -> PyErr {
     match error {
-        WorldError::NoObject { .. } | WorldError::NoAgent(_) => PyKeyError::new_err(message),
+        WorldError::NoObject { .. }
+        | WorldError::NoAgent(_)
+        | WorldError::NoSensor { .. }
+        | WorldError::NoJoint { .. } => PyKeyError::new_err(message),
         WorldError::Foreign | WorldError::Gone { .. } | WorldError::Stopped | WorldError::Run(_) => {
             PyRuntimeError::new_err(message)
         }

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 #[pyclass(module = "metachron")]
 pub struct Scene {
     inner: Inner,
-    /// The names of its joints, by their numbers; none of a scene from TOML.
+    /// The names of the joints that were added to it.
     joints: Vec<String>,
 }
 
@@ -45,6 +45,9 @@ struct Moving {
     mass: Option<f64>,
     velocity: Option<Vector>,
     rate: Option<f64>,
+    kinematic: bool,
+    gravity_scale: Option<f64>,
+    damping: Option<(f64, f64)>,
 }
 
 impl Placed {
@@ -65,7 +68,8 @@ impl Moving {
             return Ok(None);
         }
         let (mass, velocity, rate) = (field(part, "mass")?, field(part, "velocity")?, field(part, "rate")?);
-        Ok(Some(Self { mass, velocity, rate }))
+        let (kinematic, gravity_scale) = (field(part, "kinematic")?, field(part, "gravity_scale")?);
+        Ok(Some(Self { mass, velocity, rate, kinematic, gravity_scale, damping: field(part, "damping")? }))
     }
 }
 
@@ -103,7 +107,7 @@ impl Scene {
         solid: &Bound<'py, PyAny>,
     ) -> PyResult<PyRefMut<'py, Self>> {
         let (shape, placed) = (shape(solid)?, Placed::of(solid)?);
-        let is_still = |m: Moving| m.mass.is_none() && m.velocity.is_none() && m.rate.is_none();
+        let is_still = |m: Moving| m.mass.is_none() && m.velocity.is_none() && m.rate.is_none() && !m.kinematic;
         if !Moving::of(solid)?.is_none_or(is_still) {
             let message = format!("\"{name}\" is fixed: it has no mass, no velocity and no rate");
             return Err(PyValueError::new_err(message));
@@ -137,7 +141,7 @@ impl Scene {
             return Err(PyValueError::new_err(format!("the scene has a joint \"{name}\" already")));
         }
         let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
-        slf.build(|builder| builder.joint(a, b, kind, at.to_array()))?;
+        slf.build(|builder| builder.joint(a, b, kind, at.to_array()).joint_name(&name))?;
         slf.joints.push(name);
         Ok(slf)
     }
@@ -145,7 +149,7 @@ impl Scene {
     /// Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
     #[pyo3(signature = (executor = "lockstep"))]
     pub fn start(&self, py: Python<'_>, executor: &str) -> PyResult<World> {
-        World::start(py, &self.resolved()?, executor, self.joints.clone())
+        World::start(py, &self.resolved()?, executor)
     }
 }
 
@@ -201,6 +205,11 @@ pub fn part(part: &Bound<'_, PyAny>) -> PyResult<Part> {
     rigid = placed.friction.into_iter().fold(rigid, Rigid::friction);
     rigid = placed.restitution.into_iter().fold(rigid, Rigid::restitution);
     rigid = moving.mass.into_iter().fold(rigid, Rigid::mass_kg);
+    rigid = moving.gravity_scale.into_iter().fold(rigid, Rigid::gravity_scale);
+    rigid = moving.damping.into_iter().fold(rigid, |rigid, (linear, angular)| rigid.damping_per_s(linear, angular));
+    if moving.kinematic {
+        rigid = rigid.kinematic();
+    }
     Ok(moving.rate.into_iter().fold(rigid, Rigid::rate_hz).into())
 }
 

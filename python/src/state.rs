@@ -122,6 +122,14 @@ impl State {
         Ok(row(py, self.turning("spin")?.1.to_array()))
     }
 
+    /// (6,), N and N m, world axes: what contacts gave a body that does not bend, about its centre of mass, in the mean of its last step.
+    #[getter]
+    fn contact_wrench<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let wrench = self.0.contact_wrench;
+        let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n.to_array(), wrench.torque_n_m.to_array());
+        row(py, [fx, fy, fz, tx, ty, tz])
+    }
+
     /// (n - 1, 4): of a tube, the rotations of its segments, whose z is along it.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {

@@ -18,6 +18,7 @@ use metachron::core::SimSpan;
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, EventFilter};
+use numpy::PyArray1;
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -69,17 +70,16 @@ const PIECE: SimSpan = SimSpan::from_millis(20);
 type Given<'py> = Bound<'py, PyDict>;
 
 impl World {
-    /// Starts a scene whose joints have these names, by their numbers.
-    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str, joints: Vec<String>) -> PyResult<Self> {
+    /// Starts a scene.
+    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str) -> PyResult<Self> {
         let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
             let known = EXECUTORS.map(ExecutorKind::name).join(", ");
             return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
         };
         let inner = py.detach(|| world::World::start(scene, kind)).map_err(raised::world)?;
-        let mut names = joints.into_iter();
-        let joints = scene.joints.iter().map(|joint| {
+        let joints = scene.joints.iter().zip(&scene.joint_names).map(|(joint, name)| {
             let body = inner.object_of(joint.a).map_err(raised::world)?;
-            Ok(Joint { name: names.next(), body })
+            Ok(Joint { name: Some(name.clone()).filter(|name| !name.is_empty()), body })
         });
         let joints = joints.collect::<PyResult<_>>()?;
         let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
@@ -142,7 +142,6 @@ impl World {
     /// Simulated time, s.
     #[getter]
     fn time(&self, py: Python<'_>) -> f64 {
-        // in lockstep it waits for a piece of `advance` in another thread
         py.detach(|| self.inner.time().as_secs_f64())
     }
 
@@ -258,6 +257,34 @@ impl World {
         let command = Command::spring(anchor, target.unwrap_or_default(), stiffness, damping);
         let command = if target.is_none() { command.taken_back() } else { command };
         self.send(&object, keywords.timed(command)?)
+    }
+
+    /// Leads a kinematic body to a pose within its next step, and along by a velocity, m/s, and a spin, rad/s; `None` lets it go.
+    #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY), **keywords))]
+    fn pose(
+        &self,
+        object: Named<'_>,
+        position: Option<Vector>,
+        rotation: Rotation,
+        keywords: Option<&Given<'_>>,
+    ) -> PyResult<()> {
+        let keywords = Keywords::new("pose", keywords, &["velocity", "spin", "expires"])?;
+        let [velocity, spin] = ["velocity", "spin"].map(|name| keywords.get::<Vector>(name));
+        let (velocity, spin) = (velocity?.map_or(DVec3::ZERO, |v| v.0), spin?.map_or(DVec3::ZERO, |v| v.0));
+        let command = Command::pose(position.map_or(DVec3::ZERO, |v| v.0), rotation.0).moving(velocity, spin);
+        let command = if position.is_none() { command.taken_back() } else { command };
+        self.send(&object, keywords.timed(command)?)
+    }
+
+    /// Puts an object into a state that it had, or another one of as many nodes.
+    fn set_state(&self, object: Named<'_>, state: &State) -> PyResult<()> {
+        self.inner.set_state(object.of(&self.inner)?, &state.0.body).map_err(raised::world)
+    }
+
+    /// What a sensor of the scene reads, of the newest states. Raises `KeyError`.
+    fn sensor<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let reading = self.inner.sensor(name).map_err(raised::world)?;
+        Ok(crate::numbers::array(py, reading.values.into()))
     }
 
     /// To another place: a rigid body to this rotation, what bends turned by it.

@@ -97,6 +97,24 @@ def test_a_motor_turns_its_hinge() -> None:
         world.motor("axis", velocity=1.0)
 
 
+def test_a_pose_leads_a_plate_that_feels_its_load_and_a_state_is_set_back() -> None:
+    scene = mc.Scene().add("plate", mc.Box([0.2, 0.2, 0.01], kinematic=True))
+    world = scene.add("ball", mc.Ball(0.05, mass=0.3, at=[0.0, 0.0, 0.0601], restitution=0.0)).start()
+    world.advance(0.5)
+    before = world.state("ball")
+    world.pose("plate", [0.0, 0.0, 0.0], velocity=[0.0, 0.0, 0.2], expires=1.0)
+    world.advance(0.8)
+    assert world.state("ball").velocities[0, 2] == pytest.approx(0.2, abs=1e-3)
+    assert world.state("plate").contact_wrench[:3] == pytest.approx([0.0, 0.0, -0.3 * 9.81], abs=0.01)
+    world.set_state("ball", before)
+    world.advance(0.01)
+    assert world.state("ball").positions[0] == pytest.approx(before.positions[0], abs=0.01)
+    with pytest.raises(ValueError, match="own kind"):
+        world.set_state("plate", before)
+    with pytest.raises(KeyError, match="no sensor"):
+        world.sensor("nose")
+
+
 def test_every_bounce_is_told() -> None:
     world = scenes.bouncing().start()
     everything, loud = world.events(), world.events(states=False, above=30.0)

@@ -11,7 +11,8 @@ use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
 use metachron_runtime::{AgentState, Spread};
 use metachron_session::report::{
     AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, MovedReport, OverlapReport,
-    ProbeReport, Quantiles, ReferenceReport, Report, SensorReport, summarise, summarise_choices, summarise_undrawn,
+    ProbeReport, Quantiles, ReadingReport, ReferenceReport, Report, SensorReport, summarise, summarise_choices,
+    summarise_undrawn,
 };
 use metachron_session::{
     AgentOutcome, Coupling, Drawing, End, Event, FrameRecord, Headless, Outcome, PairError, ProbeOutcome,
@@ -21,8 +22,8 @@ use metachron_session::{
 use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
-use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Reading, Scene, Sensor};
 use std::path::PathBuf;
 
 /// Called for every frame; returns whether to go on.
@@ -195,6 +196,13 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
         events: outcome.events.iter().map(|one| event(scene, one)).collect(),
         sensors: outcome.sensors.iter().map(|one| sensor(scene, one)).collect(),
+        readings: scene
+            .sensors
+            .iter()
+            .zip(&outcome.readings)
+            .map(|(sensor, read)| reading(sensor, read.as_ref()))
+            .collect(),
+        parked: outcome.agents.iter().filter(|one| matches!(one.stats.state, AgentState::Parked(_))).count() as u32,
         clusters,
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
@@ -341,6 +349,15 @@ fn reference_report(scene: &Scene, oracle: &ReferenceComparison) -> ReferenceRep
     let couplings = oracle.pairs.iter().map(error).collect();
     let ReferenceComparison { dt_s, sim_s, states, sensitivity_m, .. } = *oracle;
     ReferenceReport { dt_ms: dt_s * 1e3, sim_s, states, sensitivity_m, couplings }
+}
+
+fn reading(sensor: &Sensor, read: Option<&Reading>) -> ReadingReport {
+    ReadingReport {
+        name: sensor.name.clone(),
+        kind: sensor.kind.name().to_owned(),
+        at_s: read.map_or(0.0, |read| read.time.as_secs_f64()),
+        values: read.map_or_else(Vec::new, |read| read.values.clone()),
+    }
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {

@@ -62,6 +62,20 @@ pub trait Agent: Send {
         None
     }
 
+    /// Takes another state between two steps, as its snapshots publish it: what they do not have, such as spins of a tube's parts, is at rest.
+    ///
+    /// # Errors
+    /// What does not fit; nothing is changed then.
+    fn set_state(&mut self, state: &Body) -> Result<(), String> {
+        let _ = state;
+        Err(format!("a {} takes no state", self.model()))
+    }
+
+    /// Whether it is led by poses ([`StepContext::pose`]): it then moves as they say, whatever touches it.
+    fn takes_poses(&self) -> bool {
+        false
+    }
+
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 
@@ -109,6 +123,8 @@ pub struct StepContext<'a> {
     pub forces: &'a [AnchorForce],
     /// Motors that the user has set, of joints whose first body this agent is.
     pub motors: &'a [SetMotor],
+    /// Where the user leads it, at the start of the step; `None` where the user leads it nowhere.
+    pub pose: Option<PoseGoal>,
     /// Bilateral couplings with other agents.
     pub links: &'a [Link],
 }
@@ -175,6 +191,41 @@ pub struct SetMotor {
     pub motor: Option<Motor>,
 }
 
+/// A pose that a body is led to, which itself moves on.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PoseGoal {
+    /// Where the origin of its axes is to be, metres.
+    pub position_m: DVec3,
+    /// From its axes to the world's.
+    pub rotation: DQuat,
+    /// How the origin moves on, m/s.
+    pub velocity_m_s: DVec3,
+    /// How the axes turn on, world axes, rad/s.
+    pub spin_rad_s: DVec3,
+}
+
+impl PoseGoal {
+    /// Whether every number is finite, and the rotation one.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
+        vectors.into_iter().all(DVec3::is_finite) && self.rotation.is_finite() && self.rotation.length_squared() > 0.25
+    }
+
+    /// Where it is `t_s` seconds later.
+    #[must_use]
+    pub fn after(&self, t_s: f64) -> Self {
+        let rotation = (DQuat::from_scaled_axis(self.spin_rad_s * t_s) * self.rotation).normalize();
+        Self { position_m: self.position_m + self.velocity_m_s * t_s, rotation, ..*self }
+    }
+
+    /// Whether it stays where it is.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.velocity_m_s == DVec3::ZERO && self.spin_rad_s == DVec3::ZERO
+    }
+}
+
 /// Another place or velocity for an agent. What is `None` stays.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SetMotion {
@@ -237,7 +288,7 @@ impl<'a> StepContext<'a> {
     /// The context of a step at `time` without neighbours, springs and links, for tests and for agents that nothing acts on.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
-        Self { me, time, neighbours: &[], hands: &[], forces: &[], motors: &[], links: &[] }
+        Self { me, time, neighbours: &[], hands: &[], forces: &[], motors: &[], pose: None, links: &[] }
     }
 
     /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.

@@ -53,7 +53,7 @@ pub mod laws;
 pub mod push_out;
 pub mod stepper;
 
-pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, SetMotion, SetMotor, StepContext};
+pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext};
 pub use asynchronous::acknowledged;
 pub use law::{Law, Link};
 pub use push_out::PUSH_OUT_SHARE;

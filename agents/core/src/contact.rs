@@ -1,4 +1,4 @@
-//! What touches an agent now, as its state publishes it.
+//! What touches an agent and holds it now, as its state publishes it.
 
 use crate::{AgentId, SimTime};
 use glam::DVec3;
@@ -10,6 +10,40 @@ pub enum ContactPartner {
     Static(u32),
     /// Another agent.
     Agent(AgentId),
+}
+
+/// What others give a body by contact: a force, and a torque about its centre of mass, world axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Wrench {
+    /// N.
+    pub force_n: DVec3,
+    /// N·m.
+    pub torque_n_m: DVec3,
+}
+
+impl Wrench {
+    /// Adds a force on the point `arm_m` from the centre of mass.
+    pub fn add(&mut self, force_n: DVec3, arm_m: DVec3) {
+        self.force_n += force_n;
+        self.torque_n_m += arm_m.cross(force_n);
+    }
+}
+
+impl std::ops::Mul<f64> for Wrench {
+    type Output = Self;
+
+    fn mul(self, by: f64) -> Self {
+        Self { force_n: self.force_n * by, torque_n_m: self.torque_n_m * by }
+    }
+}
+
+/// What a joint's motor and its stops give together along the way that it leaves free.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct JointEffort {
+    /// The joint's number in the scene.
+    pub joint: u32,
+    /// N·m about a hinge's axis, or N along a slide's: of the first body on the second.
+    pub effort: f64,
 }
 
 /// A contact with all its places. It is published by the agent, of two by that of the lower number.

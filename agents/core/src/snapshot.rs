@@ -4,7 +4,7 @@
 //! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 use crate::{AgentId, Body, Bounds, ClusterState, Grip, Resolution, SimSpan, SimTime};
-use crate::{AttachmentEvent, ContactState, Ledger, LocalModel, PairState, Removed, SensorTouch};
+use crate::{AttachmentEvent, ContactState, JointEffort, Ledger, LocalModel, PairState, Removed, SensorTouch, Wrench};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -50,6 +50,11 @@ pub struct Snapshot {
     pub pairs: Vec<PairState>,
     /// What it touches in the cluster that it is stepped in, but for agents of lower numbers: these publish it.
     pub contacts: Vec<ContactState>,
+    /// What all that it touches in that cluster gave it, in the mean of the last step, about its centre of mass; zero of a body that bends. Of
+    /// heaps that rapier3d steps it has what acts along normals, without torque.
+    pub contact_wrench: Wrench,
+    /// What its hinges and slides gave in the mean of the last step, of those whose first body it is.
+    pub efforts: Vec<JointEffort>,
     /// Its part in a contact cluster; `None` where it steps by itself.
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
@@ -87,6 +92,8 @@ impl Snapshot {
         (self.drift_m, self.removed) = (0.0, Removed::default());
         self.pairs.clear();
         self.contacts.clear();
+        self.contact_wrench = Wrench::default();
+        self.efforts.clear();
         self.cluster = None;
         self.bonds.clear();
         self.events.clear();

@@ -3,8 +3,9 @@
 //! In: points and triangles, texture coordinates. Out: a [`PrimitiveMesh`] whose core is in metres (extents 1, radius 0).
 //! Never here: levels; a mesh is drawn unchanged.
 
+use super::parry_shapes::hull_triangles;
 use super::topology::places;
-use super::{PrimitiveMesh, PrimitiveVertex};
+use super::{CompoundPart, Primitive, PrimitiveMesh, PrimitiveVertex, Rounding, Solid};
 use glam::{DVec3, Vec2, Vec3};
 use rapier3d::parry::transformation::try_convex_hull;
 use std::collections::BTreeMap;
@@ -88,6 +89,38 @@ pub fn hull_mesh(points_m: &[DVec3]) -> Option<PrimitiveMesh> {
     let points: Arc<[DVec3]> = points.iter().map(|p| p.as_dvec3()).collect();
     let mesh = creased_mesh(&points, &triangles);
     (!mesh.triangles.is_empty()).then_some(mesh)
+}
+
+/// The level of primitives in the mesh of a compound.
+const PART_LEVEL: u8 = 4;
+
+/// All parts of a compound as one mesh.
+#[must_use]
+pub fn compound_mesh(parts: &[CompoundPart]) -> PrimitiveMesh {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for CompoundPart { solid, position_m, rotation, .. } in parts {
+        let first = points.len() as u32;
+        let (corners, faces) = surface_of(solid);
+        points.extend(corners.into_iter().map(|corner| *position_m + *rotation * corner));
+        triangles.extend(faces.into_iter().map(|face| face.map(|corner| first + corner)));
+    }
+    creased_mesh(&points, &triangles)
+}
+
+/// A surface of a solid, in its own axes.
+fn surface_of(solid: &Solid) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+    if let Some((primitive, Rounding { extents, radius_m })) = Primitive::of(solid, PART_LEVEL) {
+        let mesh = primitive.mesh(PART_LEVEL);
+        let corner = |v: &PrimitiveVertex| (v.core * extents + v.normal * radius_m).as_dvec3();
+        return (mesh.vertices.iter().map(corner).collect(), mesh.triangles.clone());
+    }
+    match solid {
+        Solid::Hull { points_m } => {
+            hull_triangles(points_m).map_or_else(|_| Default::default(), |h| (h.points, h.triangles))
+        }
+        Solid::Mesh { points_m, triangles } => (points_m.to_vec(), triangles.to_vec()),
+        _ => Default::default(),
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //!
 //! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: the pose or the mass of the solid.
 
+use super::solid::{COMPOUND_PARTS_MAX, CompoundPart};
 use super::topology::is_closed;
 use super::{Aabb, Solid};
 use glam::{DVec3, Vec3};
@@ -41,6 +42,14 @@ pub enum ShapeError {
     EmptyMesh {
         /// Number of triangles given.
         triangles: usize,
+    },
+    /// A compound without parts, with too many, or with one that cannot be.
+    #[error("part {index} of the compound {why}")]
+    BadPart {
+        /// Number of the part, from 0.
+        index: usize,
+        /// What is wrong with it.
+        why: String,
     },
     /// A triangle refers to a corner that does not exist.
     #[error("triangle {triangle} refers to point {corner}, but the mesh has only {points} points")]
@@ -115,6 +124,21 @@ impl Solid {
                 hull_triangles(points_m)?;
                 SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "the faces of the hull do not close"))?
             }
+            Self::Compound { parts } => {
+                let mut all = Vec::with_capacity(parts.len());
+                for CompoundPart { solid, position_m, rotation, .. } in parts.iter() {
+                    let (shape, turned) = (solid.to_moving_shape()?, rotation.as_quat());
+                    let turn = Rotation::from_xyzw(turned.x, turned.y, turned.z, turned.w);
+                    let pose = Pose::from_parts(position_m.as_vec3(), turn);
+                    match shape.as_compound() {
+                        Some(within) => {
+                            all.extend(within.shapes().iter().map(|(at, shape)| (pose * *at, shape.clone())))
+                        }
+                        None => all.push((pose, shape)),
+                    }
+                }
+                SharedShape::compound(all)
+            }
             Self::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
                 let flags = if is_closed(&mesh) { TriMeshFlags::ORIENTED } else { TriMeshFlags::empty() };
@@ -142,6 +166,30 @@ impl Solid {
         Self::Hull { points_m: points_m.clone() }.to_shared_shape()
     }
 
+    /// The volume that it encloses, m³: of an open mesh that of its hull, zero of a plane, of a compound the sum over its parts.
+    ///
+    /// # Errors
+    /// [`ShapeError`] as of [`Self::to_shared_shape`].
+    pub fn volume_m3(&self) -> Result<f64, ShapeError> {
+        use std::f64::consts::PI;
+        Ok(match self {
+            Self::Ball { radius_m } => 4.0 / 3.0 * PI * radius_m.powi(3),
+            Self::Box { half_extents_m } => 8.0 * half_extents_m.element_product(),
+            Self::Capsule { radius_m: r, half_height_m: h } => PI * r * r * (4.0 / 3.0 * r + 2.0 * h),
+            Self::Cylinder { radius_m: r, half_height_m: h } => PI * r * r * 2.0 * h,
+            Self::Plane => 0.0,
+            Self::Compound { parts } => {
+                let volumes = parts.iter().map(|part| part.solid.volume_m3());
+                volumes.sum::<Result<f64, _>>()?
+            }
+            Self::Hull { points_m } => hull_triangles(points_m)?.volume_m3(),
+            Self::Mesh { points_m, triangles } => {
+                let mesh = mesh_triangles(points_m, triangles)?;
+                if mesh.encloses() { mesh.volume_m3() } else { hull_triangles(points_m)?.volume_m3() }
+            }
+        })
+    }
+
     /// Checks that every length of the solid is finite and above zero, and every point finite.
     pub fn check(&self) -> Result<(), ShapeError> {
         let length = |what, value_m: f64| {
@@ -158,6 +206,7 @@ impl Solid {
                 length("the half height", *half_height_m)
             }
             Self::Plane => Ok(()),
+            Self::Compound { parts } => check_parts(parts),
             Self::Hull { points_m } | Self::Mesh { points_m, .. } => {
                 // single precision must represent them too
                 let bad = points_m.iter().position(|p| !p.as_vec3().is_finite());
@@ -165,6 +214,24 @@ impl Solid {
             }
         }
     }
+}
+
+fn check_parts(parts: &[CompoundPart]) -> Result<(), ShapeError> {
+    if !(1..=COMPOUND_PARTS_MAX).contains(&parts.len()) {
+        let why = format!("is missing or too many: there are {}, and 1 to {COMPOUND_PARTS_MAX} can be", parts.len());
+        return Err(ShapeError::BadPart { index: parts.len().min(COMPOUND_PARTS_MAX), why });
+    }
+    for (index, CompoundPart { solid, position_m, rotation, density }) in parts.iter().enumerate() {
+        let bad = |why: String| Err(ShapeError::BadPart { index, why });
+        if matches!(solid, Solid::Plane | Solid::Compound { .. }) {
+            return bad("is a plane or a compound itself".to_owned());
+        }
+        if !(position_m.as_vec3().is_finite() && rotation.is_normalized() && *density > 0.0 && density.is_finite()) {
+            return bad("has a place, a rotation or a density that is none".to_owned());
+        }
+        solid.check().or_else(|error| bad(format!("cannot be: {error}")))?;
+    }
+    Ok(())
 }
 
 fn flat(points: &[DVec3], why: impl Into<String>) -> ShapeError {

@@ -84,7 +84,7 @@ const fn bevel_divisions(n: u8) -> u32 {
 }
 
 impl Primitive {
-    /// The primitive and size of a solid; `None` for a plane, a hull and a mesh.
+    /// The primitive and size of a solid; `None` for a plane, a hull, a mesh and a compound.
     #[must_use]
     pub fn of(solid: &Solid, n: u8) -> Option<(Self, Rounding)> {
         let shrink = |half: f64, bevel: f64| (half - bevel) as f32;
@@ -105,7 +105,7 @@ impl Primitive {
                 let extents = Vec3::new(r, r, shrink(half_height_m, bevel));
                 Some((Self::Cylinder, Rounding { extents, radius_m: bevel as f32 }))
             }
-            Solid::Plane | Solid::Hull { .. } | Solid::Mesh { .. } => None,
+            Solid::Plane | Solid::Hull { .. } | Solid::Mesh { .. } | Solid::Compound { .. } => None,
         }
     }
 

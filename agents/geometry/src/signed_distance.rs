@@ -144,6 +144,10 @@ impl Field {
             Solid::Capsule { radius_m, half_height_m } => Kind::Capsule(*radius_m, *half_height_m),
             Solid::Cylinder { radius_m, half_height_m } => Kind::Cylinder(*radius_m, *half_height_m),
             Solid::Plane => Kind::Plane,
+            Solid::Compound { .. } => {
+                let why = "has a field of its own, and the compound has none".to_owned();
+                return Err(ShapeError::BadPart { index: 0, why });
+            }
             Solid::Hull { points_m } => {
                 let mut hull = hull_triangles(points_m)?;
                 hull.points.iter_mut().for_each(|p| *p = in_world(p));

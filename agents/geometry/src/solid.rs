@@ -45,9 +45,56 @@ pub enum Solid {
         /// Corner indices of each triangle, counter-clockwise seen from outside.
         triangles: Arc<[[u32; 3]]>,
     },
+    /// Several solids as one, each solid to others where any of them is; only of bodies that move.
+    Compound {
+        /// 1 … [`COMPOUND_PARTS_MAX`]; none is a plane or a compound.
+        parts: Arc<[CompoundPart]>,
+    },
+}
+
+/// The most parts of a compound.
+pub const COMPOUND_PARTS_MAX: usize = 16;
+
+/// A part of a compound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompoundPart {
+    /// Its shape.
+    pub solid: Solid,
+    /// Where its own axes are, in those of the compound, metres.
+    pub position_m: DVec3,
+    /// From its own axes to those of the compound; of length 1.
+    pub rotation: DQuat,
+    /// Its density against that of other parts, > 0: of volumes that overlap both count.
+    pub density: f64,
+}
+
+impl CompoundPart {
+    /// A part as dense as others.
+    #[must_use]
+    pub fn new(solid: Solid, position_m: DVec3, rotation: DQuat) -> Self {
+        Self { solid, position_m, rotation: rotation.normalize(), density: 1.0 }
+    }
 }
 
 impl Solid {
+    /// A solid made of points or parts with all of them elsewhere in its axes, metres; a primitive, whose centre is their origin, stays.
+    #[must_use]
+    pub fn shifted(&self, by_m: DVec3) -> Self {
+        let moved = |points: &Arc<[DVec3]>| points.iter().map(|point| *point + by_m).collect();
+        match self {
+            _ if by_m == DVec3::ZERO => self.clone(),
+            Self::Hull { points_m } => Self::Hull { points_m: moved(points_m) },
+            Self::Mesh { points_m, triangles } => {
+                Self::Mesh { points_m: moved(points_m), triangles: Arc::clone(triangles) }
+            }
+            Self::Compound { parts } => {
+                let part = |part: &CompoundPart| CompoundPart { position_m: part.position_m + by_m, ..part.clone() };
+                Self::Compound { parts: parts.iter().map(part).collect() }
+            }
+            primitive => primitive.clone(),
+        }
+    }
+
     /// The distance of the farthest point from `centre_m`, metres; of primitives, from their own centre. Zero for a plane.
     pub(crate) fn radius_about_m(&self, centre_m: DVec3) -> f64 {
         match self {
@@ -58,6 +105,11 @@ impl Solid {
             Self::Plane => 0.0,
             Self::Hull { points_m } | Self::Mesh { points_m, .. } => {
                 points_m.iter().map(|p| p.distance(centre_m)).fold(0.0, f64::max)
+            }
+            Self::Compound { parts } => {
+                let far =
+                    |part: &CompoundPart| part.position_m.distance(centre_m) + part.solid.radius_about_m(DVec3::ZERO);
+                parts.iter().map(far).fold(0.0, f64::max)
             }
         }
     }

@@ -28,3 +28,4 @@ pub mod soft;
 mod symmetric;
 pub mod synthetic;
 pub mod tool;
+mod trajectory;

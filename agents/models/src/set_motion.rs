@@ -59,3 +59,31 @@ impl WholeMotion {
         if is_given { self.spin_rad_s.unwrap_or_default() } else { self.turn * had }
     }
 }
+
+/// A node may be so far from where it is held, metres: rounding.
+const HELD_M: f64 = 1e-6;
+
+/// Whether the nodes of another state fit those of a body, `held` where they cannot be moved.
+///
+/// # Errors
+/// What does not.
+pub(crate) fn check_nodes(now: &[DVec3], to: [&[DVec3]; 2], held: impl Fn(usize) -> bool) -> Result<(), String> {
+    let [positions, velocities] = to;
+    for (what, found) in [("positions", positions.len()), ("velocities", velocities.len())] {
+        if found != now.len() {
+            return Err(format!("the state has {found} {what}; the body has {} nodes", now.len()));
+        }
+    }
+    let reach = |v: &DVec3| v.is_finite() && v.abs().max_element() <= REACH_MAX;
+    if let Some(at) = positions.iter().zip(velocities).position(|(x, v)| !(reach(x) && reach(v))) {
+        return Err(format!("node {at} of the state is not finite or too far"));
+    }
+    let moved = |at: &usize| held(*at) && positions[*at].distance(now[*at]) > HELD_M;
+    match (0..now.len()).find(moved) {
+        Some(at) => Err(format!("node {at} is held at {}, and the state has it at {}", now[at], positions[at])),
+        None => Ok(()),
+    }
+}
+
+/// The largest coordinate or speed of a node, metres or m/s.
+const REACH_MAX: f64 = 1e6;

@@ -6,8 +6,7 @@ use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange, SimSpan, Snap
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::conformance::fall_deviation;
 use metachron_models::conformance::{Suite, check};
-use metachron_models::rigid::RigidBody;
-use metachron_models::rigid::RigidSpec;
+use metachron_models::rigid::{KinematicBody, Led, Restraint, RigidBody, RigidSpec};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
@@ -52,6 +51,8 @@ fn brick() -> RigidSpec {
         traits: ContactTraits::default(),
         gravity: GRAVITY,
         sleep: true,
+        restraint: Restraint::default(),
+        led: None,
     }
 }
 
@@ -98,6 +99,16 @@ fn a_flying_body_keeps_every_promise() {
 }
 
 #[test]
+fn a_kinematic_body_keeps_every_promise() {
+    let key = |at_s, x: f64| Keyframe { at_s, tip_m: DVec3::X * x, rotation: DQuat::from_rotation_y(x), jaw: 0.0 };
+    let led = Led { keyframes: vec![key(0.0, 0.0), key(0.3, 1.0), key(1.0, 0.2)], repeat: true };
+    let make =
+        || Box::new(KinematicBody::new(&RigidSpec { led: Some(led.clone()), ..brick() }).unwrap()) as Box<dyn Agent>;
+    let suite = Suite { allocations: Some((&count, 0.0)), ..Suite::new(&make, DT) };
+    assert_eq!(check(&suite), []);
+}
+
+#[test]
 fn a_falling_tube_keeps_every_promise() {
     let make = || tube(false, 0.0);
     let hanging = || tube(true, 6.0);
@@ -138,6 +149,16 @@ fn a_falling_tube_whose_wall_gives_keeps_every_promise_by_every_implicit_integra
 /// The other integrators, each with the substeps that twice [`DT`] needs at 64 segments.
 const OTHERS: [(Integrator, u32); 4] =
     [(Integrator::SymplecticEuler, 40), (Integrator::Xpbd, 64), (Integrator::Bdf2, 1), (Integrator::EnergyMomentum, 1)];
+
+#[test]
+fn a_body_that_keyframes_lead_keeps_every_promise() {
+    let key = |at_s, x: f64| Keyframe { at_s, tip_m: DVec3::X * x, rotation: DQuat::from_rotation_y(x), jaw: 0.0 };
+    let led = Led { keyframes: vec![key(0.0, 0.0), key(0.3, 1.0), key(1.0, 0.2)], repeat: true };
+    let make =
+        || Box::new(KinematicBody::new(&RigidSpec { led: Some(led.clone()), ..brick() }).unwrap()) as Box<dyn Agent>;
+    let suite = Suite { allocations: Some((&count, 0.0)), ..Suite::new(&make, DT) };
+    assert_eq!(check(&suite), []);
+}
 
 #[test]
 fn a_falling_tube_keeps_every_promise_by_every_integrator() {

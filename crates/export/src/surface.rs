@@ -225,6 +225,11 @@ impl LocalMesh {
                 self.points.extend(points_m.iter().map(|p| position + rotation * *p));
                 self.triangles.extend(triangles.iter().map(|t| t.map(|p| p + first)));
             }
+            Solid::Compound { parts } => {
+                for part in parts.iter() {
+                    self.add_solid(&part.solid, position + rotation * part.position_m, rotation * part.rotation);
+                }
+            }
             Solid::Plane => {
                 let first = self.points.len() as u32;
                 let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];

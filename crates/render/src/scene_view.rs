@@ -15,7 +15,8 @@ use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use metachron_geometry::{Aabb, CollisionShape, ShapeKind, SurfaceShape};
 use metachron_geometry::{
-    Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
+    Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, compound_mesh, creased_mesh,
+    hull_mesh,
 };
 use std::sync::Arc;
 
@@ -506,6 +507,7 @@ impl BodyShape {
             }
             Solid::Plane => Self::default(),
             Solid::Hull { points_m } => hull_mesh(points_m).map_or_else(Self::default, |mesh| mesh_index(mesh, meshes)),
+            Solid::Compound { parts } => mesh_index(compound_mesh(parts), meshes),
             Solid::Mesh { points_m, triangles } => mesh_index(creased_mesh(points_m, triangles), meshes),
         }
     }

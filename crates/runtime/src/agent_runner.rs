@@ -22,7 +22,7 @@ use super::metrics::{MetricsWriter, SMOOTHING};
 use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
-use metachron_contact::{Agent, Carving, Link, SetMotion};
+use metachron_contact::{Agent, Carving, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -372,7 +372,10 @@ impl AgentRunner {
             self.agent.set_pressure_pa(pressure_pa);
         }
         self.carve(&pending.carvings);
-        pending.motion.map_or(Ok(()), |motion| self.set_motion(&motion))
+        let state = pending.state.as_ref().is_some_and(|state| self.agent.set_state(state).is_ok());
+        let moved = pending.motion.is_some_and(|motion| self.agent.set_motion(&motion));
+        // others find it where it is now
+        if state || moved { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Removes the cells in some regions; others touch and see it without them from now on.
@@ -402,11 +405,6 @@ impl AgentRunner {
             broad_phase.publish_nowhere(self.id(), time);
         }
         self.shared.gauges.leave();
-    }
-
-    /// Moves it, and writes its state anew, so that others find it where it is now.
-    fn set_motion(&mut self, motion: &SetMotion) -> Result<(), String> {
-        if self.agent.set_motion(motion) { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.

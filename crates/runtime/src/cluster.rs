@@ -24,18 +24,18 @@ pub(super) use turn::Leap;
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
 use super::helpers::Helped;
-use super::loads::Loads;
+use super::loads::{Acting, Loads};
 use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
     StepDoubling,
 };
-use metachron_contact::{AnchorForce, AnchorSpring, Link, Neighbour, SetMotor, StepContext};
+use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::{DoublingSchedule, drift_m};
 use metachron_core::{
     AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets,
-    Grip, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, archive_values, recycled,
+    Grip, JointEffort, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
 };
 use std::sync::Arc;
 
@@ -53,6 +53,10 @@ pub(super) struct ClusterSeat {
     grips: Vec<Grip>,
     pairs: Vec<PairState>,
     contacts: Vec<ContactState>,
+    /// What contacts gave it in the last step, N and N·m.
+    wrench: Wrench,
+    /// What its joints gave in the last step.
+    efforts: Vec<JointEffort>,
     /// What happened to attachments, of those that it tells of.
     events: Vec<AttachmentEvent>,
     /// Agents that belong into the same cluster, as it sees them.
@@ -132,6 +136,8 @@ impl ClusterSeat {
             grips: Vec::new(),
             pairs: Vec::new(),
             contacts: Vec::new(),
+            wrench: Wrench::default(),
+            efforts: Vec::new(),
             events: Vec::new(),
             bonds: Vec::new(),
             sleepers: Vec::new(),
@@ -155,6 +161,8 @@ impl ClusterSeat {
         into.grips.clone_from(&self.grips);
         into.pairs.clone_from(&self.pairs);
         into.contacts.clone_from(&self.contacts);
+        into.contact_wrench = self.wrench;
+        into.efforts.clone_from(&self.efforts);
         into.events.clone_from(&self.events);
         into.sensed.clear();
         into.sensed.extend_from_slice(self.memory.sensed());
@@ -175,7 +183,16 @@ impl ClusterSeat {
 
     /// Writes or reads what the next turns need of those before.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.memory, self.grips, self.pairs, self.contacts, self.events)?;
+        archive_values!(
+            archive,
+            self.memory,
+            self.grips,
+            self.pairs,
+            self.contacts,
+            self.wrench,
+            self.efforts,
+            self.events
+        )?;
         archive_values!(archive, self.bonds, self.sleepers)?;
         archive_values!(archive, self.work, self.work_s, self.schedule, self.drift_m, self.state, self.solves)?;
         archive.option(&mut self.stepper, Box::default, |stepper, archive| stepper.archive(archive))?;
@@ -246,14 +263,11 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> Option<AgentId> {
 }
 
 /// What users do to an agent in a step of `dt` from `time`.
-fn prepared(
-    loads: &mut Option<Box<Loads>>,
-    time: SimTime,
-    dt: SimSpan,
-) -> (&[AnchorSpring], &[AnchorForce], &[SetMotor]) {
-    let Some(loads) = loads else { return (&[], &[], &[]) };
+fn prepared(loads: &mut Option<Box<Loads>>, time: SimTime, dt: SimSpan) -> &Acting {
+    static NOTHING: Acting = Acting::NOTHING;
+    let Some(loads) = loads else { return &NOTHING };
     loads.prepare(time, dt);
-    (loads.springs(), loads.forces(), loads.motors())
+    loads.acting()
 }
 
 impl AgentRunner {
@@ -270,8 +284,8 @@ impl AgentRunner {
         let step = PlannedStep { start: self.pace.scene_time(), dt };
         self.observe(step, &Membership::default());
         let (me, neighbours) = (self.shared.id, self.observer.neighbours());
-        let (hands, forces, motors) = prepared(&mut self.loads, time, dt);
-        let context = StepContext { me, time, neighbours, hands, forces, motors, links: &self.links };
+        let Acting { springs: hands, forces, motors, pose } = prepared(&mut self.loads, time, dt);
+        let context = StepContext { me, time, neighbours, hands, forces, motors, pose: *pose, links: &self.links };
         let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work);
@@ -394,8 +408,9 @@ impl AgentRunner {
         let id = self.shared.id;
         let Self { agent, observer, loads, links, peers, cluster, .. } = self;
         let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
-        let (hands, forces, motors) = prepared(loads, time, dt);
-        let context = StepContext { me: id, time, neighbours: observer.neighbours(), hands, forces, motors, links };
+        let Acting { springs: hands, forces, motors, pose } = prepared(loads, time, dt);
+        let (neighbours, pose) = (observer.neighbours(), *pose);
+        let context = StepContext { me: id, time, neighbours, hands, forces, motors, pose, links };
         let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
         let (member, alone_s) = (agent.member()?, self.pace.wanted().as_secs_f64());
         let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };
@@ -512,6 +527,10 @@ impl AgentRunner {
                     seat.note_pair(total, with, kind, dt_s);
                 }
             }
+            seat.wrench = stepper.wrench_of(me) * dt_s.recip();
+            let own = stepper.efforts().iter().filter(|total| total.member == me);
+            seat.efforts.clear();
+            seat.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
             seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.events);
             seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;

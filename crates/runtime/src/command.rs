@@ -12,7 +12,7 @@
 use super::mailbox::{Command, Keyed};
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::Motor;
-use metachron_contact::{AnchorForce, AnchorSpring, Carving, SetMotion, SetMotor};
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, PoseGoal, SetMotion, SetMotor};
 use metachron_core::{Anchor, SimSpan};
 
 impl Command {
@@ -53,6 +53,23 @@ impl Command {
     #[must_use]
     pub const fn motor(joint: u32, motor: Motor) -> Self {
         Self::Motor(Keyed { key: joint, what: Some(SetMotor { joint, motor: Some(motor) }), lasts: None })
+    }
+
+    /// Leads a kinematic body to a pose within its next step, and holds it there until it is taken back: where the origin of its axes is to be,
+    /// metres, and its rotation to the world's axes.
+    #[must_use]
+    pub fn pose(position_m: DVec3, rotation: DQuat) -> Self {
+        let (velocity_m_s, spin_rad_s) = (DVec3::ZERO, DVec3::ZERO);
+        Self::Pose(Keyed::first(Some(PoseGoal { position_m, rotation, velocity_m_s, spin_rad_s })))
+    }
+
+    /// The same pose, which moves on from when the body takes it, m/s and rad/s, world axes.
+    #[must_use]
+    pub const fn moving(mut self, velocity: DVec3, spin: DVec3) -> Self {
+        if let Self::Pose(Keyed { what: Some(goal), .. }) = &mut self {
+            (goal.velocity_m_s, goal.spin_rad_s) = (velocity, spin);
+        }
+        self
     }
 
     /// To another place: the origin of a rigid body's axes, or the centre of mass of what bends, metres, and by how much it turns.
@@ -96,6 +113,7 @@ impl Command {
             Self::Spring(spring) => spring.lasts = Some(span),
             Self::Force(force) => force.lasts = Some(span),
             Self::Motor(motor) => motor.lasts = Some(span),
+            Self::Pose(pose) => pose.lasts = Some(span),
             _ => {}
         }
         self
@@ -107,13 +125,14 @@ impl Command {
         self.lasting(SimSpan::from_millis(milliseconds))
     }
 
-    /// Takes back the spring, the force or the motor of its key.
+    /// Takes back the spring, the force or the motor of its key, or the pose.
     #[must_use]
     pub const fn taken_back(mut self) -> Self {
         match &mut self {
             Self::Spring(spring) => spring.what = None,
             Self::Force(force) => force.what = None,
             Self::Motor(motor) => motor.what = None,
+            Self::Pose(pose) => pose.what = None,
             _ => {}
         }
         self

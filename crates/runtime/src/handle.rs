@@ -11,7 +11,7 @@ use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
-use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -26,6 +26,8 @@ pub(super) struct Shared {
     pub wanted_hz: f64,
     /// The joints whose first body it is and that can have a motor.
     pub motored: Box<[u32]>,
+    /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
+    pub takes_poses: bool,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -64,6 +66,12 @@ impl AgentHandle {
     #[must_use]
     pub fn model(&self) -> &'static str {
         self.shared.model
+    }
+
+    /// Whether it is kinematic: poses lead it, and no force moves it.
+    #[must_use]
+    pub fn takes_poses(&self) -> bool {
+        self.shared.takes_poses
     }
 
     /// Its newest state. There is one from the start on.
@@ -131,9 +139,24 @@ impl AgentHandle {
         {
             return Err(SendError::NoMotor { agent: self.id(), joint });
         }
+        if matches!(command, Command::Pose(_)) && !self.shared.takes_poses {
+            return Err(SendError::NotKinematic(self.id()));
+        }
         self.shared.mail.send(command)?;
         self.shared.sleep.wake(self.shared.id);
         Ok(())
+    }
+
+    /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
+    pub fn set_state(&self, state: Body) {
+        self.shared.mail.set_state(state);
+        self.shared.sleep.wake(self.shared.id);
+    }
+
+    /// Lets it leave the run at its next turn.
+    pub(super) fn leave(&self) {
+        self.shared.mail.leave();
+        self.shared.sleep.wake(self.shared.id);
     }
 
     /// Begins to keep its events for readers; the number of the next one.

@@ -1,9 +1,9 @@
-//! What users do to an agent: springs, forces, impulses and motors, each for as long as it was sent for.
+//! What users do to an agent: springs, forces, impulses, motors and poses, each for as long as it was sent for.
 //!
 //! In: commands as the mailbox hands them over. Out: what acts in a step. Never here: what a step makes of it.
 
 use super::mailbox::{Keyed, PendingCommands};
-use metachron_contact::{AnchorForce, AnchorSpring, SetMotor};
+use metachron_contact::{AnchorForce, AnchorSpring, PoseGoal, SetMotor};
 use metachron_core::{SimSpan, SimTime};
 
 /// All that users do to an agent.
@@ -12,6 +12,8 @@ pub(super) struct Loads {
     springs: Vec<Lasting<AnchorSpring>>,
     forces: Vec<Lasting<AnchorForce>>,
     motors: Vec<Lasting<SetMotor>>,
+    /// At most one, as it is when the agent takes it.
+    poses: Vec<Lasting<Led>>,
     impulses: Vec<Blow>,
     /// What acts in the step that was prepared last.
     #[serde(skip)]
@@ -20,10 +22,25 @@ pub(super) struct Loads {
 
 /// What acts in a step.
 #[derive(Debug, Default)]
-struct Acting {
-    springs: Vec<AnchorSpring>,
-    forces: Vec<AnchorForce>,
-    motors: Vec<SetMotor>,
+pub(super) struct Acting {
+    pub springs: Vec<AnchorSpring>,
+    /// In the mean of the step.
+    pub forces: Vec<AnchorForce>,
+    pub motors: Vec<SetMotor>,
+    /// Where it is led when the step begins.
+    pub pose: Option<PoseGoal>,
+}
+
+impl Acting {
+    /// What acts on an agent to which nothing is done.
+    pub const NOTHING: Self = Self { springs: Vec::new(), forces: Vec::new(), motors: Vec::new(), pose: None };
+}
+
+/// A pose, and when it was one.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+struct Led {
+    goal: PoseGoal,
+    from: SimTime,
 }
 
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -46,18 +63,21 @@ struct Blow {
 impl Loads {
     /// Takes the commands that came in, at `now` of the agent's time.
     pub fn take(&mut self, sent: &mut PendingCommands, now: SimTime) {
-        update(&mut self.springs, &mut sent.springs, now);
-        update(&mut self.forces, &mut sent.forces, now);
-        update(&mut self.motors, &mut sent.motors, now);
+        update(&mut self.springs, &mut sent.springs, now, |spring| spring);
+        update(&mut self.forces, &mut sent.forces, now, |force| force);
+        update(&mut self.motors, &mut sent.motors, now, |motor| motor);
+        update(&mut self.poses, &mut sent.poses, now, |goal| Led { goal, from: now });
         self.impulses.extend(sent.impulses.drain(..).map(|impulse| Blow { impulse, at: None }));
     }
 
-    /// Prepares a step of `dt` from `time`. A force that ends within it acts for its part of it, a spring or a motor to its end.
+    /// Prepares a step of `dt` from `time`. A force that ends within it acts for its part of it, all else to its end.
     pub fn prepare(&mut self, time: SimTime, dt: SimSpan) {
-        let Self { springs, forces, motors, impulses, acting } = self;
+        let Self { springs, forces, motors, poses, impulses, acting } = self;
         springs.retain(|spring| spring.acts(time));
         forces.retain(|force| force.acts(time));
         motors.retain(|motor| motor.acts(time));
+        poses.retain(|pose| pose.acts(time));
+        acting.pose = poses.first().map(|pose| pose.what.goal.after(time.secs_after(pose.what.from)));
         // a step that is made again has the same impulses
         impulses.retain(|blow| blow.at.is_none_or(|at| at == time));
         impulses.iter_mut().for_each(|blow| blow.at = Some(time));
@@ -74,19 +94,9 @@ impl Loads {
         acting.forces.extend(impulses.iter().map(|blow| scaled(blow.impulse, dt_s.recip())));
     }
 
-    /// The springs in the step prepared last.
-    pub fn springs(&self) -> &[AnchorSpring] {
-        &self.acting.springs
-    }
-
-    /// The forces in it, in its mean.
-    pub fn forces(&self) -> &[AnchorForce] {
-        &self.acting.forces
-    }
-
-    /// The motors in it that users have set.
-    pub fn motors(&self) -> &[SetMotor] {
-        &self.acting.motors
+    /// What acts in the step prepared last.
+    pub const fn acting(&self) -> &Acting {
+        &self.acting
     }
 
     /// Whether something acts at `now` or later that keeps the agent from resting. A motor that moves its joint does so by itself.
@@ -103,12 +113,12 @@ impl<T> Lasting<T> {
 }
 
 /// Puts what was sent in the place of what had the same key.
-fn update<T: Copy>(mine: &mut Vec<Lasting<T>>, sent: &mut Vec<Keyed<T>>, now: SimTime) {
+fn update<T, U>(mine: &mut Vec<Lasting<U>>, sent: &mut Vec<Keyed<T>>, now: SimTime, taken: impl Fn(T) -> U) {
     for Keyed { key, what, lasts } in sent.drain(..) {
         mine.retain(|old| old.key != key);
         let place = mine.partition_point(|old| old.key < key);
         if let Some(what) = what {
-            mine.insert(place, Lasting { key, what, until: lasts.map(|span| now + span) });
+            mine.insert(place, Lasting { key, what: taken(what), until: lasts.map(|span| now + span) });
         }
     }
 }
@@ -136,7 +146,7 @@ mod tests {
         let dt = SimSpan::from_millis(dt_ms);
         let given = (0..steps).map(|step| {
             loads.prepare(ms(from_ms + step * dt_ms), dt);
-            loads.forces().iter().map(|force| force.force_n.x * dt.as_secs_f64()).sum::<f64>()
+            loads.acting().forces.iter().map(|force| force.force_n.x * dt.as_secs_f64()).sum::<f64>()
         });
         given.sum()
     }

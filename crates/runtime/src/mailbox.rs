@@ -3,8 +3,8 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::{AnchorForce, AnchorSpring, Carving, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Resolution, SimSpan};
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, PoseGoal, SetMotion, SetMotor};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -27,6 +27,8 @@ pub enum Command {
     /// A motor drives the joint whose number is the key, instead of the motor that the scene gives it; `None` is the scene's again.
     /// For the joint's first agent.
     Motor(Keyed<SetMotor>),
+    /// A kinematic body is led to a pose; `None` lets it go its own way again.
+    Pose(Keyed<PoseGoal>),
     /// Another place or velocity, before its next step; an agent that cannot take it stays as it is.
     SetMotion(SetMotion),
     /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
@@ -35,8 +37,6 @@ pub enum Command {
     Carve(Carving),
     /// Wake up from rest.
     Wake,
-    /// Leave the run for good: nothing of it is left but its number.
-    Leave,
 }
 
 /// Something that is done to an agent until it is taken back, or until its time is over.
@@ -77,6 +77,9 @@ pub enum SendError {
         "an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points and {KEYS} carved regions a step; keys are 0 to 7"
     )]
     TooMany,
+    /// Poses lead only what is not moved by forces.
+    #[error("agent {} is moved by what acts on it; only a kinematic body is led by poses", .0.0)]
+    NotKinematic(AgentId),
     /// There is no joint of that number that can have a motor and whose first agent this is.
     #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]
     NoMotor {
@@ -107,12 +110,15 @@ pub(super) struct PendingCommands {
     pub springs: Vec<Keyed<AnchorSpring>>,
     pub forces: Vec<Keyed<AnchorForce>>,
     pub motors: Vec<Keyed<SetMotor>>,
+    pub poses: Vec<Keyed<PoseGoal>>,
     /// One for each point, N·s and N·m·s.
     pub impulses: Vec<AnchorForce>,
     /// The newest place and velocity.
     pub motion: Option<SetMotion>,
     /// The regions to be carved, in their order.
     pub carvings: Vec<Carving>,
+    /// The newest whole state.
+    pub state: Option<Box<Body>>,
     /// It is to leave the run.
     pub leaves: bool,
     /// The newest requested pressure, Pa.
@@ -134,21 +140,29 @@ impl Mailbox {
         if command == Command::Wake {
             return Ok(());
         }
+        self.put(|pending| pending.take(command))
+    }
+
+    /// The agent is to take this state before its next step.
+    pub fn set_state(&self, state: Body) {
+        let _ = self.put(|pending| {
+            pending.state = Some(Box::new(state));
+            Ok(())
+        });
+    }
+
+    /// The agent is to leave the run for good: nothing of it is left but its number.
+    pub fn leave(&self) {
+        let _ = self.put(|pending| {
+            pending.leaves = true;
+            Ok(())
+        });
+    }
+
+    fn put(&self, what: impl FnOnce(&mut PendingCommands) -> Result<(), SendError>) -> Result<(), SendError> {
         let pending = self.pending.get_or_init(Box::default);
         let mut pending = pending.lock().unwrap_or_else(PoisonError::into_inner);
-        match command {
-            Command::Retune(resolution) => pending.set_resolution = Some(resolution),
-            Command::SetDt(dt) => pending.dt = Some(dt),
-            Command::Spring(spring) => renew(&mut pending.springs, spring),
-            Command::Force(force) => renew(&mut pending.forces, force),
-            Command::Motor(motor) => renew(&mut pending.motors, motor),
-            Command::Impulse(impulse) => pending.add(impulse).ok_or(SendError::TooMany)?,
-            Command::SetMotion(motion) => pending.move_by(motion),
-            Command::SetPressure(pressure_pa) => pending.pressure_pa = Some(pressure_pa),
-            Command::Carve(carving) => pending.carve(carving).ok_or(SendError::TooMany)?,
-            Command::Leave => pending.leaves = true,
-            Command::Wake => {}
-        }
+        what(&mut pending)?;
         self.full.store(true, Release);
         drop(pending);
         Ok(())
@@ -187,8 +201,27 @@ impl Mailbox {
 impl PendingCommands {
     /// Whether any of them is something that is done to the agent for a while.
     pub fn has_loads(&self) -> bool {
-        let Self { springs, forces, motors, impulses, .. } = self;
-        !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
+        let Self { springs, forces, motors, poses, impulses, .. } = self;
+        let is_led = !poses.is_empty();
+        is_led || !(springs.is_empty() && forces.is_empty() && motors.is_empty() && impulses.is_empty())
+    }
+
+    /// Stores a command in the place of its kind.
+    fn take(&mut self, command: Command) -> Result<(), SendError> {
+        match command {
+            Command::Retune(resolution) => self.set_resolution = Some(resolution),
+            Command::SetDt(dt) => self.dt = Some(dt),
+            Command::Spring(spring) => renew(&mut self.springs, spring),
+            Command::Force(force) => renew(&mut self.forces, force),
+            Command::Motor(motor) => renew(&mut self.motors, motor),
+            Command::Pose(pose) => renew(&mut self.poses, pose),
+            Command::Impulse(impulse) => self.add(impulse).ok_or(SendError::TooMany)?,
+            Command::SetMotion(motion) => self.move_by(motion),
+            Command::SetPressure(pressure_pa) => self.pressure_pa = Some(pressure_pa),
+            Command::Carve(carving) => self.carve(carving).ok_or(SendError::TooMany)?,
+            Command::Wake => {}
+        }
+        Ok(())
     }
 
     /// Adds an impulse; `None` where there are too many points.
@@ -244,7 +277,7 @@ fn is_sound(command: &Command) -> bool {
     match command {
         Command::Retune(wanted) => wanted.eps_m.is_finite(),
         Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
-        Command::SetDt(_) | Command::Wake | Command::Leave => true,
+        Command::SetDt(_) | Command::Wake => true,
         Command::Spring(Keyed { what, .. }) => what.as_ref().is_none_or(|pull| {
             let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
             is_finite(pull.anchor)
@@ -257,6 +290,7 @@ fn is_sound(command: &Command) -> bool {
         Command::Motor(Keyed { what, .. }) => {
             what.as_ref().and_then(|set| set.motor).is_none_or(|motor| motor.check().is_ok())
         }
+        Command::Pose(Keyed { what, .. }) => what.as_ref().is_none_or(PoseGoal::is_sound),
         Command::SetMotion(motion) => motion.is_sound(),
         Command::Carve(carving) => carving.is_sound(),
     }

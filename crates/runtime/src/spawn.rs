@@ -15,7 +15,7 @@ use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::histogram::Histogram;
-use super::mailbox::{Command, Mailbox, SendError};
+use super::mailbox::{Mailbox, SendError};
 use super::metrics::{AgentState, Metrics, MetricsWriter};
 use super::observation::{Peer, Peers};
 use super::probe::{Trace, WatchedPoint};
@@ -194,7 +194,8 @@ impl Everyone {
     pub fn leave(&self, id: AgentId) -> Result<(), SendError> {
         let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
         if !matches!(agent.state(), AgentState::Parked(_)) {
-            return agent.send(Command::Leave);
+            agent.leave();
+            return Ok(());
         }
         // no other thread publishes for it any more
         if let Some(broad_phase) = self.peers.broad_phase.get() {
@@ -340,6 +341,7 @@ fn shared(
         id,
         name: std::mem::take(&mut spawn.name).into(),
         model: spawn.agent.model(),
+        takes_poses: spawn.agent.takes_poses(),
         wanted_hz: spawn.rate_hz,
         motored: motored(id, spawn),
         gauges: Metrics::default(),

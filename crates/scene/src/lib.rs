@@ -115,6 +115,8 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     // ties between objects that are wrong themselves would give spurious problems
     let sound = c.count() == 0;
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
+    let joint_names = build::joint_names(c, &file.joint);
+    let sensors = if sound { build::sensors(c, &file.sensor, &objects, &joint_names) } else { Vec::new() };
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     let fixed = objects.obstacles.len();
@@ -153,6 +155,8 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         contacts: contacts != Some(ContactsFile::Whether(false)),
         contact_depth_m,
         joints: joints.into(),
+        joint_names,
+        sensors,
         couplings,
         probes,
         overlaps: Vec::new(),

@@ -4,7 +4,7 @@
 
 use metachron_contact::Agent;
 use metachron_core::Body;
-use metachron_geometry::{Primitive, ShapeKind, Solid, ToolShape, patch};
+use metachron_geometry::{Primitive, ShapeKind, Solid, ToolShape, compound_mesh, patch};
 use metachron_lod::control::PRIMITIVE_LEVELS;
 use metachron_models::soft::{SoftBody, SoftShape, SoftSpec};
 use metachron_render::{Form, SkinForm, skin_divisions};
@@ -15,7 +15,8 @@ use std::collections::BTreeSet;
 pub(super) fn form(spec: &Spec) -> Form {
     match spec {
         Spec::Tube(_) => Form::Tube,
-        Spec::Rigid(body) => Form::Solid(body.solid.clone()),
+        // a state has the centre of mass
+        Spec::Rigid(body) => Form::Solid(body.solid.shifted(-body.com_local())),
         Spec::Soft(soft) => soft_form(soft),
         Spec::Tool(_) => Form::Tool(ToolShape::default()),
         Spec::Synthetic(_) | Spec::Custom(_) => Form::Unseen,
@@ -91,6 +92,7 @@ fn solid_triangles(solid: &Solid, n: u8) -> u32 {
     match (Primitive::of(solid, n), solid) {
         (Some((primitive, _)), _) => primitive.triangles(n),
         (None, Solid::Mesh { triangles, .. }) => triangles.len() as u32,
+        (None, Solid::Compound { parts }) => compound_mesh(parts).triangles.len() as u32,
         // Euler: a closed triangle mesh of p corners has 2p - 4 faces
         (None, Solid::Hull { points_m }) => (2 * points_m.len() as u32).saturating_sub(4),
         (None, _) => 0,

@@ -9,6 +9,7 @@ use super::trace::Trace;
 use glam::DVec3;
 use metachron_core::{ClusterState, Resolution};
 use metachron_runtime::{AgentStats, Sample};
+use metachron_world::Reading;
 use serde::Serialize;
 
 /// One frame: a row of `--frames-csv`.
@@ -129,6 +130,8 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// What touched sensors.
     pub sensors: Vec<Sensing>,
+    /// What each sensor of the scene read at the end; `None` where what it is on has gone.
+    pub readings: Vec<Option<Reading>>,
     /// Each agent's part in the contact cluster that it was stepped in last.
     pub clusters: Vec<Option<ClusterState>>,
     /// States of the agents over time, if requested ([`crate::Session::keep_trace`]).

@@ -444,6 +444,7 @@ impl Session {
                 .collect(),
             couplings: self.couplings.all().to_vec(),
             events: events(last.iter().map(|state| &**state)),
+            readings: self.scene.sensors.iter().map(|sensor| self.world.read(&sensor.kind).ok()).collect(),
             sensors: sensed(last.iter().map(|state| &**state)),
             clusters: last.iter().map(|state| state.cluster).collect(),
             trace: self.trace,

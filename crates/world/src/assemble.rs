@@ -9,7 +9,7 @@ use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::stepper::{ClusterScene, Passage};
 use metachron_geometry::Obstacle;
-use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
@@ -133,6 +133,7 @@ fn spawn(
 fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<dyn std::error::Error>> {
     Ok(match member.spec.clone() {
         Spec::Tube(tube) => Box::new(Tube::new(tube)?),
+        Spec::Rigid(body) if body.led.is_some() => Box::new(KinematicBody::new(&body)?),
         Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
         Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
         Spec::Tool(tool) => Box::new(Tool::new(tool)?),

@@ -3,6 +3,11 @@
 //! In: parts with their measures, by name. Out: a [`Scene`] with the defaults that scene files have.
 //! Never here: files; whether a model can be built is found at [`crate::World::start`].
 
+mod rigid;
+mod sensors;
+mod soft;
+mod tube;
+
 use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
@@ -14,8 +19,12 @@ use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
-use metachron_models::rod::{Material as Elastic, Section, TubeSpec};
+pub use rigid::Rigid;
+pub use sensors::SensorOn;
+use sensors::{Mounted, Mounts};
+pub use soft::Soft;
 use std::sync::Arc;
+pub use tube::Tube;
 
 /// Default step rate of a part, Hz.
 const RATE_DEFAULT_HZ: f64 = 240.0;
@@ -23,14 +32,6 @@ const RATE_DEFAULT_HZ: f64 = 240.0;
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Friction and restitution of rigid bodies and static solids where a part does not say otherwise.
 const SURFACE: (f64, f64) = (0.5, 0.2);
-/// Friction of a tube's skin where it does not say otherwise.
-const TUBE_FRICTION: f64 = 0.2;
-/// Equal parts of a tube where it does not say otherwise.
-const SEGMENTS_DEFAULT: usize = 40;
-/// Poisson's ratio and density (kg/m³) of a tube where it does not say otherwise: soft tissue.
-const TISSUE: (f64, f64) = (0.45, 1050.0);
-/// Shear coefficient of thin walls.
-const SHEAR_FACTOR: f64 = 27.0 / 28.0;
 
 /// Why a scene cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -47,6 +48,22 @@ pub enum SceneBuildError {
     NoBody {
         /// The name.
         name: String,
+    },
+    /// The finest spacing of a soft body gives more cells than a step can take.
+    #[error("the finest ε of \"{name}\" is too fine for its size")]
+    TooFine {
+        /// The part.
+        name: String,
+    },
+    /// A sensor names what there is not.
+    #[error("the sensor \"{sensor}\" is on \"{on}\", which is no {what} of the scene")]
+    NoMount {
+        /// The sensor.
+        sensor: String,
+        /// What it names.
+        on: String,
+        /// What it can be on.
+        what: &'static str,
     },
     /// A joint cannot be.
     #[error("the joint of \"{name}\" cannot be: {reason}")]
@@ -74,24 +91,28 @@ pub struct SceneBuilder {
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
     joints: Vec<Joined>,
+    sensors: Vec<Mounted>,
 }
 
 /// A joint by the names of its bodies; no second one is the world.
 #[derive(Debug, Clone)]
 struct Joined {
+    name: String,
     a: String,
     b: Option<String>,
     kind: JointKind,
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], or an agent of your own ([`Custom`]).
+/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]).
 #[derive(Debug, Clone)]
 pub enum Part {
     /// A rigid body.
     Rigid(Rigid),
     /// A soft tube, cable or rod.
     Tube(Tube),
+    /// A sheet, solid or rope.
+    Soft(Soft),
     /// An agent of somebody else's.
     Custom(Custom),
 }
@@ -135,30 +156,15 @@ impl From<Custom> for Part {
     }
 }
 
-/// A rigid body before it is added.
-#[derive(Debug, Clone)]
-pub struct Rigid {
-    spec: RigidSpec,
-    rate_hz: f64,
-}
-
-/// A tube before it is added.
-#[derive(Debug, Clone)]
-pub struct Tube {
-    path_m: Vec<DVec3>,
-    radius_m: f64,
-    wall_m: Option<f64>,
-    young_pa: f64,
-    density_kg_m3: f64,
-    segments: usize,
-    clamp: [bool; 2],
-    damping_per_s: f64,
-    rate_hz: f64,
-}
-
 impl From<Rigid> for Part {
     fn from(rigid: Rigid) -> Self {
         Self::Rigid(rigid)
+    }
+}
+
+impl From<Soft> for Part {
+    fn from(soft: Soft) -> Self {
+        Self::Soft(soft)
     }
 }
 
@@ -168,187 +174,16 @@ impl From<Tube> for Part {
     }
 }
 
-impl Rigid {
-    /// A body of this shape: 1 kg at the origin, at rest.
-    #[must_use]
-    pub fn new(solid: Solid) -> Self {
-        let (friction, restitution) = SURFACE;
-        let spec = RigidSpec { friction, restitution, sleep: true, ..RigidSpec::free(solid, DVec3::ZERO, 1.0) };
-        Self { spec, rate_hz: RATE_DEFAULT_HZ }
-    }
-
-    /// A ball of this radius, metres.
-    #[must_use]
-    pub fn ball(radius_m: f64) -> Self {
-        Self::new(Solid::Ball { radius_m })
-    }
-
-    /// A box with these half edges, metres.
-    #[must_use]
-    pub fn cuboid(half_extents_m: [f64; 3]) -> Self {
-        Self::new(Solid::Box { half_extents_m: half_extents_m.into() })
-    }
-
-    /// Its mass, kilograms, 1e-9 … 1e9.
-    #[must_use]
-    pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
-        self.spec.mass_kg = mass_kg;
-        self
-    }
-
-    /// Position of its shape's origin, metres.
-    #[must_use]
-    pub fn at(mut self, position_m: [f64; 3]) -> Self {
-        self.spec.position = position_m.into();
-        self
-    }
-
-    /// Rotation from its shape's axes to the world's.
-    #[must_use]
-    pub const fn turned(mut self, rotation: DQuat) -> Self {
-        self.spec.rotation = rotation;
-        self
-    }
-
-    /// Velocity at the start, m/s.
-    #[must_use]
-    pub fn velocity_m_s(mut self, velocity: [f64; 3]) -> Self {
-        self.spec.velocity = velocity.into();
-        self
-    }
-
-    /// Coefficient of restitution, 0 … 1.
-    #[must_use]
-    pub const fn restitution(mut self, restitution: f64) -> Self {
-        self.spec.restitution = restitution;
-        self
-    }
-
-    /// Coulomb friction coefficient, ≥ 0.
-    #[must_use]
-    pub const fn friction(mut self, friction: f64) -> Self {
-        self.spec.friction = friction;
-        self
-    }
-
-    /// What it says about its contacts: what it collides with, rules of pairs, whether it only senses.
-    #[must_use]
-    pub const fn contact(mut self, traits: ContactTraits) -> Self {
-        self.spec.traits = traits;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
-    }
-}
-
-impl Tube {
-    /// A tube along these points, metres: of soft tissue, 1 cm in radius, solid, both ends free.
-    #[must_use]
-    pub fn along(path_m: &[[f64; 3]]) -> Self {
-        Self {
-            path_m: path_m.iter().map(|point| DVec3::from_array(*point)).collect(),
-            radius_m: 0.01,
-            wall_m: None,
-            young_pa: 1e6,
-            density_kg_m3: TISSUE.1,
-            segments: SEGMENTS_DEFAULT,
-            clamp: [false; 2],
-            damping_per_s: 0.0,
-            rate_hz: RATE_DEFAULT_HZ,
-        }
-    }
-
-    /// Outer radius, metres, > 0.
-    #[must_use]
-    pub const fn radius_m(mut self, radius_m: f64) -> Self {
-        self.radius_m = radius_m;
-        self
-    }
-
-    /// Thickness of its wall, metres, above 0 and at most its radius; without it the tube is solid.
-    #[must_use]
-    pub const fn wall_m(mut self, wall_m: f64) -> Self {
-        self.wall_m = Some(wall_m);
-        self
-    }
-
-    /// Young's modulus, Pa, > 0.
-    #[must_use]
-    pub const fn young_pa(mut self, young_pa: f64) -> Self {
-        self.young_pa = young_pa;
-        self
-    }
-
-    /// Density, kg/m³, > 0.
-    #[must_use]
-    pub const fn density_kg_m3(mut self, density_kg_m3: f64) -> Self {
-        self.density_kg_m3 = density_kg_m3;
-        self
-    }
-
-    /// Number of equal parts, 2 … 4096.
-    #[must_use]
-    pub const fn segments(mut self, segments: usize) -> Self {
-        self.segments = segments;
-        self
-    }
-
-    /// Which ends are held in position and direction: start, end.
-    #[must_use]
-    pub const fn clamp(mut self, ends: [bool; 2]) -> Self {
-        self.clamp = ends;
-        self
-    }
-
-    /// Mass-proportional damping, 1/s, ≥ 0.
-    #[must_use]
-    pub const fn damping_per_s(mut self, damping_per_s: f64) -> Self {
-        self.damping_per_s = damping_per_s;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
-    }
-
-    fn spec(self, gravity: DVec3) -> TubeSpec {
-        let material = Elastic {
-            young_pa: self.young_pa,
-            poisson: TISSUE.0,
-            density_kg_m3: self.density_kg_m3,
-            shear_factor: SHEAR_FACTOR,
-        };
-        let section = Section::hollow(self.radius_m, self.wall_m.unwrap_or(self.radius_m), material);
-        TubeSpec {
-            clamp: self.clamp,
-            damping_per_s: self.damping_per_s,
-            self_contact: true,
-            friction: TUBE_FRICTION,
-            gravity,
-            sleep: true,
-            ..TubeSpec::free(self.path_m, section, self.segments)
-        }
-    }
-}
-
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
     pub(super) const fn new() -> Self {
-        let joints = Vec::new();
         Self {
             gravity: GRAVITY_DEFAULT,
             contact_depth_m: DEPTH_DEFAULT_M,
             fixed: Vec::new(),
             parts: Vec::new(),
-            joints,
+            joints: Vec::new(),
+            sensors: Vec::new(),
         }
     }
 
@@ -390,7 +225,29 @@ impl SceneBuilder {
     /// the axes of a's shape. Springs and ropes, which have two ends, are not for this.
     #[must_use]
     pub fn joint(mut self, a: &str, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
-        self.joints.push(Joined { a: a.to_owned(), b: b.map(str::to_owned), kind, at_m: at_m.into() });
+        self.joints.push(Joined {
+            name: String::new(),
+            a: a.to_owned(),
+            b: b.map(str::to_owned),
+            kind,
+            at_m: at_m.into(),
+        });
+        self
+    }
+
+    /// Names the joint that was added last, so that [`super::World::joint`] and sensors find it.
+    #[must_use]
+    pub fn joint_name(mut self, name: impl Into<String>) -> Self {
+        if let Some(joint) = self.joints.last_mut() {
+            joint.name = name.into();
+        }
+        self
+    }
+
+    /// Adds a sensor, which [`super::World::sensor`] reads.
+    #[must_use]
+    pub fn sensor(mut self, name: impl Into<String>, on: SensorOn) -> Self {
+        self.sensors.push(Mounted { name: name.into(), on });
         self
     }
 
@@ -406,18 +263,18 @@ impl SceneBuilder {
     /// # Errors
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
-        let Self { gravity, contact_depth_m, fixed, parts, joints } = self;
-        let names: Vec<&String> =
-            fixed.iter().map(|solid| &solid.name).chain(parts.iter().map(|(name, _)| name)).collect();
-        if let Some((_, name)) = names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
-            return Err(SceneBuildError::SameName { name: (*name).clone() });
-        }
+        self.check_names()?;
+        let Self { gravity, contact_depth_m, fixed, parts, joints, sensors } = self;
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
         let agents = agents?;
+        let joint_names: Vec<_> = joints.iter().map(|joined| joined.name.clone()).collect();
         let joints: Result<Arc<[_]>, _> = joints.iter().map(|joined| joined.between(&agents)).collect();
+        let mounts = Mounts { agents: &agents, fixed: &obstacles, joints: &joint_names };
+        let sensors: Result<Vec<_>, _> = sensors.into_iter().map(|mounted| mounts.sensor(mounted)).collect();
+        let sensors = sensors?;
         let mut scene = Scene {
             name: "built in code".to_owned(),
             description: String::new(),
@@ -450,6 +307,8 @@ impl SceneBuilder {
             contacts: true,
             contact_depth_m,
             joints: joints?,
+            joint_names,
+            sensors,
             couplings: Vec::new(),
             probes: Vec::new(),
             overlaps: Vec::new(),
@@ -457,6 +316,21 @@ impl SceneBuilder {
         };
         scene.resolve_initial_overlaps();
         Ok(scene)
+    }
+}
+
+impl SceneBuilder {
+    /// Whether all names of a kind differ.
+    fn check_names(&self) -> Result<(), SceneBuildError> {
+        let differ = |names: &[&String]| match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+            Some((_, name)) => Err(SceneBuildError::SameName { name: (*name).clone() }),
+            None => Ok(()),
+        };
+        let fixed = self.fixed.iter().map(|solid| &solid.name);
+        differ(&fixed.chain(self.parts.iter().map(|(name, _)| name)).collect::<Vec<_>>())?;
+        let joints = self.joints.iter().map(|joint| &joint.name).filter(|name| !name.is_empty());
+        differ(&joints.collect::<Vec<_>>())?;
+        differ(&self.sensors.iter().map(|sensor| &sensor.name).collect::<Vec<_>>())
     }
 }
 
@@ -509,19 +383,26 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
         Part::Tube(tube) => tube.rate_hz,
+        Part::Soft(soft) => soft.rate_hz,
         Part::Custom(custom) => custom.rate_hz,
     };
     let dt = SimSpan::from_secs_f64(1.0 / rate_hz).filter(|_| (1.0..=1e5).contains(&rate_hz));
     let Some(dt) = dt else { return Err(SceneBuildError::BadRate { name, rate_hz: rate_hz.to_string() }) };
+    let mut eps_m = None;
     let (spec, start) = match part {
         Part::Rigid(rigid) => {
-            let spec = RigidSpec { gravity, ..rigid.spec };
+            let spec = RigidSpec { gravity: gravity * rigid.gravity_scale, ..rigid.spec };
             (Spec::Rigid(spec), Resolution { eps_m: 1.0, n: N_MAX })
         }
         Part::Tube(tube) => {
             let spec = tube.spec(gravity);
             let start = spec.resolution;
             (Spec::Tube(spec), start)
+        }
+        Part::Soft(soft) => {
+            let Some((spec, range_m)) = soft.spec(gravity) else { return Err(SceneBuildError::TooFine { name }) };
+            eps_m = range_m;
+            (Spec::Soft(spec), Resolution { eps_m: range_m.map_or(1.0, |range| range.0), n: N_MAX })
         }
         Part::Custom(custom) => (Spec::Custom(custom), Resolution { eps_m: 1.0, n: 1 }),
     };
@@ -532,7 +413,7 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
         spec,
         pace: PaceWish { rate_hz, dt, dt_range: (dt, dt) },
         tolerance_m: None,
-        simulation: ResolutionRange::fixed(start),
+        simulation: eps_m.map_or(ResolutionRange::fixed(start), |eps_m| ResolutionRange { eps_m, n: (1, start.n) }),
         start,
         picture,
         links: Vec::new(),

@@ -116,7 +116,7 @@ impl Scene {
         !(spec.graspable.contains(&other) || self.couplings.iter().any(linked))
     }
 
-    /// Whether an agent is free: it has no joint, attachment, clamp, pin or held points, and is no tool and not synthetic.
+    /// Whether an agent is free: it has no joint, attachment, clamp, pin or held points, and is no tool, not kinematic and not synthetic.
     pub(super) fn is_free(&self, id: AgentId) -> bool {
         let jointed = self.joints.iter().any(|joint| joint.a == id || joint.b == Some(id));
         let tied = |kind: &CouplingKind| matches!(kind, CouplingKind::Attach { .. });
@@ -124,7 +124,7 @@ impl Scene {
         let held = match &self.agents[id.0 as usize].spec {
             Spec::Tube(tube) => [tube.clamp, tube.pin].concat().contains(&true) || !tube.attachments.is_empty(),
             Spec::Soft(soft) => !soft.held.is_empty(),
-            Spec::Rigid(_) => false,
+            Spec::Rigid(body) => body.led.is_some(),
             Spec::Tool(_) | Spec::Synthetic(_) | Spec::Custom(_) => true,
         };
         !(jointed || attached || held)

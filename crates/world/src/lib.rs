@@ -38,12 +38,13 @@ mod object;
 mod overlap;
 mod queries;
 mod scene;
+mod sensors;
 mod spec;
 mod ties;
 mod world;
 
 pub use assemble::{Govern, machine};
-pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, Tube, static_solid};
+pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid};
 pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};
@@ -56,5 +57,6 @@ pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe,
     RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
+pub use sensors::{JointRef, Reading, Sensor, SensorKind};
 pub use spec::Division;
 pub use world::{World, WorldError};

@@ -64,7 +64,8 @@ impl Scene {
     /// its axis is inside.
     fn overlaps_with_static(&self, pairs: &mut Vec<(AgentId, Container, f64)>) {
         let (mut scratch, mut found) = (NarrowPhaseScratch::default(), Vec::new());
-        let others = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)));
+        let others =
+            self.agents.iter().filter(|member| !matches!(member.spec, Spec::Tool(_)) && !member.spec.is_kinematic());
         for shape in others.filter_map(shape) {
             let held = !(self.is_free(shape.id) || matches!(self.agents[shape.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {
@@ -130,10 +131,12 @@ impl Scene {
         coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()
     }
 
-    /// Whether two agents collide; two tools never do.
+    /// Whether two agents collide; two tools never do, nor do two kinematic bodies.
     pub(super) fn collide(&self, one: &StartShape, two: &StartShape, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
         let led = |shape: &StartShape| matches!(shape.form.kind, ShapeKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
-        named != self.contacts && !(led(one) && led(two)) && one.form.presses(&two.form)
+        let kinematic = |shape: &StartShape| self.agents[shape.id.0 as usize].spec.is_kinematic();
+        let both_led = led(one) && led(two) || kinematic(one) && kinematic(two);
+        named != self.contacts && !both_led && one.form.presses(&two.form)
     }
 }

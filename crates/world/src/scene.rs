@@ -10,6 +10,7 @@ use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
 use super::overlap::Overlap;
+use super::sensors::Sensor;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::stepper::DEPTH_RANGE_M;
@@ -67,6 +68,10 @@ pub struct Scene {
     pub contact_depth_m: f64,
     /// Joints between rigid agents.
     pub joints: Arc<[Joint]>,
+    /// Their names, in their order; empty where a joint has none.
+    pub joint_names: Vec<String>,
+    /// What programs read by name.
+    pub sensors: Vec<Sensor>,
     /// Pairs that interact otherwise than by the default contact.
     pub couplings: Vec<Coupling>,
     /// The points whose state is reported.

@@ -50,6 +50,12 @@ impl Spec {
         }
     }
 
+    /// True where a rigid body moves as it is led.
+    #[must_use]
+    pub const fn is_kinematic(&self) -> bool {
+        matches!(self, Self::Rigid(body) if body.led.is_some())
+    }
+
     /// True where the body bends.
     #[must_use]
     pub const fn is_deformable(&self) -> bool {
@@ -72,7 +78,7 @@ impl Spec {
     pub fn shift(&mut self, by: DVec3) {
         match self {
             Self::Tube(tube) => tube.path_m.iter_mut().for_each(|at| *at += by),
-            Self::Rigid(body) => body.position += by,
+            Self::Rigid(body) => body.shift(by),
             Self::Soft(soft) => soft.position += by,
             Self::Tool(_) | Self::Synthetic(_) | Self::Custom(_) => {}
         }
@@ -83,7 +89,7 @@ impl Spec {
     pub fn mass_kg(&self) -> Option<f64> {
         match self {
             Self::Tube(tube) => Some(tube.section.mass_per_length_kg_m * path_length_m(tube)),
-            Self::Rigid(body) => Some(body.mass_kg),
+            Self::Rigid(body) => body.led.is_none().then_some(body.mass_kg),
             Self::Soft(_) | Self::Tool(_) | Self::Synthetic(_) | Self::Custom(_) => None,
         }
     }
@@ -92,7 +98,7 @@ impl Spec {
     #[must_use]
     pub fn mass_in_kg(&self, body: &Body) -> f64 {
         match (self, body) {
-            (Self::Rigid(spec), _) => spec.mass_kg,
+            (Self::Rigid(spec), _) if spec.led.is_none() => spec.mass_kg,
             (Self::Tube(spec), Body::Curve(curve)) => {
                 spec.section.mass_per_length_kg_m * curve.arc_m.last().copied().unwrap_or(0.0)
             }
@@ -104,7 +110,7 @@ impl Spec {
     #[must_use]
     pub fn momentum_n_s(&self, body: &Body) -> DVec3 {
         match (self, body) {
-            (Self::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
+            (Self::Rigid(spec), Body::Rigid(state)) if spec.led.is_none() => state.velocity * spec.mass_kg,
             (Self::Tube(spec), Body::Curve(curve)) => velocity_integral(curve) * spec.section.mass_per_length_kg_m,
             _ => DVec3::ZERO,
         }

@@ -12,6 +12,7 @@ use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
 use super::object::{Object, WorldTag};
+use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
@@ -20,7 +21,8 @@ use metachron_runtime::{
     Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
 /// Why a world could not be started, or refuses something.
@@ -80,6 +82,22 @@ pub enum WorldError {
         /// Why.
         reason: String,
     },
+    /// The world has no joint of that name.
+    #[error("the world has no joint \"{name}\"; its joints with names are [{known}]")]
+    NoJoint {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// The world has no sensor of that name.
+    #[error("the world has no sensor \"{name}\"; its sensors are [{known}]")]
+    NoSensor {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// A query that asks for nothing that can be found.
     #[error("{0}")]
     BadQuery(String),
@@ -109,6 +127,9 @@ struct Shared {
     gravity: DVec3,
     /// The static solids and joints.
     surroundings: Arc<ClusterScene>,
+    instruments: Instruments,
+    /// The time when it was last let pass or had passed, nanoseconds.
+    seen_ns: AtomicU64,
     executor: ExecutorKind,
     /// By what checkpoints of its scene are known again.
     identity: SceneIdentity,
@@ -166,7 +187,11 @@ impl World {
         }
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock };
+        let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
+        let instruments = Instruments { joint_names, joints, sensors: scene.sensors.clone() };
+        let seen_ns = AtomicU64::new(0);
+        let shared =
+            Shared { tag, state, agents, gravity, surroundings, instruments, seen_ns, executor, identity, clock };
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -220,7 +245,9 @@ impl World {
         if self.executor() != ExecutorKind::Lockstep {
             return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a world in real time".to_owned() }));
         }
-        let Err(reason) = read_state(run.as_mut(), &checkpoint.state) else { return Ok(()) };
+        let outcome = read_state(run.as_mut(), &checkpoint.state);
+        self.see(run.as_ref());
+        let Err(reason) = outcome else { return Ok(()) };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
         let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
         // what it has become is not accounted for
@@ -276,6 +303,9 @@ impl World {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
         let state = agent.latest();
+        if agent.takes_poses() && matches!(command, Command::Force(_) | Command::Impulse(_) | Command::Spring(_)) {
+            return Err(refused("it is kinematic: no force moves it; lead it by poses".to_owned()));
+        }
         match command {
             Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => {
                 self.check_point(object, &state, force.anchor)?;
@@ -290,6 +320,40 @@ impl World {
             _ => {}
         }
         agent.send(command).map_err(|error| refused(error.to_string()))
+    }
+
+    /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
+    /// place and motion, a tube its nodes and frames, a soft body without ε its vertices; what a tube's parts turn with is zero.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`]; [`WorldError::Refused`] for a state of another kind or length and for numbers that are not finite. Nothing was
+    /// done then; nor where the object divides itself otherwise before it hears of it.
+    pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
+        let agent = self.agent(object)?;
+        let refused = |reason: String| Err(WorldError::Refused { name: agent.name().to_owned(), reason });
+        let lengths = |body: &Body| match body {
+            Body::Curve(curve) => vec![curve.positions.len(), curve.velocities.len(), curve.frames.len()],
+            Body::Soft(soft) => vec![soft.positions.len(), soft.velocities.len()],
+            _ => Vec::new(),
+        };
+        let now = agent.latest();
+        let is_alike = std::mem::discriminant(state) == std::mem::discriminant(&now.body);
+        if !is_alike || matches!(state, Body::Nothing | Body::Tool(_)) || agent.takes_poses() {
+            return refused(
+                "it takes states of rigid bodies, tubes and soft bodies that are of its own kind".to_owned(),
+            );
+        }
+        let (found, wanted) = (lengths(state), lengths(&now.body));
+        if found != wanted {
+            return refused(format!(
+                "the lists of the state have {found:?} entries; those of the object have {wanted:?}"
+            ));
+        }
+        if !state.is_finite() {
+            return refused("every number of a state must be finite".to_owned());
+        }
+        agent.set_state(state.clone());
+        Ok(())
     }
 
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
@@ -339,10 +403,19 @@ impl World {
         Frame::now(self.clone())
     }
 
-    /// Simulated time now.
+    /// Simulated time now; in lockstep, while another thread lets it pass, that at which this began: it does not wait for it.
     #[must_use]
     pub fn time(&self) -> SimTime {
-        match &*self.state() {
+        let state = match self.shared.state.try_lock() {
+            Ok(state) => state,
+            Err(TryLockError::Poisoned(state)) => state.into_inner(),
+            Err(TryLockError::WouldBlock) if self.executor() == ExecutorKind::Lockstep => {
+                return SimTime::from_nanos(self.shared.seen_ns.load(Relaxed));
+            }
+            // in real time nobody keeps it for long
+            Err(TryLockError::WouldBlock) => self.state(),
+        };
+        match &*state {
             State::Running(run) => run.sim_now(),
             State::Stopped { time, .. } => *time,
         }
@@ -440,6 +513,10 @@ impl World {
         self.shared.tag
     }
 
+    pub(super) fn instruments(&self) -> &Instruments {
+        &self.shared.instruments
+    }
+
     pub(super) fn surroundings(&self) -> &ClusterScene {
         &self.shared.surroundings
     }
@@ -478,8 +555,15 @@ impl World {
     /// Does something with a world that runs; nothing with one that was stopped.
     fn with_run(&self, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
+            self.see(run.as_ref());
             act(run.as_mut());
+            self.see(run.as_ref());
         }
+    }
+
+    /// Notes the time for those that ask while it passes.
+    fn see(&self, run: &dyn Run) {
+        self.shared.seen_ns.store(run.sim_now().as_nanos(), Relaxed);
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

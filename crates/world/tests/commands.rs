@@ -4,9 +4,10 @@ use glam::{DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
 use metachron_core::{Anchor, Body, RigidState, SimSpan};
 use metachron_geometry::Solid;
+use metachron_models::soft::Side;
 use metachron_world::Command;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Object, Rigid, Scene, Tube, World, WorldError};
+use metachron_world::{Object, Rigid, Scene, Soft, Tube, World, WorldError};
 
 const RATES_HZ: [f64; 3] = [60.0, 240.0, 1000.0];
 const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
@@ -187,4 +188,39 @@ fn commands_that_cannot_be_say_why_and_do_nothing() {
     assert!(message(body, Command::teleport(DVec3::INFINITY, DQuat::IDENTITY)).contains("finite"));
     world.advance(SimSpan::from_millis(100));
     assert_eq!(state(&world, body).velocity, DVec3::ZERO);
+}
+
+#[test]
+fn a_body_a_tube_and_a_rope_go_back_to_the_states_that_they_had() {
+    let tube = Tube::along(&[[-0.2, 1.0, 0.5], [0.2, 1.0, 0.5]]).segments(8).clamp([true, false]);
+    let rope = Soft::rope(&[[0.0, 2.0, 0.5], [0.4, 2.0, 0.5]], 0.005, 8).hold(&[Side::Left]);
+    let brick = Rigid::new(Solid::Box { half_extents_m: DVec3::new(0.1, 0.2, 0.3) }).velocity_m_s([1.0, 0.0, 3.0]);
+    let scene = Scene::builder().add("brick", brick).add("tube", tube).add("rope", rope).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    world.advance(SimSpan::from_millis(200));
+    let objects = world.objects(["brick", "tube", "rope"]).unwrap();
+    let states = objects.map(|object| world.latest(object).unwrap().body.clone());
+    let point = [CENTRE, Anchor::Arc(0.3), Anchor::Vertex(6)];
+    let places = |world: &World| {
+        let at = |(object, anchor): (&Object, Anchor)| world.latest(*object).unwrap().body.point(anchor).unwrap();
+        objects.iter().zip(point).map(at).collect::<Vec<_>>()
+    };
+    let before = places(&world);
+    world.advance(SimSpan::from_millis(500));
+    for (object, state) in objects.iter().zip(&states) {
+        world.set_state(*object, state).unwrap();
+    }
+    world.advance(SimSpan::from_millis(5));
+    for ((place, velocity), (then, then_m_s)) in places(&world).into_iter().zip(before) {
+        // up to two steps of 1/240 s on from there
+        assert!((place - then).length() < 0.02 * (0.1 + then_m_s.length()), "{place} instead of {then}");
+        assert!((velocity - then_m_s).length() < 0.2 + 0.2 * then_m_s.length(), "{velocity} instead of {then_m_s}");
+    }
+    let refused = |object, state: &Body| world.set_state(object, state).unwrap_err().to_string();
+    assert!(refused(objects[0], &states[1]).contains("own kind"));
+    let Body::Soft(mut short) = states[2].clone() else { panic!("a rope") };
+    short.velocities.pop();
+    assert!(refused(objects[2], &Body::Soft(short)).contains("[9, 8]"));
+    let endless = RigidState { position: DVec3::NAN, ..RigidState::default() };
+    assert!(refused(objects[0], &Body::Rigid(endless)).contains("finite"));
 }

@@ -51,6 +51,14 @@ class _Motor(TypedDict, total=False):
     expires: float | None
     """For how many seconds it acts; `None` until it is replaced or taken back."""
 
+class _Led(TypedDict, total=False):
+    velocity: Numbers
+    """How the pose moves on, m/s; default not."""
+    spin: Numbers
+    """How it turns on, rad/s, world axes; default not."""
+    expires: float | None
+    """For how many seconds of the object's time it leads; `None` until it is replaced or taken back."""
+
 class _Rollout(_Point, total=False):
     step: float
     """Seconds that each action acts for."""
@@ -168,6 +176,17 @@ class World:
     def spring(self, object: str | Object, target: Numbers | None, **keywords: Unpack[_Spring]) -> None:
         """A spring to a place in space, m; `None` takes back that of the key."""
 
+    def pose(
+        self, object: str | Object, position: Numbers | None, rotation: Numbers = ..., **keywords: Unpack[_Led]
+    ) -> None:
+        """Leads a kinematic body to a pose within its next step, and along by a velocity, m/s, and a spin, rad/s; `None` lets it go."""
+
+    def set_state(self, object: str | Object, state: State) -> None:
+        """Puts an object into a state that it had, or another one of as many nodes."""
+
+    def sensor(self, name: str) -> Array:
+        """What a sensor of the scene reads, of the newest states. Raises `KeyError`."""
+
     def teleport(self, object: str | Object, position: Numbers, rotation: Numbers = ...) -> None:
         """To another place: a rigid body to this rotation, what bends turned by it."""
 
@@ -243,6 +262,10 @@ class State:
     @property
     def arc(self) -> Array:
         """(n,), m: of a tube, the rest lengths from its start to its nodes."""
+
+    @property
+    def contact_wrench(self) -> Array:
+        """(6,), N and N m, world axes: what contacts gave a body that does not bend, about its centre of mass, in the mean of its last step."""
 
     @property
     def radii(self) -> Array:

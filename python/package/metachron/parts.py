@@ -36,6 +36,12 @@ class _Moving(_Placed):
     """Velocity at the start, m/s; default at rest."""
     rate: float | None = None
     """Steps a simulated second, 1 ... 100000; default 240."""
+    kinematic: bool = False
+    """Whether `World.pose` leads it, and it gives way to nothing."""
+    gravity_scale: float | None = None
+    """How many times as strong gravity is for it; default 1."""
+    damping: tuple[float, float] | None = None
+    """Rates by which its velocity and its angular momentum decay, 1/s; default none."""
 
 
 @final

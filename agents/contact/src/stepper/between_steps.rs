@@ -6,9 +6,9 @@
 use super::memory::{Partner, Remembered};
 use super::spin_friction::Spin;
 use super::ties::place_key;
-use super::{ClusterStepper, PairTotal, Participant, search};
+use super::{ClusterMember, ClusterStepper, PairTotal, Participant, search};
 use glam::DVec3;
-use metachron_core::SimSpan;
+use metachron_core::{SimSpan, Wrench};
 
 impl ClusterStepper {
     /// Starts every contact from what the last step gave.
@@ -24,7 +24,7 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, outside, tearing, yielding, .. } = self;
+        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
@@ -39,10 +39,16 @@ impl ClusterStepper {
             if impulse != DVec3::ZERO {
                 let total = total_of(&mut self.totals, owner.member, owner.partner);
                 total.add(impulse, -contact.gap_m);
+                let skin = all[owner.member].member.skin();
+                let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+                for (member, impulse_n_s) in
+                    std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)))
+                {
+                    give(&mut self.wrenches[member], &*all[member].member, impulse_n_s, point_m);
+                }
                 if impulse.length() > total.most_n_s {
                     total.most_n_s = impulse.length();
-                    let skin = all[owner.member].member.skin();
-                    total.point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+                    total.point_m = point_m;
                     total.normal = contact.normal;
                     total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
                 }
@@ -62,6 +68,7 @@ impl ClusterStepper {
             let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
+        joints.note_efforts(ties, &solution.rows_n_s, efforts);
         yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);
@@ -103,6 +110,13 @@ impl PairTotal {
         self.impulse_n_s += impulse_n_s;
         self.depth_m = self.depth_m.max(depth_m);
         self.contacts += 1;
+    }
+}
+
+/// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
+fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
+    if let Some(pose) = member.pose(&[], 0.0) {
+        wrench.add(impulse_n_s, point_m - pose.centre_m);
     }
 }
 

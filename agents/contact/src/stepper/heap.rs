@@ -9,14 +9,14 @@ use super::between_steps::total_of;
 use super::domain::{Domain, assign};
 use super::progress::Progress;
 use super::search::Search;
-use super::{ClusterReport, ClusterScene, PairTotal, Participant, Partner};
+use super::{ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
 use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
-    CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
-    SpringCoefficients,
+    CoefficientCombineRule, FrictionModel, IntegrationParameters, LockedAxes, MassProperties, RigidBodyBuilder,
+    RigidBodyHandle, SpringCoefficients,
 };
 use rapier3d::geometry::{
     ColliderBuilder, ColliderHandle, ContactPair, Group, InteractionGroups, InteractionTestMode, SharedShape,
@@ -51,6 +51,14 @@ pub(super) struct Heap {
 pub(super) struct HeapReport {
     pub contacts: usize,
     pub depth_m: f64,
+}
+
+/// Where the heap adds what its contacts gave.
+pub(super) struct Sums<'a> {
+    /// Of pairs.
+    pub totals: &'a mut Vec<PairTotal>,
+    /// Of participants, by their places.
+    pub wrenches: &'a mut [Wrench],
 }
 
 /// The bodies of a heap in rapier3d.
@@ -165,7 +173,7 @@ impl Heap {
     }
 
     /// Steps the members of the heap by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
-    /// What pairs gave is added to `totals`.
+    /// What pairs gave is added to sums.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where rapier3d has no finite answer.
@@ -174,9 +182,10 @@ impl Heap {
         all: &[Participant<'_>],
         progress: &mut [Progress],
         h_s: f64,
-        totals: &mut Vec<PairTotal>,
+        into: Sums<'_>,
     ) -> Result<HeapReport, StepError> {
         let Self { world: Some(world), domains } = self else { return Ok(HeapReport::default()) };
+        let Sums { totals, wrenches } = into;
         world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
         let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);
@@ -204,6 +213,12 @@ impl Heap {
         for Given { member, partner, impulse_n_s, depth_m, counts } in world.given.drain(..) {
             let total = total_of(totals, member, partner);
             total.add(impulse_n_s, depth_m);
+            wrenches[member].force_n += impulse_n_s;
+            if let Partner::Agent(id) = partner
+                && let Ok(other) = all.binary_search_by_key(&id, |one| one.id)
+            {
+                wrenches[other].force_n -= impulse_n_s;
+            }
             // a place is counted once, not in every step of rapier3d
             total.contacts -= u32::from(!counts);
         }
@@ -409,13 +424,16 @@ fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
 
 fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, origin_m: DVec3) -> Known {
     let [mass, inertia] = [0, 1].map(|block| one.member.blocks()[block].value);
-    let (mass_kg, axes) = (mass.x_axis.x, DMat3::from_quat(body.rotation));
+    let locked = one.member.locked();
+    let (mass_kg, inertia) = locked.map_or((mass.x_axis.x, inertia), |locked| (locked.mass_kg, locked.inertia));
+    let axes = DMat3::from_quat(body.rotation);
     let inertia = axes.transpose() * inertia * axes;
     let com = body.shape.com_local.as_vec3();
     let matter = MassProperties::with_inertia_matrix(com, mass_kg as f32, inertia.as_mat3());
     let builder = RigidBodyBuilder::dynamic()
         .pose(body.pose(origin_m))
         .can_sleep(false)
+        .locked_axes(locked.map_or(LockedAxes::empty(), axes_of))
         .soft_ccd_prediction((FORESEEN_RADII * body.shape.radius_m) as f32)
         .allow_fast_rotation(true)
         // the members' own flight, which is part of what changes their velocities, has the gyroscopic part
@@ -423,6 +441,18 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
     let collider = skin(body.shape.shape.clone(), body.form).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
     Known { id: one.id, member: 0, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
+}
+
+fn axes_of(locked: Locked) -> LockedAxes {
+    let all = [
+        (LockedAxes::TRANSLATION_LOCKED_X, locked.locked_translation[0]),
+        (LockedAxes::TRANSLATION_LOCKED_Y, locked.locked_translation[1]),
+        (LockedAxes::TRANSLATION_LOCKED_Z, locked.locked_translation[2]),
+        (LockedAxes::ROTATION_LOCKED_X, locked.locked_rotation[0]),
+        (LockedAxes::ROTATION_LOCKED_Y, locked.locked_rotation[1]),
+        (LockedAxes::ROTATION_LOCKED_Z, locked.locked_rotation[2]),
+    ];
+    all.into_iter().filter(|(_, is_locked)| *is_locked).fold(LockedAxes::empty(), |axes, (axis, _)| axes | axis)
 }
 
 /// A static solid; its form is always one.

@@ -40,10 +40,27 @@ pub(super) struct Joints {
     parts: Vec<Part>,
 }
 
+/// What a joint gave in a macro step along the way that it leaves free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointTotal {
+    /// The participant that is its first body.
+    pub member: usize,
+    /// Its number in the scene.
+    pub joint: u32,
+    /// Of the first body on the second, N·m·s of a hinge, N·s of a slide.
+    pub impulse: f64,
+}
+
 /// A joint between participants; no second one is the world.
 #[derive(Debug, Clone, Copy)]
 struct Held {
+    /// Its number in the scene.
+    number: u32,
     joint: Joint,
+    /// The direction that it leaves free, world axes, of length 1.
+    axis: DVec3,
+    /// Its rows in the problem, from the first to past the last.
+    rows: [usize; 2],
     members: (usize, Option<usize>),
     /// How far it is off when the step begins, and the rotations of both.
     now: Off,
@@ -180,8 +197,11 @@ impl Joints {
         // as in the last step
         ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
         let now = joint.off(&a, &b);
-        self.held.push(Held { joint: *joint, members: (first, second), now, rotations: [a.rotation, b.rotation] });
-        self.lay_all(step, ties, &Parts { points, turns, axis: joint.axis(&a, anchors[1] - anchors[0]), lasting });
+        let (axis, rows) = (joint.axis(&a, anchors[1] - anchors[0]), [ties.rows.len(); 2]);
+        let (members, rotations) = ((first, second), [a.rotation, b.rotation]);
+        self.held.push(Held { number, joint: *joint, axis, rows, members, now, rotations });
+        self.lay_all(step, ties, &Parts { points, turns, axis, lasting });
+        self.held.iter_mut().next_back().into_iter().for_each(|held| held.rows[1] = ties.rows.len());
     }
 
     /// Lays out the rows of the joint that was noted last.
@@ -244,6 +264,20 @@ impl Joints {
         };
         let (per_m_s, free_m) = (step.h_s, step.joint_miss_m);
         ties.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
+    }
+
+    /// Adds to `totals` what motors and stops gave b against a along the ways that their joints leave free.
+    pub fn note_efforts(&self, ties: &Ties, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
+        for held in self.held.iter().filter(|held| held.joint.takes_motor()) {
+            let rows = held.rows[0]..held.rows[1];
+            let along = rows.filter(|row| matches!(ties.rows[*row].hold, Hold::Along { .. }));
+            let given = along.map(|row| -rows_n_s[row].dot(held.axis)).fold(0.0, |sum, given| sum + given);
+            let (member, joint) = (held.members.0, held.number);
+            match totals.iter_mut().find(|total| total.joint == joint) {
+                Some(total) => total.impulse += given,
+                None => totals.push(JointTotal { member, joint, impulse: given }),
+            }
+        }
     }
 
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
@@ -335,6 +369,13 @@ impl Way {
 }
 
 impl Joint {
+    /// How far b has moved from a in the way that the joint leaves free, from its zero: rad within −π … π, metres; of springs and ropes the
+    /// distance of the anchors.
+    #[must_use]
+    pub fn travel(&self, a: &Pose, b: &Pose) -> f64 {
+        self.off(a, b).travel
+    }
+
     /// How far the joint is off where its bodies are in these poses.
     fn off(&self, a: &Pose, b: &Pose) -> Off {
         let apart = a.place(self.anchor_a_m) - b.place(self.anchor_b_m);
@@ -380,7 +421,8 @@ impl Joint {
 
 impl Pose {
     /// The place of a point of the shape's axes.
-    fn place(&self, local_m: DVec3) -> DVec3 {
+    #[must_use]
+    pub fn place(&self, local_m: DVec3) -> DVec3 {
         self.origin_m + self.rotation * local_m
     }
 }

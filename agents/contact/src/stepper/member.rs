@@ -4,7 +4,7 @@
 
 use crate::StepContext;
 use crate::cluster::{Block, Response, Side};
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
@@ -32,6 +32,11 @@ pub trait ClusterMember: Send {
     /// stand for themselves, and no side refers to them. None of a body that is led.
     fn blocks(&self) -> &[Block] {
         &[]
+    }
+
+    /// The axes of the world along and about which nothing moves it, of a rigid body that has such: its matrix is as good as unbounded there.
+    fn locked(&self) -> Option<Locked> {
+        None
     }
 
     /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
@@ -231,6 +236,19 @@ pub enum Role {
     Rigid,
     /// Bends: it keeps steps of its own length.
     Deformable,
+}
+
+/// A rigid body that does not move along or about some axes of the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Locked {
+    /// Whether it is kept from moving along x, y, z.
+    pub locked_translation: [bool; 3],
+    /// Whether it is kept from turning about x, y, z.
+    pub locked_rotation: [bool; 3],
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its inertia without locks, world axes, kg·m².
+    pub inertia: DMat3,
 }
 
 /// A point of a body's matter.

@@ -49,14 +49,15 @@ use crate::law::Law;
 use blows::Rebounds;
 pub use doubling::StepDoubling;
 use glam::DVec3;
-use heap::Heap;
+use heap::{Heap, Sums};
+pub use joints::JointTotal;
 use joints::Joints;
 pub use local::LocalQuery;
 pub use matter::Matter;
-pub use member::{ClusterMember, Drive, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
+pub use member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
-use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, check_span};
+use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, Wrench, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use plan::Plan;
 use progress::Progress;
@@ -187,6 +188,9 @@ pub struct ClusterStepper {
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     totals: Vec<PairTotal>,
+    /// What contacts gave each participant in the macro step, N·s and N·m·s.
+    wrenches: Vec<Wrench>,
+    efforts: Vec<JointTotal>,
     tearing: Tearing,
     yielding: Yielding,
     /// What participants remembered when the macro step began.
@@ -219,6 +223,8 @@ impl Default for ClusterStepper {
             progress: Vec::new(),
             members: Vec::new(),
             totals: Vec::new(),
+            wrenches: Vec::new(),
+            efforts: Vec::new(),
             tearing: Tearing::default(),
             yielding: Yielding::default(),
             kept: Vec::new(),
@@ -337,6 +343,9 @@ impl ClusterStepper {
             one.grips.clear();
         }
         self.totals.clear();
+        self.wrenches.clear();
+        self.efforts.clear();
+        self.wrenches.resize(all.len(), Wrench::default());
         self.tearing.begin();
         self.yielding.begin();
         self.outside.begin();
@@ -386,7 +395,9 @@ impl ClusterStepper {
 
     /// Steps a heap from the velocities that its members have without contact.
     fn step_heap(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        self.heap.step(all, &mut self.progress, h_s, &mut self.totals)?.add_to(report);
+        self.heap
+            .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
+            .add_to(report);
         Ok(())
     }
 
@@ -460,6 +471,17 @@ impl ClusterStepper {
     pub fn totals_of(&self, member: usize) -> &[PairTotal] {
         let start = self.totals.partition_point(|total| total.member < member);
         &self.totals[start..self.totals.partition_point(|total| total.member <= member)]
+    }
+
+    /// What contacts gave a participant that moves as a whole in the last macro step, about its centre of mass, N·s and N·m·s; zero of others.
+    #[must_use]
+    pub fn wrench_of(&self, member: usize) -> Wrench {
+        self.wrenches.get(member).copied().unwrap_or_default()
+    }
+
+    /// What hinges and slides gave in the last macro step along the ways that they leave free.
+    pub fn efforts(&self) -> &[JointTotal] {
+        &self.efforts
     }
 
     /// What tore in the last macro step, by participants: no later step knows it.

@@ -13,7 +13,7 @@ use super::memory::Partner;
 use super::remote;
 use super::scene::{ClusterScene, Passage};
 use super::spin_friction::Spin;
-use super::{Participant, Progress};
+use super::{Participant, Progress, Role};
 use crate::cluster::{Contact, Side};
 use boxes::Boxes;
 use glam::DVec3;
@@ -246,6 +246,7 @@ impl Search {
         for &[a, b] in pairs {
             if !(self.is_heap(a) && self.is_heap(b))
                 && all[a].may_touch(&all[b])
+                && [a, b].iter().any(|at| all[*at].member.role() != Role::Kinematic)
                 && !scene.lets_through([all[a].id, all[b].id])
             {
                 self.find_of(round, Pair { member: a, against: Against::Member(b) });

@@ -5,10 +5,10 @@
 use super::shape_cache::{PARTS, ShapeCache};
 use super::skin;
 use super::skin_tree::PlacedSkin;
-use crate::Solid;
 use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
+use crate::{CompoundPart, Solid};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::Shape;
 
@@ -85,20 +85,17 @@ impl<'a> Pieces<'a> {
             (ShapeKind::Solid(form), ShapePose::Solid { position, rotation }) => {
                 let SolidShape { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;
-                let along = |half: f64| rotation * (DVec3::Z * half);
-                pieces.0[0] = Some(match solid {
-                    Solid::Ball { radius_m } => strand(Nodes::Solid([origin, origin], 1, *radius_m)),
-                    Solid::Capsule { radius_m, half_height_m: half } => {
-                        strand(Nodes::Solid([origin - along(*half), origin + along(*half)], 2, *radius_m))
+                let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
+                if let Solid::Compound { parts } = solid {
+                    for (piece, part) in pieces.0.iter_mut().zip(parts.iter()) {
+                        let at = Standing::part(part, origin, rotation);
+                        *piece = known.part(&part.solid).map(|shape| at.piece(&part.solid, shape.as_ref(), known));
                     }
-                    _ => {
-                        let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
-                        let around = Ball { centre: position, radius_m };
-                        let (field, shape) = (known.field(solid), known.shape(form).as_ref());
-                        let (deep_m, pierces) = (2.0 * radius_m, false);
-                        Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces })
-                    }
-                });
+                } else {
+                    let around = Ball { centre: position, radius_m };
+                    let at = Standing { origin, rotation, around };
+                    pieces.0[0] = Some(at.piece(solid, known.shape(form).as_ref(), known));
+                }
             }
             (ShapeKind::Tool(shape), ShapePose::Tool { tip, rotation, jaw }) => {
                 let solids = known.tool(shape).into_iter().flatten();
@@ -124,6 +121,38 @@ impl<'a> Pieces<'a> {
     /// The pieces with their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &Piece<'a>)> {
         self.0.iter().enumerate().filter_map(|(i, piece)| Some((i, piece.as_ref()?)))
+    }
+}
+
+/// Where a solid is.
+struct Standing {
+    origin: DVec3,
+    rotation: DQuat,
+    /// A ball around it.
+    around: Ball,
+}
+
+impl Standing {
+    /// A part of a compound whose axes are here.
+    fn part(part: &CompoundPart, origin: DVec3, rotation: DQuat) -> Self {
+        let (origin, rotation) = (origin + rotation * part.position_m, rotation * part.rotation);
+        Self { origin, rotation, around: Ball { centre: origin, radius_m: part.solid.radius_about_m(DVec3::ZERO) } }
+    }
+
+    /// The piece of a solid.
+    fn piece<'a>(self, solid: &'a Solid, shape: &'a dyn Shape, known: &'a ShapeCache) -> Piece<'a> {
+        let Self { origin, rotation, around } = self;
+        let along = |half: f64| rotation * (DVec3::Z * half);
+        match solid {
+            Solid::Ball { radius_m } => strand(Nodes::Solid([origin, origin], 1, *radius_m)),
+            Solid::Capsule { radius_m, half_height_m: half } => {
+                strand(Nodes::Solid([origin - along(*half), origin + along(*half)], 2, *radius_m))
+            }
+            _ => {
+                let (field, deep_m, pierces) = (known.field(solid), 2.0 * around.radius_m, false);
+                Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces })
+            }
+        }
     }
 }
 

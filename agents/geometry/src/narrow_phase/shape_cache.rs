@@ -5,13 +5,15 @@
 use super::skin_tree::SkinCache;
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, PlacedShape, ShapeKind, ShapePose, SolidShape};
-use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
+use crate::{COMPOUND_PARTS_MAX, Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
 
-/// How many parts a tool has; no form has more.
-pub(super) const PARTS: usize = 6;
+/// The most parts of a form: a compound has no more, and a tool has fewer.
+pub(super) const PARTS: usize = COMPOUND_PARTS_MAX;
+/// How many parts a tool has.
+const TOOL_PARTS: usize = 6;
 /// The level of the jaw's mesh whose hull touches: past it the hull grows by less than a hundredth of the jaw's thickness.
 const JAW_LEVEL: u8 = 2;
 
@@ -20,7 +22,9 @@ const JAW_LEVEL: u8 = 2;
 pub(super) struct ShapeCache {
     fields: Vec<(Solid, Option<Field>)>,
     hulls: Vec<(Solid, Option<SharedShape>)>,
-    tools: Vec<(ToolShape, Option<[ToolSolid; PARTS]>)>,
+    /// Parts of compounds.
+    parts: Vec<(Solid, Option<SharedShape>)>,
+    tools: Vec<(ToolShape, Option<[ToolSolid; TOOL_PARTS]>)>,
     /// Skins where they were last.
     pub skins: SkinCache,
 }
@@ -38,6 +42,10 @@ impl ShapeCache {
     pub fn prepare(&mut self, a: &PlacedShape<'_>, b: &PlacedShape<'_>) {
         for (placed, other) in [(a, b), (b, a)] {
             match &placed.form.kind {
+                ShapeKind::Solid(SolidShape { solid: Solid::Compound { parts }, .. }) => {
+                    parts.iter().for_each(|part| self.prepare_solid(&part.solid));
+                    self.prepare_pieces(placed);
+                }
                 ShapeKind::Solid(SolidShape { solid, .. }) if is_strand(&other.form.kind) => self.prepare_solid(solid),
                 _ => self.prepare_pieces(placed),
             }
@@ -47,6 +55,9 @@ impl ShapeCache {
     /// Caches the data that the pieces of a form need where its own field is not asked.
     pub fn prepare_pieces(&mut self, placed: &PlacedShape<'_>) {
         match (&placed.form.kind, placed.view) {
+            (ShapeKind::Solid(SolidShape { solid: Solid::Compound { parts }, .. }), _) => {
+                parts.iter().for_each(|part| self.prepare_part(&part.solid));
+            }
             (ShapeKind::Solid(SolidShape { solid, shape, .. }), _) if shape.as_trimesh().is_some() => {
                 self.prepare_hull(solid)
             }
@@ -72,6 +83,12 @@ impl ShapeCache {
         }
     }
 
+    fn prepare_part(&mut self, solid: &Solid) {
+        if !self.parts.iter().any(|(known, _)| is_same(known, solid)) {
+            self.parts.push((solid.clone(), solid.to_moving_shape().ok()));
+        }
+    }
+
     fn prepare_tool(&mut self, shape: &ToolShape) {
         if !self.tools.iter().any(|(known, _)| known == shape) {
             let solids: Result<Vec<_>, _> = shape.parts(0.0).iter().map(ToolSolid::new).collect();
@@ -90,15 +107,24 @@ impl ShapeCache {
         hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
     }
 
+    /// The cached shape of a part of a compound.
+    pub fn part(&self, solid: &Solid) -> Option<&SharedShape> {
+        self.parts.iter().find(|(known, _)| is_same(known, solid))?.1.as_ref()
+    }
+
     /// The cached solids of a tool.
-    pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid; PARTS]> {
+    pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid; TOOL_PARTS]> {
         self.tools.iter().find(|(known, _)| known == shape)?.1.as_ref()
     }
 }
 
 /// Whether a form consists of points and spans that are looked up in the fields of others.
 fn is_strand(kind: &ShapeKind) -> bool {
-    let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
+    let is_round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
+    let round = |solid: &Solid| match solid {
+        Solid::Compound { parts } => parts.iter().any(|part| is_round(&part.solid)),
+        solid => is_round(solid),
+    };
     matches!(kind, ShapeKind::Chain | ShapeKind::Surface(_))
         || matches!(kind, ShapeKind::Solid(SolidShape { solid, .. }) if round(solid))
 }
@@ -120,6 +146,7 @@ fn is_same(a: &Solid, b: &Solid) -> bool {
         (Solid::Mesh { points_m: a, triangles: s }, Solid::Mesh { points_m: b, triangles: t }) => {
             Arc::ptr_eq(a, b) && Arc::ptr_eq(s, t)
         }
+        (Solid::Compound { parts: a }, Solid::Compound { parts: b }) => Arc::ptr_eq(a, b),
         _ => a == b,
     }
 }

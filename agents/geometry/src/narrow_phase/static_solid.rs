@@ -12,7 +12,9 @@ use super::primitives::{Block, Piece, Pieces};
 use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
 use super::{NarrowPhaseScratch, SweptReach, SweptShape, finish, touches};
 use crate::signed_distance::{Ball, Field};
-use crate::{Aabb, CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape};
+use crate::{
+    Aabb, CollisionShape, CompoundPart, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape,
+};
 use crate::{Touch, is_closed, mesh_triangles};
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use rapier3d::parry::shape::Cuboid;
@@ -283,6 +285,12 @@ fn bounds(solid: &Solid, position: DVec3, rotation: DQuat) -> Aabb {
     let across = |radius_m: f64| (DVec3::ONE - axis * axis).max(DVec3::ZERO).map(f64::sqrt) * radius_m;
     let half = match solid {
         Solid::Plane => return Aabb::everywhere(),
+        Solid::Compound { parts } => {
+            let of_part = |part: &CompoundPart| {
+                bounds(&part.solid, position + rotation * part.position_m, rotation * part.rotation)
+            };
+            return parts.iter().map(of_part).reduce(Aabb::union).unwrap_or(Aabb::about(position, 0.0));
+        }
         Solid::Hull { points_m } | Solid::Mesh { points_m, .. } => {
             let of_point = |point: &DVec3| position + rotation * *point;
             let boxes = points_m.iter().map(|point| Aabb::about(of_point(point), 0.0));

@@ -4,7 +4,7 @@
 
 use super::mass_properties::MassDistribution;
 use super::member::Unknowns;
-use super::motion::Motion;
+use super::motion::{Flight, Motion};
 use super::{RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// A rigid body with its own clock.
 pub struct RigidBody {
     pub(super) spread: MassDistribution,
-    pub(super) gravity: DVec3,
+    pub(super) flight: Flight,
     pub(super) may_sleep: bool,
     pub(super) motion: Motion,
     pub(super) form: Arc<CollisionShape>,
@@ -51,10 +51,11 @@ impl RigidBody {
         let mut motion = Motion {
             position: spec.position + rotation * spread.com,
             rotation,
-            velocity: spec.velocity,
+            velocity: spec.restraint.translation(spec.velocity),
             angular: DVec3::ZERO,
         };
-        motion.set_spin(&spread, spec.spin);
+        motion.set_spin(&spread, spec.restraint.rotation(spec.spin));
+        let flight = Flight { gravity: spec.restraint.translation(spec.gravity), restraint: spec.restraint };
         let shape = SolidShape::moving(&spec.solid, spread.com)?;
         let radius_m = shape.radius_m;
         let kind = ShapeKind::Solid(shape);
@@ -62,12 +63,12 @@ impl RigidBody {
         let form = CollisionShape { kind, friction, restitution, traits };
         let mut body = Self {
             spread,
-            gravity: spec.gravity,
+            flight,
             may_sleep: spec.sleep,
             motion,
             form: Arc::new(form),
             radius_m,
-            acceleration: spec.gravity,
+            acceleration: flight.gravity,
             at_rest: false,
             calm_s: 0.0,
             steps: 0,
@@ -122,11 +123,11 @@ impl Agent for RigidBody {
     }
 
     fn set_motion(&mut self, set: &SetMotion) -> bool {
-        let Self { motion, spread, .. } = self;
+        let Self { motion, spread, flight: Flight { restraint, .. }, .. } = self;
         let origin_m = set.position_m.unwrap_or(motion.position - motion.rotation * spread.com);
-        let spin_rad_s = set.spin_rad_s.unwrap_or_else(|| motion.spin(spread));
+        let spin_rad_s = restraint.rotation(set.spin_rad_s.unwrap_or_else(|| motion.spin(spread)));
         let rotation = set.rotation.map_or(motion.rotation, DQuat::normalize);
-        let velocity = set.velocity_m_s.unwrap_or(motion.velocity);
+        let velocity = restraint.translation(set.velocity_m_s.unwrap_or(motion.velocity));
         let mut to = Motion { position: origin_m + rotation * spread.com, rotation, velocity, ..*motion };
         to.set_spin(spread, spin_rad_s);
         if !to.is_sane(spread) {
@@ -136,6 +137,19 @@ impl Agent for RigidBody {
         (self.at_rest, self.calm_s, self.acceleration) = (false, 0.0, DVec3::ZERO);
         self.unknowns.start([velocity, spin_rad_s]);
         true
+    }
+
+    fn set_state(&mut self, state: &Body) -> Result<(), String> {
+        let Body::Rigid(state) = state else { return Err("a rigid body has the state of one".to_owned()) };
+        let rotation = state.rotation.normalize();
+        let set = SetMotion {
+            position_m: Some(state.position - rotation * self.spread.com),
+            rotation: Some(rotation),
+            velocity_m_s: Some(state.velocity),
+            spin_rad_s: Some(state.spin),
+        };
+        let is_taken = set.is_sound() && self.set_motion(&set);
+        is_taken.then_some(()).ok_or_else(|| "a number is not finite or too large".to_owned())
     }
 
     /// A rigid body has no nodes to redistribute: nothing changes.
@@ -160,7 +174,7 @@ impl Agent for RigidBody {
             velocity: self.motion.velocity,
             spin: self.motion.spin(&self.spread),
         });
-        into.energy_j = self.motion.energy_j(&self.spread, self.gravity);
+        into.energy_j = self.motion.energy_j(&self.spread, self.flight.gravity);
         into.residual_m = (self.motion.position.abs().max_element() + self.radius_m) * f64::EPSILON;
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);

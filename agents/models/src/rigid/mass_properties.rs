@@ -7,7 +7,7 @@
 use super::RigidError;
 use crate::symmetric::{PrincipalAxes, principal_axes};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_geometry::{Solid, Triangles, hull_triangles, mesh_triangles};
+use metachron_geometry::{CompoundPart, Solid, Triangles, hull_triangles, mesh_triangles};
 
 /// Mass, centre and principal moments of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +35,7 @@ impl MassDistribution {
             Solid::Cylinder { radius_m, half_height_m } => centred(mass_kg * cylinder(*radius_m, *half_height_m)),
             Solid::Capsule { radius_m, half_height_m } => centred(capsule(mass_kg, *radius_m, *half_height_m)),
             Solid::Plane => return Err(RigidError::MovingPlane),
+            Solid::Compound { parts } => Self::together(parts, mass_kg)?,
             Solid::Hull { points_m } => Self::inside(&hull_triangles(points_m)?, mass_kg),
             Solid::Mesh { points_m, triangles } => {
                 let mesh = mesh_triangles(points_m, triangles)?;
@@ -42,6 +43,28 @@ impl MassDistribution {
                 Self::inside(&solid, mass_kg)
             }
         })
+    }
+
+    /// The distribution of `mass_kg` over several solids by their volumes and densities, by parallel axes.
+    fn together(parts: &[CompoundPart], mass_kg: f64) -> Result<Self, RigidError> {
+        let mut all = Vec::with_capacity(parts.len());
+        let mut sum = 0.0;
+        for part in parts {
+            let share = part.solid.volume_m3()? * part.density;
+            all.push((part, Self::of(&part.solid, share)?));
+            sum += share;
+        }
+        let place = |part: &CompoundPart, own: &Self| part.position_m + part.rotation * own.com;
+        let com: DVec3 = all.iter().map(|(part, own)| place(part, own) * (own.mass_kg / sum)).sum();
+        let mut inertia = DMat3::ZERO;
+        for (part, own) in &all {
+            let (turned, arm) = (DMat3::from_quat(part.rotation * own.axes), place(part, own) - com);
+            let about_itself = turned * DMat3::from_diagonal(own.moments) * turned.transpose();
+            let moved = DMat3::from_diagonal(DVec3::splat(arm.length_squared())) - outer(arm);
+            inertia += about_itself + moved * own.mass_kg;
+        }
+        let PrincipalAxes { values, axes } = principal_axes(inertia * (mass_kg / sum));
+        Ok(Self { mass_kg, com, moments: values, axes: DQuat::from_mat3(&axes).normalize() })
     }
 
     /// The distribution of `mass_kg` over the inside of a closed surface.
@@ -145,6 +168,27 @@ mod tests {
         // chords are inside the arc by (angle step)²/8 ≈ 3e-4, its square enters the moments
         let wrong = (got - DVec3::from_array(expected)).abs().max_element();
         assert!(wrong < 2e-3 * expected[2], "{got} is not {expected:?}");
+    }
+
+    #[test]
+    fn a_dumbbell_weighs_as_its_balls_and_its_bar_by_parallel_axes() {
+        let (r, l, half) = (0.1, 0.3, DVec3::new(0.2, 0.02, 0.03));
+        let part = |solid, x: f64, density| CompoundPart {
+            density,
+            ..CompoundPart::new(solid, DVec3::new(x, 0.0, 0.4), DQuat::IDENTITY)
+        };
+        let ball = |x: f64| part(Solid::Ball { radius_m: r }, x, 3.0);
+        let bar = part(Solid::Box { half_extents_m: half }, 0.0, 1.0);
+        let parts = [ball(-l), ball(l), bar].into();
+        let all = MassDistribution::of(&Solid::Compound { parts }, 5.0).unwrap();
+        let volumes = [4.0 / 3.0 * std::f64::consts::PI * r * r * r * 3.0, 8.0 * half.element_product()];
+        let share = 5.0 / (2.0 * volumes[0] + volumes[1]);
+        let [ball_kg, bar_kg] = volumes.map(|volume| volume * share);
+        let (about, own) = (2.0 * 0.4 * ball_kg * r * r, bar_kg / 3.0 * (half.length_squared() - half * half));
+        let across = 2.0 * ball_kg * l * l;
+        let expected = DVec3::new(about + own.x, about + across + own.y, about + across + own.z);
+        assert!((all.com - DVec3::Z * 0.4).length() < 1e-15, "{:?}", all.com);
+        assert!((sorted(all.moments) - sorted(expected)).abs().max_element() < 1e-14, "{} {expected}", all.moments);
     }
 
     #[test]

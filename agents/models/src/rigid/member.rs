@@ -2,17 +2,35 @@
 //!
 //! In: steps and velocities. Out: its inertia, its free flight, its skin. Never here: contacts. Theory: docs/theory/clusters.md, section 9.
 
+use super::Restraint;
 use super::RigidBody;
 use super::body::{CALM_M_S, REST_S};
-use super::motion::Motion;
+use super::motion::{Flight, Motion};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::stepper::{ClusterMember, Locked, MaterialPoint, Pose, Role};
 use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// The block of its spin; block 0 is the velocity of its centre of mass.
 const SPIN: usize = 1;
+
+/// How many times as heavy a body is along an axis that is locked: of what an impulse would move it, one part in so many is left, and is then
+/// taken away.
+const LOCKED_TIMES: f64 = 1e8;
+
+/// A mass or an inertia with axes of the world locked, `heaviest` along any of them.
+fn locked(mass: DMat3, axes: [bool; 3], heaviest: f64) -> DMat3 {
+    let mut mass = mass;
+    for axis in (0..3).filter(|axis| axes[*axis]) {
+        for other in 0..3 {
+            mass.col_mut(axis)[other] = 0.0;
+            mass.col_mut(other)[axis] = 0.0;
+        }
+        mass.col_mut(axis)[axis] = LOCKED_TIMES * heaviest;
+    }
+    mass
+}
 
 /// Its unknowns in a cluster.
 #[derive(Debug, Clone)]
@@ -63,16 +81,34 @@ impl RigidBody {
     /// Its motion after `h_s` seconds with the velocities `v`; by its own free flight where nothing has touched it.
     fn moved(&self, v: &[DVec3], h_s: f64, touched: bool) -> Motion {
         let mut motion = self.motion;
-        motion.angular += self.motion.inertia_times(&self.spread, v[SPIN] - self.unknowns.free[SPIN]);
+        let Flight { restraint, .. } = self.flight;
+        let given = restraint.rotation(v[SPIN] - self.unknowns.free[SPIN]);
+        let given = self.motion.inertia_times(&self.spread, given);
         if !touched {
-            motion.velocity += v[0] - self.unknowns.free[0];
-            motion.fly(&self.spread, self.gravity, h_s);
+            motion.angular += given;
+            motion.velocity += restraint.translation(v[0] - self.unknowns.free[0]);
+            motion.fly(&self.spread, &self.flight, h_s);
             return motion;
         }
-        motion.velocity = v[0];
-        motion.position += v[0] * h_s;
-        motion.turn(&self.spread, h_s);
+        if restraint.angular_damping_per_s > 0.0 {
+            motion.angular *= libm::exp(-restraint.angular_damping_per_s * h_s);
+        }
+        motion.angular += given;
+        motion.velocity = restraint.translation(v[0]);
+        motion.position += motion.velocity * h_s;
+        motion.turn_within(&self.spread, &restraint, h_s);
         motion
+    }
+
+    /// Its blocks: where an axis is locked, it is as heavy there as nothing that touches it moves, and no impulse is left over.
+    fn masses(&self) -> [DMat3; 2] {
+        let (mass, inertia) = (DMat3::from_diagonal(DVec3::splat(self.spread.mass_kg)), self.inertia());
+        let Restraint { locked_translation, locked_rotation, .. } = self.flight.restraint;
+        if !self.flight.restraint.locks() {
+            return [mass, inertia];
+        }
+        let heaviest = self.spread.moments.max_element();
+        [locked(mass, locked_translation, self.spread.mass_kg), locked(inertia, locked_rotation, heaviest)]
     }
 
     fn diverged(&self, dt_s: f64, what: &str) -> StepError {
@@ -87,13 +123,12 @@ impl ClusterMember for RigidBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let mut flight = self.motion;
-        flight.fly(&self.spread, self.gravity, h_s);
-        let inertia = self.inertia();
+        flight.fly(&self.spread, &self.flight, h_s);
+        let masses = self.masses();
         let Unknowns { blocks, free, now, .. } = &mut self.unknowns;
         *now = [self.motion.velocity, self.motion.spin(&self.spread)];
         *free = [flight.velocity, flight.spin(&self.spread)];
-        blocks[0].value = DMat3::from_diagonal(DVec3::splat(self.spread.mass_kg));
-        blocks[1].value = inertia;
+        blocks.iter_mut().zip(masses).for_each(|(block, mass)| block.value = mass);
         if flight.is_sane(&self.spread) {
             Ok(())
         } else {
@@ -103,6 +138,13 @@ impl ClusterMember for RigidBody {
 
     fn blocks(&self) -> &[Block] {
         &self.unknowns.blocks
+    }
+
+    fn locked(&self) -> Option<Locked> {
+        let Flight { restraint, .. } = self.flight;
+        let Restraint { locked_translation, locked_rotation, .. } = restraint;
+        let (mass_kg, inertia) = (self.spread.mass_kg, self.inertia());
+        restraint.locks().then_some(Locked { locked_translation, locked_rotation, mass_kg, inertia })
     }
 
     fn free(&self) -> &[DVec3] {
@@ -154,8 +196,9 @@ impl ClusterMember for RigidBody {
     }
 
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
-        self.motion.position += impulses_n_s2[0] / self.spread.mass_kg;
-        let turn = self.inertia().inverse() * impulses_n_s2[SPIN];
+        let Flight { restraint, .. } = self.flight;
+        self.motion.position += restraint.translation(impulses_n_s2[0] / self.spread.mass_kg);
+        let turn = restraint.rotation(self.inertia().inverse() * impulses_n_s2[SPIN]);
         if turn != DVec3::ZERO {
             self.motion.rotation = (glam::DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
         }
@@ -208,7 +251,7 @@ impl RigidBody {
     fn count_calm(&mut self, before: &Motion, h_s: f64, touched: bool) {
         let still = self.motion.velocity.length() + self.swing_m_s() < CALM_M_S;
         // one that hovers at the top of its flight is not at rest
-        let held = touched || (self.gravity == DVec3::ZERO && *before == self.motion);
+        let held = touched || (self.flight.gravity == DVec3::ZERO && *before == self.motion);
         self.calm_s = if still && held { self.calm_s + h_s } else { 0.0 };
     }
 }

@@ -1,5 +1,7 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
+use super::mass_properties::MassDistribution;
+use crate::trajectory::Keyframe;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
@@ -28,6 +30,61 @@ pub struct RigidSpec {
     pub gravity: DVec3,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
+    /// What slows it down and where it cannot move.
+    pub restraint: Restraint,
+    /// How it is led, of a kinematic body ([`super::KinematicBody`]), whose mass, velocity, spin and gravity have no meaning; `None` for a
+    /// body that moves by what acts on it.
+    pub led: Option<Led>,
+}
+
+/// What slows a rigid body down wherever it is, and the axes of the world along and about which it does not move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Restraint {
+    /// Its velocity decays by this rate, 1/s, 0 … 1e6.
+    pub linear_damping_per_s: f64,
+    /// Its angular momentum likewise.
+    pub angular_damping_per_s: f64,
+    /// Whether it is kept from moving along x, y, z.
+    pub locked_translation: [bool; 3],
+    /// Whether it is kept from turning about x, y, z. Of a body that turns about two axes, gyroscopic torques are left out.
+    pub locked_rotation: [bool; 3],
+}
+
+impl Restraint {
+    /// What is left of a velocity, m/s.
+    pub(super) fn translation(&self, v: DVec3) -> DVec3 {
+        left(self.locked_translation, v)
+    }
+
+    /// What is left of a spin, rad/s.
+    pub(super) fn rotation(&self, w: DVec3) -> DVec3 {
+        left(self.locked_rotation, w)
+    }
+
+    /// Whether it locks an axis of rotation.
+    pub(super) const fn locks_rotation(&self) -> bool {
+        let [x, y, z] = self.locked_rotation;
+        x || y || z
+    }
+
+    /// Whether it locks any axis.
+    pub(super) const fn locks(&self) -> bool {
+        let [x, y, z] = self.locked_translation;
+        x || y || z || self.locks_rotation()
+    }
+}
+
+fn left(locked: [bool; 3], v: DVec3) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|i| if locked[i] { 0.0 } else { v[i] }))
+}
+
+/// How a kinematic body moves where no command leads it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Led {
+    /// Poses of the origin of its axes, times rising; jaws have no meaning. None for one that stays where it is.
+    pub keyframes: Vec<Keyframe>,
+    /// Whether the motion starts again after the last keyframe.
+    pub repeat: bool,
 }
 
 /// Why a rigid body cannot be built.
@@ -61,6 +118,9 @@ pub enum RigidError {
 /// The largest coordinate or speed accepted, metres or m/s: beyond it a contact solver in single precision would lose all resolution.
 pub(super) const REACH_MAX: f64 = 1e6;
 
+/// The longest script, seconds (11 days).
+const SCRIPT_MAX_S: f64 = 1e6;
+
 impl RigidSpec {
     /// A solid of `mass_kg` at `position` on which nothing acts: zero velocity, no gravity, friction 0.5, no bounce;
     /// it never reports rest.
@@ -78,7 +138,21 @@ impl RigidSpec {
             traits: ContactTraits::default(),
             gravity: DVec3::ZERO,
             sleep: false,
+            restraint: Restraint::default(),
+            led: None,
         }
+    }
+
+    /// Its centre of mass in the axes of its shape, metres; their origin where the shape is none.
+    #[must_use]
+    pub fn com_local(&self) -> DVec3 {
+        MassDistribution::of(&self.solid, self.mass_kg).map_or(DVec3::ZERO, |spread| spread.com)
+    }
+
+    /// Shifts its start and its keyframes, metres.
+    pub fn shift(&mut self, by_m: DVec3) {
+        self.position += by_m;
+        self.led.iter_mut().flat_map(|led| &mut led.keyframes).for_each(|key| key.tip_m += by_m);
     }
 
     /// Whether every number is in its range.
@@ -89,11 +163,32 @@ impl RigidSpec {
         number("the mass", self.mass_kg, (1e-9, 1e9), "between 1e-9 and 1e9 kg")?;
         number("the restitution", self.restitution, (0.0, 1.0), "between 0 and 1")?;
         number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
+        let Restraint { linear_damping_per_s, angular_damping_per_s, .. } = self.restraint;
+        number("the linear damping", linear_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
+        number("the angular damping", angular_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
         vector("the spin", self.spin)?;
         vector("the gravity", self.gravity)?;
-        rotation("the rotation", self.rotation)
+        rotation("the rotation", self.rotation)?;
+        self.led.as_ref().map_or(Ok(()), Led::check)
+    }
+}
+
+impl Led {
+    fn check(&self) -> Result<(), RigidError> {
+        let mut before_s = 0.0;
+        for (at, key) in self.keyframes.iter().enumerate() {
+            let rises = if at == 0 { key.at_s >= before_s } else { key.at_s > before_s };
+            if !(rises && key.at_s <= SCRIPT_MAX_S) {
+                let (what, wanted) = ("the time of a keyframe", "later than the one before, 0 to 1e6 s");
+                return Err(RigidError::BadNumber { what, value: key.at_s, wanted });
+            }
+            before_s = key.at_s;
+            vector("the position of a keyframe", key.tip_m)?;
+            rotation("the rotation of a keyframe", key.rotation)?;
+        }
+        Ok(())
     }
 }
 

@@ -1,12 +1,13 @@
-//! A tube's publication: its snapshot.
+//! A tube's publication: its snapshot, and the way back from one.
 //!
-//! In: a tube between two steps. Out: its curve. Never here: any change of its state.
+//! In: a tube between two steps. Out: its curve, or the tube with another. Never here: steps.
 
 use super::residual;
 use super::state::RodState;
 use super::tube::Tube;
+use crate::set_motion::check_nodes;
 use glam::DVec3;
-use metachron_core::{Bounds, Snapshot};
+use metachron_core::{Bounds, CurveState, Snapshot};
 
 /// The bounding box of a tube in this state that is nowhere wider than `radius_m`.
 pub fn bounds(state: &RodState, radius_m: f64) -> Bounds {
@@ -32,6 +33,38 @@ impl Tube {
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(bounds(&self.now, self.widest_m()));
         self.publish_curve(into);
+    }
+
+    /// Takes the curve of another state: its sections stay as they are.
+    ///
+    /// # Errors
+    /// What does not fit; nothing is changed then.
+    pub(super) fn take_curve(&mut self, curve: &CurveState) -> Result<(), String> {
+        let (last, held) = (self.now.x.len() - 1, self.matter.held);
+        let is_held = |node: usize| node == 0 && held[0] || node == last && held[1];
+        check_nodes(&self.now.x, [&curve.positions, &curve.velocities], is_held)?;
+        if curve.frames.len() != self.now.q.len() {
+            let (found, parts) = (curve.frames.len(), self.now.q.len());
+            return Err(format!("the state has {found} frames; the tube has {parts} segments"));
+        }
+        if let Some(at) = curve.frames.iter().position(|q| !(q.is_finite() && q.length_squared() > 0.25)) {
+            return Err(format!("frame {at} of the state is no rotation"));
+        }
+        let Self { now, matter, division, .. } = self;
+        for (node, (x, v)) in curve.positions.iter().zip(&curve.velocities).enumerate() {
+            if !is_held(node) {
+                (now.x[node], now.u[2 * node]) = (*x, *v);
+            }
+        }
+        for (part, q) in curve.frames.iter().enumerate() {
+            let is_clamped = part == 0 && matter.clamp[0] || part + 1 == last && matter.clamp[1];
+            if !is_clamped {
+                (now.q[part], now.u[2 * part + 1]) = (q.normalize(), DVec3::ZERO);
+            }
+        }
+        now.strain(matter, division);
+        self.begin_anew();
+        Ok(())
     }
 
     fn publish_curve(&self, into: &mut Snapshot) {

@@ -23,7 +23,7 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
+    Archive, ArchiveError, Body, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
 };
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -350,6 +350,16 @@ impl Tube {
     }
 }
 
+impl Tube {
+    /// Begins from a state that it was set to: what steps before it said is of another.
+    pub(super) fn begin_anew(&mut self) {
+        self.stepper.forget();
+        self.present_velocities();
+        self.rest.wake();
+        self.at_rest = false;
+    }
+}
+
 impl Agent for Tube {
     fn model(&self) -> &'static str {
         "tube"
@@ -414,11 +424,13 @@ impl Agent for Tube {
             };
         }
         now.strain(matter, division);
-        self.stepper.forget();
-        self.present_velocities();
-        self.rest.wake();
-        self.at_rest = false;
+        self.begin_anew();
         true
+    }
+
+    fn set_state(&mut self, state: &Body) -> Result<(), String> {
+        let Body::Curve(curve) = state else { return Err("a tube has the state of a curve".to_owned()) };
+        self.take_curve(curve)
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -13,7 +13,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::step_doubling::Doubling;
 use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
-use crate::set_motion::WholeMotion;
+use crate::set_motion::{WholeMotion, check_nodes};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, Carving, SetMotion, StepContext};
@@ -261,6 +261,21 @@ impl Agent for SoftBody {
         }
         self.woken();
         true
+    }
+
+    fn set_state(&mut self, state: &Body) -> Result<(), String> {
+        let Body::Soft(state) = state else { return Err("a soft body has the state of vertices".to_owned()) };
+        if self.skin.is_some() {
+            return Err("what others see of it is carried by other nodes: restore a checkpoint instead".to_owned());
+        }
+        let Self { positions, velocities, mesh, .. } = self;
+        check_nodes(positions, [&state.positions, &state.velocities], |at| mesh.held[at])?;
+        for (at, (x, v)) in state.positions.iter().zip(&state.velocities).enumerate().filter(|(at, _)| !mesh.held[*at])
+        {
+            (positions[at], velocities[at]) = (*x, *v);
+        }
+        self.woken();
+        Ok(())
     }
 
     /// A body with a skin of its own is divided anew; the division of any other is fixed by its scene.

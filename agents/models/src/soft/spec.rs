@@ -318,6 +318,58 @@ impl SoftShape {
     }
 }
 
+/// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
+const SKIN_LATTICE_MAX: u64 = 1_000_000;
+
+impl SoftSpec {
+    /// The same body with nodes that are spaced by its ε, finest and coarsest, metres, instead of by the cells of its lattice: it begins with the
+    /// finest, and its skin is as fine as that. A box or ball becomes what its skin encloses. `None` where the finest is too fine for its
+    /// size; other shapes stay as they are.
+    #[must_use]
+    pub fn spaced(self, range_m: (f64, f64)) -> Option<Self> {
+        let fitted = |size: f64| (size / range_m.0).ceil().clamp(1.0, 2047.0) as u32;
+        let lattice = match &self.shape {
+            SoftShape::Sheet { .. } | SoftShape::Rope { .. } => {
+                let most = |shape: &SoftShape| match *shape {
+                    SoftShape::Sheet { segments: [x, y], .. } => x.max(y),
+                    SoftShape::Rope { segments, .. } => segments,
+                    _ => 0,
+                };
+                let fits = |finest: &SoftShape| finest.vertices() <= VERTICES_MAX && (1..=2047).contains(&most(finest));
+                let shape = self.shape.divided_by(range_m.0).filter(fits)?;
+                return Some(Self { shape, nodes: Some(NodeSpacing { eps_m: range_m.0, range_m }), ..self });
+            }
+            SoftShape::Box { size_m, .. } => {
+                SoftShape::Box { size_m: *size_m, segments: size_m.to_array().map(fitted) }
+            }
+            SoftShape::Ball { radius_m, .. } => {
+                SoftShape::Ball { radius_m: *radius_m, segments: fitted(2.0 * radius_m).max(2) }
+            }
+            SoftShape::Embedded { .. } | SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => return Some(self),
+        };
+        let half_m = if let SoftShape::Box { size_m, .. } = lattice { 0.5 * size_m } else { DVec3::ZERO };
+        let position = self.position + self.rotation * half_m;
+        Some(Self { shape: lattice.embedded(range_m)?, position, ..self })
+    }
+}
+
+impl SoftShape {
+    /// What the skin of a box or ball encloses, about its middle, in a cage of cells within a range; `None` where its lattice is too fine, and
+    /// for other shapes.
+    #[must_use]
+    pub fn embedded(&self, range_m: (f64, f64)) -> Option<Self> {
+        if self.vertices() > SKIN_LATTICE_MAX {
+            return None;
+        }
+        let mut surface = self.skin()?;
+        if let Self::Box { size_m, .. } = self {
+            // about its middle, as a mesh is about its origin
+            surface.points.iter_mut().for_each(|point| *point -= 0.5 * *size_m);
+        }
+        Some(Self::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m })
+    }
+}
+
 impl NodeSpacing {
     fn check(&self) -> Result<(), SoftError> {
         let all = [("ε", self.eps_m), ("the finest ε", self.range_m.0), ("the coarsest ε", self.range_m.1)];

@@ -6,12 +6,13 @@
 //! like a critically damped spring, solved exactly, so that being taken, released or put off by lost time never makes it jump.
 //! In a cluster contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
 
-use super::drive::{Drive, PointMotion};
+use super::drive::Drive;
 use super::gripper::{Jaws, nearest, nearest_of};
 use super::member::Unknowns;
 use super::pivot::Pivot;
-use super::trajectory::{Pose, Script};
+
 use super::{ToolError, ToolSpec};
+use crate::trajectory::{PointMotion, Pose, Script};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
@@ -57,8 +58,6 @@ const FRICTION: f64 = 0.2;
 
 /// Rate at which the tip closes up to a user spring, 1/s: nine tenths of the distance in 65 ms; the tremor of a mouse is filtered out.
 const USER_RATE_PER_S: f64 = 60.0;
-/// Rate at which it returns to its script after a user spring, 1/s: nine tenths of the distance in a second.
-const RETURN_RATE_PER_S: f64 = 4.0;
 /// Rate at which jaws open and close where no script sets them, 1/s.
 const JAW_RATE_PER_S: f64 = 4.0;
 /// Under a user spring, jaws close on a body whose skin is nearer than this share of their reach.
@@ -67,8 +66,6 @@ const CATCH_SHARE: f64 = 0.5;
 const ARRIVED: f64 = 1e-7;
 /// A tool on which sleeping bodies rest keeps still below this speed, m/s.
 pub(super) const SUPPORTING_MAX_M_S: f64 = 2e-3;
-/// Rotations whose dot product is within this of one are the same.
-const SAME_TURN: f64 = 1e-14;
 
 impl Tool {
     /// Builds the tool of `spec`, in its first keyframe or at the given offset from it.
@@ -127,7 +124,7 @@ impl Tool {
     /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that `is_near`.
     pub(super) fn follow_user_spring(&self, spring: &AnchorSpring, dt: f64, is_near: bool) -> ToolState {
         let target = self.user_target(spring);
-        let off = decay(self.commanded.relative_to(target), USER_RATE_PER_S, dt);
+        let off = self.commanded.relative_to(target).decayed(USER_RATE_PER_S, dt);
         let tip = target.position + target.velocity * dt + off.position;
         let wanted = if is_near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
@@ -136,25 +133,13 @@ impl Tool {
 
     /// Follows the script; the offset from it decays.
     pub(super) fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
-        let start = PointMotion { position: from.tip, velocity: from.velocity };
-        let off = decay(self.commanded.relative_to(start), RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
         let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         let (_, scripted) = through(self.pivot, self.tool.tip, from.rotation);
-        let turned_off = self.tool.rotation * scripted.conjugate();
-        let rotation = if turned_off.w.abs() >= 1.0 - SAME_TURN {
-            to.rotation
-        } else {
-            let left = libm::exp(-RETURN_RATE_PER_S * dt);
-            (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
-        };
-        ToolState {
-            tip: to.tip + off.position,
-            velocity: to.velocity + off.velocity,
-            rotation,
-            jaw: jaw.clamp(0.0, 1.0),
-            ..self.tool
-        }
+        let PointMotion { position: tip, velocity } = self.commanded;
+        let now = Pose { tip, velocity, rotation: self.tool.rotation, jaw };
+        let Pose { tip, velocity, rotation, .. } = now.returning(&Pose { rotation: scripted, ..*from }, to, dt);
+        ToolState { tip, velocity, rotation, jaw: jaw.clamp(0.0, 1.0), ..self.tool }
     }
 
     /// The agent that open jaws may grasp or have just released: the nearest of those that are near them, or may be within two steps of
@@ -219,16 +204,6 @@ pub(super) fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
 /// The angular velocity that turns one rotation into another in `dt` seconds, world axes, rad/s.
 pub(super) fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
     shortest_turn(from, to) / dt
-}
-
-/// A deviation after `t` seconds of critical damping: exact for any step.
-fn decay(off: PointMotion, damping_per_s: f64, t: f64) -> PointMotion {
-    let left = libm::exp(-damping_per_s * t);
-    let push = off.velocity + off.position * damping_per_s;
-    PointMotion {
-        position: (off.position + push * t) * left,
-        velocity: (off.velocity - push * (damping_per_s * t)) * left,
-    }
 }
 
 impl Agent for Tool {

@@ -4,24 +4,9 @@
 //! where the drive is not strong enough. Never here: the path, grasps, contacts.
 //! Theory: docs/theory/coupling.md, eq. 9d, 9e: the god-object of haptics (ZS95), its coupling limited in force.
 
+use crate::trajectory::PointMotion;
 use glam::{DMat3, DVec3};
 use metachron_core::Inertia;
-
-/// A moving point.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct PointMotion {
-    /// Metres.
-    pub position: DVec3,
-    /// Metres per second.
-    pub velocity: DVec3,
-}
-
-impl PointMotion {
-    /// How it moves as seen from `other`.
-    pub(super) fn relative_to(self, other: Self) -> Self {
-        Self { position: self.position - other.position, velocity: self.velocity - other.velocity }
-    }
-}
 
 /// A step of the drive within a contact cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]

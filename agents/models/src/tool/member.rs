@@ -5,9 +5,10 @@
 
 use super::Tool;
 use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin, through};
-use super::drive::{Drive, PointMotion};
+use super::drive::Drive;
 use super::gripper::Jaws;
 use super::spec::REACH_MAX_M;
+use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{self, ClusterMember, MaterialPoint, Pose, Role};

@@ -13,10 +13,10 @@ mod gripper;
 mod member;
 mod pivot;
 mod spec;
-mod trajectory;
 
+pub use crate::trajectory::Keyframe;
 pub use agent::Tool;
-pub use spec::{Keyframe, ToolError, ToolSpec};
+pub use spec::{ToolError, ToolSpec};
 
 #[cfg(test)]
 mod tests;

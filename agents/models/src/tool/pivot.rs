@@ -4,8 +4,8 @@
 //! the tip. Never here: what leads the tip, contacts.
 //! Theory: docs/theory/coupling.md, eq. 9f to 9h.
 
-use super::drive::PointMotion;
 use super::{Keyframe, ToolError, ToolSpec};
+use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Side, SideTerm};
 use metachron_core::ToolState;

@@ -1,6 +1,7 @@
 //! Specification of a tool: script and grasp, the numbers a scene gives, and their checks.
 
-use glam::{DQuat, DVec3};
+use crate::trajectory::Keyframe;
+use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_geometry::ContactTraits;
 
@@ -32,19 +33,6 @@ pub struct ToolSpec {
     pub traits: ContactTraits,
     /// Offset of the tip's start from the first keyframe, metres: it approaches its path from there as after a user spring.
     pub starts_off_m: DVec3,
-}
-
-/// Pose of a tool at one time of its script.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Keyframe {
-    /// Seconds from the start of the script, ≥ 0.
-    pub at_s: f64,
-    /// The point between the jaws, metres.
-    pub tip_m: DVec3,
-    /// Rotation from the tool's axes (shaft along −z, so the jaws point along +z) to the world's.
-    pub rotation: DQuat,
-    /// Opening of the jaws: 0 shut … 1 wide open. Jaws that close past 0.2 grasp; above 0.3 they release.
-    pub jaw: f64,
 }
 
 /// Why a tool cannot be built.

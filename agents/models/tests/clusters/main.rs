@@ -2,6 +2,7 @@
 
 mod alike;
 mod bodies;
+mod compounds;
 mod errors;
 mod fine_skin;
 mod grasp;
@@ -11,6 +12,7 @@ mod hung;
 mod joints;
 mod large;
 mod links;
+mod locked;
 mod motors;
 mod organ;
 mod own_model;

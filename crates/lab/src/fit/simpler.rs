@@ -78,6 +78,9 @@ fn resting(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Opti
 /// The note on a body that nothing touches.
 fn flying(task: &Task<'_>, played: &Played, object: usize, room_m: f64) -> Option<Simpler> {
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
+    if spec.led.is_some() {
+        return None;
+    }
     let agents = &task.objects[object].agents;
     let paired = played.pairs.iter().any(|(a, b)| agents.contains(a) || agents.contains(b));
     let jointed = task.scene.joints.iter().any(|joint| agents.iter().any(|agent| joint.holds(*agent)));

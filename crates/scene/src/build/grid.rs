@@ -87,8 +87,10 @@ fn placed(spec: Spec, place: &CopyPlace) -> Spec {
     let by = place.offset_m;
     match spec {
         Spec::Rigid(mut body) => {
-            body.position += by;
+            body.shift(by);
             body.rotation = place.turned(body.rotation);
+            let keys = body.led.iter_mut().flat_map(|led| &mut led.keyframes);
+            keys.for_each(|key| key.rotation = place.turned(key.rotation));
             Spec::Rigid(body)
         }
         Spec::Tube(mut tube) => {

@@ -21,6 +21,7 @@ mod obj;
 mod object;
 mod rigid;
 mod scenery;
+mod sensor;
 mod soft;
 mod soft_mesh;
 mod stage;
@@ -39,6 +40,7 @@ pub(super) use coupling::couplings;
 pub(super) use group::groups;
 pub(super) use joint::joints;
 pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};
+pub(super) use sensor::{joint_names, sensors};
 pub(super) use stage::{camera, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.
@@ -49,6 +51,9 @@ const SPEED_MAX: f64 = 1e4;
 
 /// Greatest angle of a rotation to either side, degrees: past it double precision leaves less than a billionth of a turn.
 const ROTATION_MAX_DEG: f64 = 1e6;
+
+/// Most keyframes of a script.
+const KEYFRAMES_MAX: usize = 10_000;
 
 /// Sizes of solids, rigid or soft.
 const LENGTH: Allowed = allowed(1e-6..=1e4, "m");

@@ -15,7 +15,7 @@ use crate::source::Source;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
 use metachron_geometry::{ContactTraits, Obstacle};
-use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
 use metachron_models::soft::SoftBody;
@@ -388,6 +388,7 @@ fn check_buildable(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
             }
             Err(e) => Err(e.to_string()),
         },
+        Spec::Rigid(spec) if spec.led.is_some() => KinematicBody::new(&spec).map(drop).map_err(|e| e.to_string()),
         Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Soft(spec) => SoftBody::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Tool(spec) => Tool::new(spec).map(drop).map_err(|e| e.to_string()),

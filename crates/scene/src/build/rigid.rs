@@ -4,13 +4,13 @@ use super::mesh;
 use super::mesh::Mesh;
 use super::object::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
-use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
+use super::{FRICTION, KEYFRAMES_MAX, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{Point, RigidFile, Shape};
+use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid, generate_surface};
-use metachron_models::rigid::RigidSpec;
+use metachron_geometry::{COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, generate_surface};
+use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
 use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.
@@ -18,6 +18,8 @@ const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
 
 /// Triangles of generated surfaces.
 const TRIANGLES: Allowed = allowed(4.0..=1e5, "");
+
+const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
 
 const MASS: Allowed = allowed(1e-9..=1e9, "kg");
 
@@ -48,6 +50,14 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
             c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
         }
     }
+    if file.shape == Shape::Compound {
+        c.wrong(place, "shape", "is a compound, and the object is fixed", "expected fixed objects, one for each part");
+        return None;
+    }
+    let led = [("kinematic", file.kinematic == Some(true)), ("keyframe", file.keyframe.is_some())];
+    for (key, _) in led.into_iter().filter(|(_, given)| *given) {
+        c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
+    }
     let solid = solid(c, place, file, source)?;
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
@@ -70,8 +80,14 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     // a wrong shape gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
     let (position, rotation) = pose(c, place, file);
+    let led = led(c, place, file, rotation);
+    let start = led.as_ref().and_then(|led| led.keyframes.first());
+    let (position, rotation) = start.map_or((position, rotation), |key| (key.tip_m, key.rotation));
     let (restitution, friction) = surface(c, place, file);
+    let scale = c.optional(place, "gravity_scale", file.gravity_scale, &allowed(-1000.0..=1000.0, "")).unwrap_or(1.0);
     Some(RigidSpec {
+        restraint: restraint(c, place, file),
+        led,
         solid,
         position,
         rotation,
@@ -81,9 +97,67 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
         restitution,
         friction,
         traits: context.traits,
-        gravity: context.gravity,
+        gravity: context.gravity * scale,
         sleep: context.sleep,
     })
+}
+
+/// What slows an object down, and where it cannot move.
+fn restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Restraint {
+    let rate = allowed(0.0..=1e6, "1/s");
+    let mut damping = |key: &str, given: Option<f64>| c.optional(place, key, given, &rate).unwrap_or(0.0);
+    let locked = |axes: Option<&Vec<Axis>>| {
+        [Axis::X, Axis::Y, Axis::Z].map(|axis| axes.is_some_and(|locked| locked.contains(&axis)))
+    };
+    Restraint {
+        linear_damping_per_s: damping("linear_damping_per_s", file.linear_damping_per_s),
+        angular_damping_per_s: damping("angular_damping_per_s", file.angular_damping_per_s),
+        locked_translation: locked(file.lock_translation.as_ref()),
+        locked_rotation: locked(file.lock_rotation.as_ref()),
+    }
+}
+
+/// How a kinematic object is led; `None` for one that moves by what acts on it.
+fn led(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Option<Led> {
+    let is_led = file.kinematic == Some(true);
+    for (key, given) in [("keyframe", file.keyframe.is_some()), ("repeat", file.repeat.is_some())] {
+        if given && !is_led {
+            c.wrong(place, key, "is for objects that are led", "expected `kinematic = true`");
+        }
+    }
+    if !is_led {
+        return None;
+    }
+    let moved = [("velocity_m_s", file.velocity_m_s.is_some()), ("spin_rad_s", file.spin_rad_s.is_some())];
+    let placed = ("position_m", file.position_m.is_some() && file.keyframe.is_some());
+    for (key, _) in moved.into_iter().chain([placed]).filter(|(_, given)| *given) {
+        let expected = "expected `[[object.keyframe]]` to say where it is";
+        c.wrong(place, key, "has no effect on a kinematic object that keyframes or commands lead", expected);
+    }
+    Some(Led { keyframes: keyframes(c, place, file, rotation), repeat: file.repeat.unwrap_or(false) })
+}
+
+fn keyframes(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Vec<Keyframe> {
+    let files = file.keyframe.as_deref().unwrap_or_default();
+    if files.len() > KEYFRAMES_MAX {
+        let expected = format!("expected at most {KEYFRAMES_MAX}");
+        c.wrong(place, "keyframe", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    let mut keys: Vec<Keyframe> = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let (place, before) = (place.entry("keyframe", i), keys.last().copied());
+        let at_s = c.optional(&place, "at_s", file.at_s, &TIME).unwrap_or(0.0);
+        if let Some(before) = before.filter(|before| at_s <= before.at_s) {
+            let what = file.at_s.map_or("is missing".to_owned(), |at_s| format!("is {at_s}"));
+            c.wrong(&place, "at_s", what, format!("expected a time after the keyframe before, {} s", before.at_s));
+        }
+        let start = before.map_or(rotation, |before| before.rotation);
+        let turned = file.rotation_deg.map(|deg| c.point(&place, "rotation_deg", deg, ROTATION_MAX_DEG));
+        let tip_m = c.point(&place, "position_m", file.position_m, POSITION_MAX_M);
+        keys.push(Keyframe { at_s, tip_m, rotation: turned.map_or(start, self::rotation), jaw: 0.0 });
+    }
+    keys
 }
 
 pub(super) fn point_or_zero(
@@ -106,107 +180,183 @@ fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f6
     (restitution, c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.5))
 }
 
-/// The keys that each shape takes, of those that describe shapes.
-const fn keys_of(shape: Shape) -> &'static [&'static str] {
-    match shape {
-        Shape::Ball => &["radius_m"],
-        Shape::Box => &["half_extents_m"],
-        Shape::Capsule | Shape::Cylinder => &["radius_m", "half_height_m"],
-        Shape::Plane => &[],
-        Shape::Hull | Shape::Mesh => &["file", "generate", "seed", "triangles", "scale"],
-    }
+/// The keys of a shape, of an object or of a part of one.
+struct ShapeKeys<'a> {
+    shape: Shape,
+    radius_m: Option<f64>,
+    half_extents_m: Option<Point>,
+    half_height_m: Option<f64>,
+    file: Option<&'a str>,
+    generate: Option<GeneratorKind>,
+    seed: Option<u32>,
+    triangles: Option<u32>,
+    scale: Option<f64>,
+    has_parts: bool,
 }
 
-/// Reports keys that belong to another shape, and required keys that are missing; returns whether none is missing.
-fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
-    let takes = keys_of(file.shape);
-    let given = [
-        ("radius_m", file.radius_m.is_some()),
-        ("half_extents_m", file.half_extents_m.is_some()),
-        ("half_height_m", file.half_height_m.is_some()),
-        ("file", file.file.is_some()),
-        ("generate", file.generate.is_some()),
-        ("seed", file.seed.is_some()),
-        ("triangles", file.triangles.is_some()),
-        ("scale", file.scale.is_some()),
-    ];
-    let name = format!("{:?}", file.shape).to_lowercase();
-    let list = takes.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(" and ");
-    let expected = if list.is_empty() { format!("a {name} has no dimensions") } else { format!("a {name} has {list}") };
-    let mut complete = true;
-    for (key, is_given) in given {
-        let takes = takes.contains(&key);
-        if is_given && !takes {
-            c.wrong(place, key, format_args!("does not belong to a {name}"), expected.clone());
+/// The keys that a type with the keys of a shape has.
+macro_rules! shape_keys {
+    ($file:expr, $has_parts:expr) => {
+        ShapeKeys {
+            shape: $file.shape,
+            radius_m: $file.radius_m,
+            half_extents_m: $file.half_extents_m,
+            half_height_m: $file.half_height_m,
+            file: $file.file.as_deref(),
+            generate: $file.generate,
+            seed: $file.seed,
+            triangles: $file.triangles,
+            scale: $file.scale,
+            has_parts: $has_parts,
         }
-        // a surface has one of `file` and `generate`, which is checked where it is read
-        if takes && !is_given && !matches!(key, "file" | "generate" | "seed" | "triangles" | "scale") {
-            c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
-            complete = false;
+    };
+}
+
+impl ShapeKeys<'_> {
+    /// The keys that each shape takes, of those that describe shapes.
+    const fn takes(&self) -> &'static [&'static str] {
+        match self.shape {
+            Shape::Ball => &["radius_m"],
+            Shape::Box => &["half_extents_m"],
+            Shape::Capsule | Shape::Cylinder => &["radius_m", "half_height_m"],
+            Shape::Plane => &[],
+            Shape::Compound => &["part"],
+            Shape::Hull | Shape::Mesh => &["file", "generate", "seed", "triangles", "scale"],
         }
     }
-    complete
+
+    /// Reports keys that belong to another shape, and required keys that are missing; returns whether none is missing.
+    fn check(&self, c: &mut Checker<'_, '_>, place: &Place) -> bool {
+        let takes = self.takes();
+        let given = [
+            ("radius_m", self.radius_m.is_some()),
+            ("half_extents_m", self.half_extents_m.is_some()),
+            ("half_height_m", self.half_height_m.is_some()),
+            ("file", self.file.is_some()),
+            ("generate", self.generate.is_some()),
+            ("seed", self.seed.is_some()),
+            ("triangles", self.triangles.is_some()),
+            ("scale", self.scale.is_some()),
+            ("part", self.has_parts),
+        ];
+        let name = format!("{:?}", self.shape).to_lowercase();
+        let list = takes.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(" and ");
+        let expected =
+            if list.is_empty() { format!("a {name} has no dimensions") } else { format!("a {name} has {list}") };
+        let mut complete = true;
+        for (key, is_given) in given {
+            let takes = takes.contains(&key);
+            if is_given && !takes {
+                c.wrong(place, key, format_args!("does not belong to a {name}"), expected.clone());
+            }
+            // a surface has one of `file` and `generate`, which is checked where it is read
+            if takes && !is_given && !matches!(key, "file" | "generate" | "seed" | "triangles" | "scale") {
+                c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
+                complete = false;
+            }
+        }
+        complete
+    }
+
+    /// The solid; of a compound nothing, as that has others.
+    fn solid(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Solid> {
+        let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), &LENGTH);
+        Some(match self.shape {
+            Shape::Ball => Solid::Ball { radius_m: length("radius_m", self.radius_m) },
+            Shape::Capsule => Solid::Capsule {
+                radius_m: length("radius_m", self.radius_m),
+                half_height_m: length("half_height_m", self.half_height_m),
+            },
+            Shape::Cylinder => Solid::Cylinder {
+                radius_m: length("radius_m", self.radius_m),
+                half_height_m: length("half_height_m", self.half_height_m),
+            },
+            Shape::Box => {
+                let half = self.half_extents_m.unwrap_or_default();
+                let half = std::array::from_fn(|i| length(&format!("half_extents_m.{i}"), Some(half[i])));
+                Solid::Box { half_extents_m: DVec3::from_array(half) }
+            }
+            Shape::Plane => Solid::Plane,
+            Shape::Hull => {
+                let (points_m, _) = self.surface(c, place, source)?;
+                sound(c, place, Solid::Hull { points_m })?
+            }
+            Shape::Mesh => {
+                let (points_m, triangles) = self.surface(c, place, source)?;
+                sound(c, place, Solid::Mesh { points_m, triangles })?
+            }
+            Shape::Compound => return None,
+        })
+    }
+
+    fn surface(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Surface> {
+        let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
+        let wanted = c.optional(place, "triangles", self.triangles.map(f64::from), &TRIANGLES).unwrap_or(4000.0);
+        let name = match surface_source(c, place, self.file, self.generate)? {
+            SurfaceSource::File(name) => name,
+            SurfaceSource::Generated(kind) => {
+                let made = generate_surface(generator(kind), u64::from(self.seed.unwrap_or(0)), wanted as u32);
+                return Some((made.points.iter().map(|p| *p * scale).collect(), made.triangles.into()));
+            }
+        };
+        let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
+        match read {
+            Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
+            Err(why) => {
+                let expected = "expected a .glb, STL or OBJ file beside the scene";
+                c.wrong(place, "file", format_args!("cannot be used: {name}: {why}"), expected);
+                None
+            }
+        }
+    }
 }
 
 fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Solid> {
-    if !check_shape_keys(c, place, file) {
+    let keys = shape_keys!(file, file.part.is_some());
+    if !keys.check(c, place) {
         return None;
     }
-    let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), &LENGTH);
-    Some(match file.shape {
-        Shape::Ball => Solid::Ball { radius_m: length("radius_m", file.radius_m) },
-        Shape::Capsule => Solid::Capsule {
-            radius_m: length("radius_m", file.radius_m),
-            half_height_m: length("half_height_m", file.half_height_m),
-        },
-        Shape::Cylinder => Solid::Cylinder {
-            radius_m: length("radius_m", file.radius_m),
-            half_height_m: length("half_height_m", file.half_height_m),
-        },
-        Shape::Box => {
-            let half = file.half_extents_m.unwrap_or_default();
-            let half = std::array::from_fn(|i| length(&format!("half_extents_m.{i}"), Some(half[i])));
-            Solid::Box { half_extents_m: DVec3::from_array(half) }
-        }
-        Shape::Plane => Solid::Plane,
-        Shape::Hull => {
-            let (points_m, _) = triangles(c, place, file, source)?;
-            sound(c, place, Solid::Hull { points_m })?
-        }
-        Shape::Mesh => {
-            let (points_m, triangles) = triangles(c, place, file, source)?;
-            sound(c, place, Solid::Mesh { points_m, triangles })?
-        }
-    })
+    let Some(parts) = file.part.as_ref().filter(|_| file.shape == Shape::Compound) else {
+        return keys.solid(c, place, source);
+    };
+    if !(1..=COMPOUND_PARTS_MAX).contains(&parts.len()) {
+        let expected = format!("expected 1 … {COMPOUND_PARTS_MAX}");
+        c.wrong(place, "part", format_args!("has {} entries", parts.len()), expected);
+        return None;
+    }
+    let among = PartContext { source, density_kg_m3: file.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3) };
+    let parts = parts.iter().enumerate().map(|(i, file)| part(c, &place.entry("part", i), file, among));
+    Some(Solid::Compound { parts: parts.collect::<Option<Vec<_>>>()?.into() })
+}
+
+/// What the parts of a compound share.
+#[derive(Clone, Copy)]
+struct PartContext<'a> {
+    source: &'a Source,
+    /// Of parts that have none of their own.
+    density_kg_m3: f64,
+}
+
+/// A part of a compound, with its density against that of others.
+fn part(c: &mut Checker<'_, '_>, place: &Place, file: &PartFile, among: PartContext<'_>) -> Option<CompoundPart> {
+    if matches!(file.shape, Shape::Plane | Shape::Compound) {
+        c.wrong(place, "shape", "cannot be a part", "expected a solid that is neither a plane nor a compound");
+        return None;
+    }
+    let keys = shape_keys!(file, false);
+    if !keys.check(c, place) {
+        return None;
+    }
+    let PartContext { source, density_kg_m3: default } = among;
+    let solid = keys.solid(c, place, source)?;
+    let position_m = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
+    let rotation = rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG));
+    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(default) / default;
+    Some(CompoundPart { density, ..CompoundPart::new(solid, position_m, rotation) })
 }
 
 /// Points of a mesh, metres, and its triangles.
 type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
-
-fn triangles(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
-    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
-    let wanted = c.optional(place, "triangles", file.triangles.map(f64::from), &TRIANGLES).unwrap_or(4000.0);
-    let name = match surface_source(c, place, file.file.as_deref(), file.generate)? {
-        SurfaceSource::File(name) => name,
-        SurfaceSource::Generated(kind) => {
-            let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), wanted as u32);
-            return Some((made.points.iter().map(|p| *p * scale).collect(), made.triangles.into()));
-        }
-    };
-    let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
-    match read {
-        Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
-        Err(why) => {
-            c.wrong(
-                place,
-                "file",
-                format_args!("cannot be used: {name}: {why}"),
-                "expected a .glb, STL or OBJ file beside the scene",
-            );
-            None
-        }
-    }
-}
 
 /// The solid, if the physics can make a shape of it.
 fn sound(c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> {
@@ -221,16 +371,14 @@ fn sound(c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> 
 
 fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid) -> f64 {
     if let Some(mass) = file.mass_kg {
-        if file.density_kg_m3.is_some() {
+        if file.density_kg_m3.is_some() && file.part.is_none() {
             let expected = "expected `mass_kg` or `density_kg_m3`, not both";
             c.wrong(place, "density_kg_m3", "contradicts `mass_kg`", expected);
         }
         return c.number(place, "mass_kg", mass, &MASS);
     }
-    let density = c
-        .optional(place, "density_kg_m3", file.density_kg_m3, &allowed(1e-3..=1e6, "kg/m³"))
-        .unwrap_or(DENSITY_DEFAULT_KG_M3);
-    let volume = volume_m3(solid);
+    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(DENSITY_DEFAULT_KG_M3);
+    let volume = weighted_m3(solid);
     if is_flat(solid, volume) {
         let what =
             format!("encloses only {volume:.1e} m³, which gives no mass: its triangles are in one plane or not closed");
@@ -253,21 +401,17 @@ fn is_flat(solid: &Solid, volume: f64) -> bool {
     corners.is_none_or(|(low, high)| volume < 1e-7 * low.distance(high).powi(3))
 }
 
-/// The volume a solid encloses.
-fn volume_m3(solid: &Solid) -> f64 {
-    use std::f64::consts::PI;
+/// Its volume, of parts each times its relative density.
+fn weighted_m3(solid: &Solid) -> f64 {
     match solid {
-        Solid::Ball { radius_m } => 4.0 / 3.0 * PI * radius_m.powi(3),
-        Solid::Box { half_extents_m } => 8.0 * half_extents_m.element_product(),
-        Solid::Capsule { radius_m, half_height_m } => {
-            PI * radius_m * radius_m * (4.0 / 3.0 * radius_m + 2.0 * half_height_m)
-        }
-        Solid::Cylinder { radius_m, half_height_m } => PI * radius_m * radius_m * 2.0 * half_height_m,
-        Solid::Plane => 0.0,
-        Solid::Hull { .. } | Solid::Mesh { .. } => {
-            solid.to_shared_shape().map_or(0.0, |shape| f64::from(shape.mass_properties(1.0).mass()).abs())
-        }
+        Solid::Compound { parts } => parts.iter().map(|part| volume_m3(&part.solid) * part.density).sum(),
+        solid => volume_m3(solid),
     }
+}
+
+/// The volume a solid encloses; zero of one whose surface is none.
+fn volume_m3(solid: &Solid) -> f64 {
+    solid.volume_m3().unwrap_or(0.0)
 }
 
 #[cfg(test)]

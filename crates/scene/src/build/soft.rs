@@ -13,7 +13,7 @@ use metachron_core::{Anchor, Body};
 use metachron_geometry::{Aabb, Triangles, generate_surface, open_edge, subdivided};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
-use metachron_models::soft::{MaterialLaw, NodeSpacing, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
 use std::sync::Arc;
 
 pub(super) const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
@@ -21,8 +21,6 @@ pub(super) const POISSON: Allowed = allowed(0.0..=0.499, "");
 const POISSON_DEFAULT: f64 = 0.4;
 pub(super) const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
 const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
-/// Most vertices of the lattice whose skin becomes that of a box or ball with an ε.
-const SKIN_LATTICE_MAX: u64 = 1_000_000;
 /// Most triangles into which a coarse surface is divided, to be as fine as its finest cage; a cage of more has too many vertices.
 const SKIN_TRIANGLES_MAX: usize = 200_000;
 /// The diagonal of a cell, in its edges: no edge of a surface from a file is longer.
@@ -225,21 +223,12 @@ fn solid_shape(
         }
         SoftShape::Ball { radius_m, segments: cells[0] }
     };
-    match eps_m {
-        Some(range) if lattice.vertices() <= SKIN_LATTICE_MAX => {
-            let mut surface = lattice.skin()?;
-            if let SoftShape::Box { size_m, .. } = lattice {
-                // about its middle, as a mesh is about its origin
-                surface.points.iter_mut().for_each(|point| *point -= 0.5 * size_m);
-            }
-            Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range.0, range_m: range })
-        }
-        Some(_) => {
-            c.wrong(place, "eps_m", "is too fine for its size", "expected a larger finest ε");
-            None
-        }
-        None => Some(lattice),
+    let Some(range) = eps_m else { return Some(lattice) };
+    let embedded = lattice.embedded(range);
+    if embedded.is_none() {
+        c.wrong(place, "eps_m", "is too fine for its size", "expected a larger finest ε");
     }
+    embedded
 }
 
 /// The closed surface of a file or a generator, metres; `None` where there is none, which is reported.
@@ -352,19 +341,12 @@ fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option
     if matches!(&spec.shape, SoftShape::Rope { path_m, .. } if path_m.windows(2).all(|pair| pair[0] == pair[1])) {
         return BuiltSoft { spec, eps_m: None };
     }
-    let most = |shape: &SoftShape| match *shape {
-        SoftShape::Sheet { segments: [x, y], .. } => f64::from(x.max(y)),
-        SoftShape::Rope { segments, .. } => f64::from(segments),
-        _ => 0.0,
-    };
-    let fits = |finest: &SoftShape| finest.vertices() <= VERTICES_MAX && SEGMENTS.contains(most(finest));
-    let Some(shape) = spec.shape.divided_by(range_m.0).filter(fits) else {
+    let Some(spec) = spec.clone().spaced(range_m) else {
         let expected = format!("expected a larger finest ε: at most {VERTICES_MAX} vertices, 2047 cells along an axis");
         c.wrong(place, "eps_m", "is too fine for its size", expected);
         return BuiltSoft { spec, eps_m };
     };
-    let nodes = Some(NodeSpacing { eps_m: range_m.0, range_m });
-    BuiltSoft { spec: SoftSpec { shape, nodes, ..spec }, eps_m }
+    BuiltSoft { spec, eps_m }
 }
 
 fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {

@@ -3,7 +3,7 @@
 use super::common::rounded;
 use super::object::{ModelContext, NamedObject, Names};
 use super::rigid::rotation;
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
+use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{KeyframeFile, Point, ToolFile};
 use glam::{DQuat, DVec3};
@@ -11,8 +11,6 @@ use metachron_core::AgentId;
 use metachron_models::tool::{Keyframe, ToolSpec};
 use std::ops::RangeInclusive;
 
-/// Most keyframes of a script.
-const KEYFRAMES_MAX: usize = 10_000;
 /// Default reach of the jaws, metres.
 const REACH_DEFAULT_M: f64 = 0.02;
 /// Default limit of the force of a tool's drive, newtons: an arm holds against it without effort.

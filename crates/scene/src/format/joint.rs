@@ -8,6 +8,9 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
+    /// Its name, by which programs drive it and sensors read it: unique among those of joints. Default: none.
+    #[schemars(length(min = 1, max = 64))]
+    pub name: Option<String>,
     /// Motion that it leaves free. `fixed`: none. `revolute`: rotation about `axis`. `spherical`: any rotation. `prismatic`: sliding
     /// along `axis`. `spring`: all, against a spring. `rope`: all, up to a distance of `length_m`.
     pub kind: JointKind,

@@ -11,6 +11,7 @@ mod joint;
 mod rigid;
 mod scene;
 mod scenery;
+mod sensor;
 mod soft;
 mod synthetic;
 mod tool;
@@ -22,12 +23,13 @@ pub use common::{COMMON_KEYS, CommonFile, HoldKind};
 pub use contact::{CombineRuleName, ContactFile};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use joint::{JointFile, JointKind, MotorFile};
-pub use rigid::{RigidFile, Shape};
+pub use rigid::{Axis, PartFile, PoseKeyFile, RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
     TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
+pub use sensor::{SensorFile, SensorFileKind};
 pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tool::{KeyframeFile, ToolFile};

@@ -10,7 +10,7 @@ use serde::Deserialize;
 pub struct RigidFile {
     /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
     /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`
-    /// or `generate`.
+    /// or `generate`. `compound`: several solids as one, one `[[object.part]]` each.
     pub shape: Shape,
     /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
     pub radius_m: Option<f64>,
@@ -29,6 +29,9 @@ pub struct RigidFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
+    /// The solids of a `compound`, 1 … 16: each has a shape with its keys, and may have `position_m`, `rotation_deg` and `density_kg_m3`.
+    #[schemars(length(min = 1, max = 16))]
+    pub part: Option<Vec<PartFile>>,
     /// Position of the origin of the shape's axes, metres. Default: the world's origin.
     pub position_m: Option<Point>,
     /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
@@ -47,8 +50,82 @@ pub struct RigidFile {
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub friction: Option<f64>,
+    /// How many times as strong gravity is for it, -1000 … 1000. Default 1.
+    pub gravity_scale: Option<f64>,
+    /// Rate by which its velocity decays, 1/s, 0 … 1e6. Default 0.
+    pub linear_damping_per_s: Option<f64>,
+    /// Rate by which its angular momentum decays, 1/s, 0 … 1e6. Default 0.
+    pub angular_damping_per_s: Option<f64>,
+    /// Axes of the world along which it does not move. Default none.
+    pub lock_translation: Option<Vec<Axis>>,
+    /// Axes of the world about which it does not turn. Default none.
+    pub lock_rotation: Option<Vec<Axis>>,
     /// Whether it never moves. Default false; a plane is always fixed.
     pub fixed: Option<bool>,
+    /// Whether it moves as keyframes and commands lead it, and gives way to nothing; mass and density have no effect then. Default false.
+    pub kinematic: Option<bool>,
+    /// Poses of a kinematic object, at most 10000; it starts in the first. Default: it stays at `position_m` until a command leads it.
+    #[schemars(length(max = 10_000))]
+    pub keyframe: Option<Vec<PoseKeyFile>>,
+    /// Whether the motion along `keyframe` starts again after the last, to which it returns from there in as long as its last leg took. Default
+    /// false.
+    pub repeat: Option<bool>,
+}
+
+/// An axis of the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third: up.
+    Z,
+}
+
+/// A solid of a `compound`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartFile {
+    /// Its shape; no plane and no compound.
+    pub shape: Shape,
+    /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
+    pub radius_m: Option<f64>,
+    /// Half the edges of a box, metres, each 1e-6 … 1e4.
+    pub half_extents_m: Option<Point>,
+    /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
+    pub half_height_m: Option<f64>,
+    /// A .glb, STL or OBJ file, its path relative to the scene file.
+    pub file: Option<String>,
+    /// A generated surface, about a metre large; not with `file`.
+    pub generate: Option<GeneratorKind>,
+    /// Seed of a generated surface. Default 0.
+    pub seed: Option<u32>,
+    /// Triangles of a generated surface, 4 … 100000. Default 4000.
+    #[schemars(range(min = 4, max = 100_000))]
+    pub triangles: Option<u32>,
+    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
+    pub scale: Option<f64>,
+    /// Position of the origin of its axes in those of the object, metres. Default: their origin.
+    pub position_m: Option<Point>,
+    /// Rotation by angles about the object's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+    /// Density, kg/m³, 1e-3 … 1e6; where the object has a mass, the densities of its parts only share it. Default: that of the object.
+    pub density_kg_m3: Option<f64>,
+}
+
+/// Pose of a kinematic object at one time.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PoseKeyFile {
+    /// Seconds from the start, 0 … 1e6, later than the keyframe before. Default 0 for the first.
+    pub at_s: Option<f64>,
+    /// Position of the origin of the shape's axes, metres.
+    pub position_m: Point,
+    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default: that of the keyframe before; for the first, the
+    /// object's `rotation_deg`.
+    pub rotation_deg: Option<Point>,
 }
 
 /// The shape of a rigid body.
@@ -69,4 +146,6 @@ pub enum Shape {
     Hull,
     /// A file's triangles.
     Mesh,
+    /// Several solids as one.
+    Compound,
 }

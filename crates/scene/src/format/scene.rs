@@ -1,6 +1,6 @@
 //! The tables of a scene other than its objects.
 
-use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile};
+use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile, SensorFile};
 use metachron_core::gains;
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
@@ -40,6 +40,10 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub joint: Vec<JointFile>,
+    /// What programs read by name, and the report has at the end; at most 1000.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub sensor: Vec<SensorFile>,
     /// Pairs of objects that interact otherwise than by the default contact; at most 10000.
     #[serde(default)]
     #[schemars(length(max = 10_000))]

@@ -56,6 +56,11 @@ pub struct Report {
     /// What touched sensors, and how often; left out where nothing did.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<SensorReport>,
+    /// What the scene's sensors read at the end; left out where it has none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub readings: Vec<ReadingReport>,
+    /// Agents that failed and stepped no more.
+    pub parked: u32,
     /// The contact clusters of the last states.
     pub clusters: Vec<ClusterRow>,
     /// Agents that started inside each other or fixed solids.
@@ -321,6 +326,19 @@ pub struct BudgetReport {
     pub choices: ChoiceSummary,
 }
 
+/// What a sensor read at the end.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ReadingReport {
+    /// Its name.
+    pub name: String,
+    /// Its kind, as scene files write it.
+    pub kind: String,
+    /// Time of the state that it is of, seconds.
+    pub at_s: f64,
+    /// The numbers, in the order that its kind gives; none where what it is on has gone.
+    pub values: Vec<f64>,
+}
+
 /// The motion of a probe.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ProbeReport {
@@ -363,6 +381,8 @@ impl Report {
             couplings: vec![CouplingReport::default()],
             events: vec![EventReport::default()],
             sensors: vec![SensorReport::default()],
+            readings: vec![ReadingReport { values: vec![0.0], ..ReadingReport::default() }],
+            parked: 0,
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],
             moved: vec![MovedReport::default()],
@@ -450,6 +470,11 @@ mod tests {
         "/sensors/0/begins",
         "/sensors/0/ends",
         "/sensors/0/changed_s",
+        "/readings/0/name",
+        "/readings/0/kind",
+        "/readings/0/at_s",
+        "/readings/0/values/0",
+        "/parked",
         "/overlaps/0/depth_m",
         "/moved/0/by_m",
         "/oracle/dt_ms",

@@ -1,4 +1,4 @@
-//! The path through the keyframes: a smooth curve through all of them.
+//! The path through the keyframes of what is led: a smooth curve through all of them, and the way back to it.
 //!
 //! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: user springs, grasping jaws.
 //!
@@ -6,13 +6,56 @@
 //! the range of both, so a tool never dips below the place it was sent to. Rotation is a slerp along 3u² − 2u³, at rest
 //! in every keyframe. A script that repeats is one closed curve.
 
-use super::Keyframe;
 use glam::{DQuat, DVec3, DVec4};
 use metachron_core::{Archive, ArchiveError};
 
+/// Rate at which what was led elsewhere returns to its script, 1/s: nine tenths of the distance in a second.
+const RETURN_RATE_PER_S: f64 = 4.0;
+/// Rotations whose dot product is within this of one are the same.
+const SAME_TURN: f64 = 1e-14;
+
+/// Pose of what is led at one time of its script.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keyframe {
+    /// Seconds from the start of the script, ≥ 0.
+    pub at_s: f64,
+    /// The point between a tool's jaws, or the origin of a kinematic body's axes, metres.
+    pub tip_m: DVec3,
+    /// Rotation from its axes (a tool's shaft along −z, so the jaws point along +z) to the world's.
+    pub rotation: DQuat,
+    /// Opening of a tool's jaws: 0 shut … 1 wide open. Jaws that close past 0.2 grasp; above 0.3 they release.
+    pub jaw: f64,
+}
+
+/// A moving point.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct PointMotion {
+    /// Metres.
+    pub position: DVec3,
+    /// Metres per second.
+    pub velocity: DVec3,
+}
+
+impl PointMotion {
+    /// How it moves as seen from `other`.
+    pub(crate) fn relative_to(self, other: Self) -> Self {
+        Self { position: self.position - other.position, velocity: self.velocity - other.velocity }
+    }
+
+    /// This deviation after `t` seconds of critical damping: exact for any step.
+    pub(crate) fn decayed(self, damping_per_s: f64, t: f64) -> Self {
+        let left = libm::exp(-damping_per_s * t);
+        let push = self.velocity + self.position * damping_per_s;
+        Self {
+            position: (self.position + push * t) * left,
+            velocity: (self.velocity - push * (damping_per_s * t)) * left,
+        }
+    }
+}
+
 /// The pose that the script commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pose {
+pub(crate) struct Pose {
     pub tip: DVec3,
     pub velocity: DVec3,
     pub rotation: DQuat,
@@ -31,21 +74,37 @@ struct SplineKey {
 
 /// A script ready to be read.
 #[derive(Debug, Clone)]
-pub(super) struct Script {
+pub(crate) struct Script {
     keys: Vec<SplineKey>,
     repeat: bool,
     /// Time at which the script starts, seconds.
     begin_s: f64,
 }
 
+impl Pose {
+    /// The pose `dt` seconds later of what is here, while its script goes from one pose to another: the offset from it decays.
+    pub(crate) fn returning(&self, from: &Self, to: &Self, dt: f64) -> Self {
+        let motion = |pose: &Self| PointMotion { position: pose.tip, velocity: pose.velocity };
+        let off = motion(self).relative_to(motion(from)).decayed(RETURN_RATE_PER_S, dt);
+        let turned_off = self.rotation * from.rotation.conjugate();
+        let rotation = if turned_off.w.abs() >= 1.0 - SAME_TURN {
+            to.rotation
+        } else {
+            let left = libm::exp(-RETURN_RATE_PER_S * dt);
+            (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
+        };
+        Self { tip: to.tip + off.position, velocity: to.velocity + off.velocity, rotation, jaw: to.jaw }
+    }
+}
+
 impl Script {
     /// Writes or reads when it starts; its keys never change.
-    pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.value(&mut self.begin_s)
     }
 
     /// A curve through `keyframes`: at least one, times rising.
-    pub(super) fn new(keyframes: &[Keyframe], repeat: bool) -> Self {
+    pub(crate) fn new(keyframes: &[Keyframe], repeat: bool) -> Self {
         let mut keys: Vec<SplineKey> = keyframes
             .iter()
             .map(|key| SplineKey {
@@ -64,12 +123,12 @@ impl Script {
     }
 
     /// Shifts the start of the script by so many seconds, later if positive.
-    pub(super) fn begin_later(&mut self, by_s: f64) {
+    pub(crate) fn begin_later(&mut self, by_s: f64) {
         self.begin_s += by_s;
     }
 
     /// The pose at `time_s`: before its first keyframe the script waits in it, after its last it waits in that.
-    pub(super) fn at(&self, time_s: f64) -> Pose {
+    pub(crate) fn at(&self, time_s: f64) -> Pose {
         let time_s = time_s - self.begin_s;
         let (first, last) = (self.keys[0], self.keys[self.keys.len() - 1]);
         let t = if self.repeat && time_s > first.at_s {
@@ -86,7 +145,7 @@ impl Script {
     }
 
     /// Whether the script no longer moves from `time_s` on.
-    pub(super) fn is_over(&self, time_s: f64) -> bool {
+    pub(crate) fn is_over(&self, time_s: f64) -> bool {
         !self.repeat && time_s - self.begin_s >= self.keys[self.keys.len() - 1].at_s
     }
 }

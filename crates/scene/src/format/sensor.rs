@@ -1,0 +1,45 @@
+//! `[[sensor]]`: what programs read by name, and the report has at the end.
+
+use super::Point;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A sensor.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorFile {
+    /// Its name: unique among those of sensors, not empty.
+    #[schemars(length(min = 1, max = 64))]
+    pub name: String,
+    /// Its reading. `joint-position`: how far `b` of a joint has moved from `a`, rad within ±π or metres. `joint-velocity`: rad/s or m/s.
+    /// `joint-effort`: what motor and stops give `b`, N·m or N. `contact-force`: what touches an object gives it, world axes, N. `imu`: of a
+    /// rigid object its acceleration less that of gravity, m/s², and its spin, rad/s, in the axes of its shape. `pose`: position of a point of
+    /// a rigid object, metres, and the rotation of its axes as a quaternion x, y, z, w.
+    pub kind: SensorFileKind,
+    /// Name of a joint, for kinds of joints.
+    pub joint: Option<String>,
+    /// Name of an object that moves, for all other kinds.
+    pub object: Option<String>,
+    /// Of a `contact-force` the object, fixed or not, whose contacts count. Default: all.
+    pub with: Option<String>,
+    /// Of a `pose` the point, in the axes of the object's shape, metres. Default: their origin.
+    pub at_m: Option<Point>,
+}
+
+/// What a sensor reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensorFileKind {
+    /// How far a joint has moved.
+    JointPosition,
+    /// How fast it moves.
+    JointVelocity,
+    /// What drives it.
+    JointEffort,
+    /// What touches an object gives it.
+    ContactForce,
+    /// Acceleration and spin in an object's own axes.
+    Imu,
+    /// Position and rotation of a point.
+    Pose,
+}

@@ -1,0 +1,164 @@
+//! Rigid bodies of a scene built in code.
+//!
+//! In: measures. Out: a [`RigidSpec`]. Never here: the scene.
+
+use super::{RATE_DEFAULT_HZ, SURFACE};
+use glam::{DQuat, DVec3};
+use metachron_geometry::{CompoundPart, ContactTraits, Solid};
+use metachron_models::rigid::{Keyframe, RigidSpec};
+
+/// A rigid body before it is added.
+#[derive(Debug, Clone)]
+pub struct Rigid {
+    pub(super) spec: RigidSpec,
+    pub(super) gravity_scale: f64,
+    pub(super) rate_hz: f64,
+}
+
+impl Rigid {
+    /// A body of this shape: 1 kg at the origin, at rest.
+    #[must_use]
+    pub fn new(solid: Solid) -> Self {
+        let (friction, restitution) = SURFACE;
+        let spec = RigidSpec { friction, restitution, sleep: true, ..RigidSpec::free(solid, DVec3::ZERO, 1.0) };
+        Self { spec, gravity_scale: 1.0, rate_hz: RATE_DEFAULT_HZ }
+    }
+
+    /// A ball of this radius, metres.
+    #[must_use]
+    pub fn ball(radius_m: f64) -> Self {
+        Self::new(Solid::Ball { radius_m })
+    }
+
+    /// Several solids as one body: each with where its axes are in those of the body, metres, and turned. All are equally dense; see
+    /// [`CompoundPart::density`].
+    #[must_use]
+    pub fn compound(parts: impl IntoIterator<Item = CompoundPart>) -> Self {
+        Self::new(Solid::Compound { parts: parts.into_iter().collect() })
+    }
+
+    /// A capsule along z of this radius and this half length of its straight part, metres.
+    #[must_use]
+    pub fn capsule(radius_m: f64, half_height_m: f64) -> Self {
+        Self::new(Solid::Capsule { radius_m, half_height_m })
+    }
+
+    /// A box with these half edges, metres.
+    #[must_use]
+    pub fn cuboid(half_extents_m: [f64; 3]) -> Self {
+        Self::new(Solid::Box { half_extents_m: half_extents_m.into() })
+    }
+
+    /// Its mass, kilograms, 1e-9 … 1e9.
+    #[must_use]
+    pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
+        self.spec.mass_kg = mass_kg;
+        self
+    }
+
+    /// Position of its shape's origin, metres.
+    #[must_use]
+    pub fn at(mut self, position_m: [f64; 3]) -> Self {
+        self.spec.position = position_m.into();
+        self
+    }
+
+    /// Rotation from its shape's axes to the world's.
+    #[must_use]
+    pub const fn turned(mut self, rotation: DQuat) -> Self {
+        self.spec.rotation = rotation;
+        self
+    }
+
+    /// Velocity at the start, m/s.
+    #[must_use]
+    pub fn velocity_m_s(mut self, velocity: [f64; 3]) -> Self {
+        self.spec.velocity = velocity.into();
+        self
+    }
+
+    /// Coefficient of restitution, 0 … 1.
+    #[must_use]
+    pub const fn restitution(mut self, restitution: f64) -> Self {
+        self.spec.restitution = restitution;
+        self
+    }
+
+    /// Coulomb friction coefficient, ≥ 0.
+    #[must_use]
+    pub const fn friction(mut self, friction: f64) -> Self {
+        self.spec.friction = friction;
+        self
+    }
+
+    /// How many times as strong gravity is for it; below zero it rises.
+    #[must_use]
+    pub const fn gravity_scale(mut self, gravity_scale: f64) -> Self {
+        self.gravity_scale = gravity_scale;
+        self
+    }
+
+    /// By which rates its velocity and its angular momentum decay, 1/s, 0 … 1e6.
+    #[must_use]
+    pub const fn damping_per_s(mut self, linear_per_s: f64, angular_per_s: f64) -> Self {
+        let restraint = &mut self.spec.restraint;
+        (restraint.linear_damping_per_s, restraint.angular_damping_per_s) = (linear_per_s, angular_per_s);
+        self
+    }
+
+    /// Along which axes of the world it does not move: x, y, z.
+    #[must_use]
+    pub const fn lock_translation(mut self, axes: [bool; 3]) -> Self {
+        self.spec.restraint.locked_translation = axes;
+        self
+    }
+
+    /// About which axes of the world it does not turn: x, y, z.
+    #[must_use]
+    pub const fn lock_rotation(mut self, axes: [bool; 3]) -> Self {
+        self.spec.restraint.locked_rotation = axes;
+        self
+    }
+
+    /// What it says about its contacts: what it collides with, rules of pairs, whether it only senses.
+    #[must_use]
+    pub const fn contact(mut self, traits: ContactTraits) -> Self {
+        self.spec.traits = traits;
+        self
+    }
+
+    /// Kinematic: it moves as [`metachron_runtime::Command::pose`] and its keyframes lead it, and gives way to nothing. What touches it pushes
+    /// back, which [`metachron_core::Snapshot::contact_wrench`] has. Its mass and velocity have no meaning.
+    #[must_use]
+    pub fn kinematic(mut self) -> Self {
+        self.spec.led.get_or_insert_default();
+        self
+    }
+
+    /// Kinematic, with one more keyframe: at `at_s` seconds of its time, later than the one before, the origin of its shape is at `position_m`,
+    /// metres, turned by `rotation`. It starts in the first.
+    #[must_use]
+    pub fn keyframe(mut self, at_s: f64, position_m: [f64; 3], rotation: DQuat) -> Self {
+        let led = self.spec.led.get_or_insert_default();
+        let key = Keyframe { at_s, tip_m: position_m.into(), rotation, jaw: 0.0 };
+        if led.keyframes.is_empty() {
+            (self.spec.position, self.spec.rotation) = (key.tip_m, rotation);
+        }
+        led.keyframes.push(key);
+        self
+    }
+
+    /// Whether its keyframes start again after the last.
+    #[must_use]
+    pub fn repeating(mut self) -> Self {
+        self.spec.led.get_or_insert_default().repeat = true;
+        self
+    }
+
+    /// Steps a simulated second, 1 … 100000.
+    #[must_use]
+    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
+        self.rate_hz = rate_hz;
+        self
+    }
+}

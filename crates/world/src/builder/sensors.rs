@@ -1,0 +1,80 @@
+//! Sensors of a scene built in code.
+//!
+//! In: names. Out: [`Sensor`]s of the scene. Never here: what sensors read.
+
+use super::SceneBuildError;
+use crate::scene::{Member, Spec};
+use crate::sensors::{Sensor, SensorKind};
+use metachron_core::ContactPartner;
+use metachron_geometry::Obstacle;
+
+/// A sensor by the names of what it is on.
+#[derive(Debug, Clone)]
+pub(super) struct Mounted {
+    pub name: String,
+    pub on: SensorOn,
+}
+
+/// What a sensor is on, by name.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum SensorOn {
+    /// How far a hinge or a slide has moved: [`SensorKind::JointPosition`].
+    JointPosition(String),
+    /// How fast: [`SensorKind::JointVelocity`].
+    JointVelocity(String),
+    /// By how much it is driven: [`SensorKind::JointEffort`].
+    JointEffort(String),
+    /// What touches an object: [`SensorKind::ContactForce`].
+    ContactForce(String),
+    /// What one object or fixed solid, the second, gives the first.
+    ContactBetween(String, String),
+    /// An accelerometer and a gyroscope in a rigid body: [`SensorKind::Imu`].
+    Imu(String),
+    /// A point of a rigid body, metres in the axes of its shape: [`SensorKind::Pose`].
+    Pose(String, [f64; 3]),
+}
+
+/// What sensors may be on.
+pub(super) struct Mounts<'a> {
+    pub agents: &'a [Member],
+    pub fixed: &'a [Obstacle],
+    pub joints: &'a [String],
+}
+
+impl Mounts<'_> {
+    pub fn sensor(&self, mounted: Mounted) -> Result<Sensor, SceneBuildError> {
+        let Mounted { name, on } = mounted;
+        let nothing =
+            |on: &String, what: &'static str| SceneBuildError::NoMount { sensor: name.clone(), on: on.clone(), what };
+        let joint = |on: &String| {
+            let at = self.joints.iter().position(|joint| joint == on && !joint.is_empty());
+            at.map(|at| at as u32).ok_or_else(|| nothing(on, "joint"))
+        };
+        let object = |on: &String| self.agents.iter().find(|member| member.name == *on);
+        let moving = |on: &String| object(on).map(|member| member.id).ok_or_else(|| nothing(on, "object that moves"));
+        let rigid = |on: &String| match object(on).map(|member| (member.id, &member.spec)) {
+            Some((id, Spec::Rigid(spec))) => Ok((id, spec)),
+            _ => Err(nothing(on, "rigid body")),
+        };
+        let partner = |on: &String| match self.fixed.iter().position(|solid| solid.name == *on) {
+            Some(at) => Ok(ContactPartner::Static(at as u32)),
+            None => moving(on).map(ContactPartner::Agent),
+        };
+        let kind = match &on {
+            SensorOn::JointPosition(on) => SensorKind::JointPosition(joint(on)?),
+            SensorOn::JointVelocity(on) => SensorKind::JointVelocity(joint(on)?),
+            SensorOn::JointEffort(on) => SensorKind::JointEffort(joint(on)?),
+            SensorOn::ContactForce(on) => SensorKind::ContactForce { object: moving(on)?, with: None },
+            SensorOn::ContactBetween(on, with) => {
+                SensorKind::ContactForce { object: moving(on)?, with: Some(partner(with)?) }
+            }
+            SensorOn::Imu(on) => {
+                let (object, spec) = rigid(on)?;
+                SensorKind::Imu { object, gravity_m_s2: spec.gravity }
+            }
+            SensorOn::Pose(on, at_m) => SensorKind::Pose { object: rigid(on)?.0, at_m: (*at_m).into() },
+        };
+        Ok(Sensor { name, kind })
+    }
+}

@@ -1,0 +1,260 @@
+//! Sensors: what programs read of a world by name, and joints by name.
+//!
+//! In: the newest states. Out: numbers, with the time that they are of. Never here: noise, delays, stored readings.
+
+use super::object::Object;
+use super::world::{World, WorldError};
+use glam::{DQuat, DVec3};
+use metachron_contact::joint::{Joint, JointKind, Motor};
+use metachron_contact::stepper::Pose;
+use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime};
+use metachron_geometry::ShapeKind;
+use metachron_runtime::Command;
+
+/// A sensor of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Its name, unique among those of sensors.
+    pub name: String,
+    /// What it reads.
+    pub kind: SensorKind,
+}
+
+/// What a sensor reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum SensorKind {
+    /// How far the second body of a joint has moved from the first, from its zero: rad of a hinge within −π … π, metres of a slide, the
+    /// distance of the anchors of a spring or rope. One number.
+    JointPosition(u32),
+    /// How fast, rad/s or m/s. One number.
+    JointVelocity(u32),
+    /// What its motor and its stops give the second body together, N·m of a hinge, N of a slide: the mean of the last step. One number.
+    JointEffort(u32),
+    /// What touches an object gives it, world axes, N: the mean of the last step. Three numbers.
+    ContactForce {
+        /// The object.
+        object: AgentId,
+        /// Whose contacts count; `None` for all.
+        with: Option<ContactPartner>,
+    },
+    /// What an accelerometer in a rigid body's centre of mass reads, its acceleration less that of gravity, m/s², in the mean of the last step,
+    /// then a gyroscope, rad/s, both in the axes of its shape. Six numbers.
+    Imu {
+        /// The body.
+        object: AgentId,
+        /// The gravity on it, m/s².
+        gravity_m_s2: DVec3,
+    },
+    /// Where a point of a rigid body is, metres, and the rotation of its shape's axes as a unit quaternion x, y, z, w. Seven numbers.
+    Pose {
+        /// The body.
+        object: AgentId,
+        /// The point, metres in the axes of its shape.
+        at_m: DVec3,
+    },
+}
+
+impl SensorKind {
+    /// What it is called in scene files and reports.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::JointPosition(_) => "joint-position",
+            Self::JointVelocity(_) => "joint-velocity",
+            Self::JointEffort(_) => "joint-effort",
+            Self::ContactForce { .. } => "contact-force",
+            Self::Imu { .. } => "imu",
+            Self::Pose { .. } => "pose",
+        }
+    }
+}
+
+/// What a sensor read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// When: the time of the state that it is of.
+    pub time: SimTime,
+    /// The numbers, as [`SensorKind`] lists them.
+    pub values: Vec<f64>,
+}
+
+/// A joint of a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct JointRef {
+    body: Object,
+    number: u32,
+}
+
+impl JointRef {
+    /// The object that takes commands for it: its first body.
+    #[must_use]
+    pub const fn body(self) -> Object {
+        self.body
+    }
+
+    /// Its number in the scene.
+    #[must_use]
+    pub const fn number(self) -> u32 {
+        self.number
+    }
+
+    /// The command that lets a motor drive it; for [`JointRef::body`].
+    #[must_use]
+    pub const fn motor(self, motor: Motor) -> Command {
+        Command::motor(self.number, motor)
+    }
+}
+
+/// Joints and sensors of a world, by name.
+#[derive(Debug, Default)]
+pub(super) struct Instruments {
+    pub joint_names: Vec<String>,
+    pub joints: std::sync::Arc<[Joint]>,
+    pub sensors: Vec<Sensor>,
+}
+
+/// A rigid body as joints see it.
+struct Placed {
+    pose: Pose,
+    velocity: DVec3,
+    spin: DVec3,
+    time: SimTime,
+}
+
+impl World {
+    /// The joint of that name.
+    ///
+    /// # Errors
+    /// [`WorldError::NoJoint`].
+    pub fn joint(&self, name: &str) -> Result<JointRef, WorldError> {
+        let Instruments { joint_names, joints, .. } = self.instruments();
+        let at = joint_names.iter().position(|joint| joint == name && !name.is_empty());
+        let found = at.and_then(|at| Some((at as u32, joints.get(at)?.a)));
+        let Some((number, a)) = found else {
+            let known = joint_names.iter().filter(|name| !name.is_empty()).take(20).cloned().collect::<Vec<_>>();
+            return Err(WorldError::NoJoint { name: name.to_owned(), known: known.join(", ") });
+        };
+        Ok(JointRef { body: self.object_of(a)?, number })
+    }
+
+    /// The sensors of the scene.
+    #[must_use]
+    pub fn sensors(&self) -> &[Sensor] {
+        &self.instruments().sensors
+    }
+
+    /// What a sensor reads now, of the newest states.
+    ///
+    /// # Errors
+    /// [`WorldError::NoSensor`], and [`WorldError::Gone`] where what it is on has been removed.
+    pub fn sensor(&self, name: &str) -> Result<Reading, WorldError> {
+        let sensors = self.sensors();
+        let Some(sensor) = sensors.iter().find(|sensor| sensor.name == name) else {
+            let known = sensors.iter().take(20).map(|sensor| sensor.name.as_str()).collect::<Vec<_>>().join(", ");
+            return Err(WorldError::NoSensor { name: name.to_owned(), known });
+        };
+        self.read(&sensor.kind)
+    }
+
+    /// What a sensor of this kind reads now.
+    ///
+    /// # Errors
+    /// [`WorldError::NoAgent`] and [`WorldError::Gone`].
+    pub fn read(&self, kind: &SensorKind) -> Result<Reading, WorldError> {
+        match *kind {
+            SensorKind::JointPosition(number) => {
+                self.read_joint(number, |joint, [a, b]| joint.travel(&a.pose, &b.pose))
+            }
+            SensorKind::JointVelocity(number) => self.read_joint(number, rate),
+            SensorKind::JointEffort(number) => {
+                let state = self.latest(self.object_of(self.joint_at(number)?.a)?)?;
+                let effort = state.efforts.iter().find(|effort| effort.joint == number);
+                Ok(Reading { time: state.time, values: vec![effort.map_or(0.0, |effort| effort.effort)] })
+            }
+            SensorKind::ContactForce { object, with } => {
+                let object = self.object_of(object)?;
+                let counts = with.map(|with| super::events::touched(self.tag(), with));
+                let contacts = self.contacts(object)?;
+                let forces = contacts.iter().filter(|contact| counts.is_none_or(|with| with == contact.with));
+                let force_n: DVec3 = forces.map(|contact| contact.force_n).sum();
+                Ok(Reading { time: self.latest(object)?.time, values: force_n.to_array().to_vec() })
+            }
+            SensorKind::Imu { object, gravity_m_s2 } => {
+                let state = self.latest(self.object_of(object)?)?;
+                let RigidState { rotation, spin, .. } = rigid(&state.body);
+                // what rests is held: gravity alone is missing
+                let felt_m_s2 = rotation.conjugate() * (state.acceleration - gravity_m_s2);
+                let values = [felt_m_s2, rotation.conjugate() * spin].map(|v| v.to_array()).concat();
+                Ok(Reading { time: state.time, values })
+            }
+            SensorKind::Pose { object, at_m } => {
+                let Placed { pose, time, .. } = self.placed(object)?;
+                let values = [&pose.place(at_m).to_array()[..], &pose.rotation.to_array()].concat();
+                Ok(Reading { time, values })
+            }
+        }
+    }
+
+    fn joint_at(&self, number: u32) -> Result<&Joint, WorldError> {
+        let joints = &self.instruments().joints;
+        joints
+            .get(number as usize)
+            .ok_or_else(|| WorldError::NoJoint { name: number.to_string(), known: String::new() })
+    }
+
+    fn read_joint(&self, number: u32, read: impl Fn(&Joint, [&Placed; 2]) -> f64) -> Result<Reading, WorldError> {
+        let joint = self.joint_at(number)?;
+        let a = self.placed(joint.a)?;
+        let b = joint.b.map_or(Ok(WORLD), |b| self.placed(b))?;
+        Ok(Reading { time: a.time, values: vec![read(joint, [&a, &b])] })
+    }
+
+    fn placed(&self, id: AgentId) -> Result<Placed, WorldError> {
+        let object = self.object_of(id)?;
+        let (agent, state) = (self.agent(object)?, self.latest(object)?);
+        let shape = agent.form();
+        let com = match shape.as_ref().map(|shape| &shape.kind) {
+            Some(ShapeKind::Solid(solid)) => solid.com_local,
+            _ => DVec3::ZERO,
+        };
+        let RigidState { position, rotation, velocity, spin } = rigid(&state.body);
+        let origin_m = position - rotation * com;
+        let pose = Pose { centre_m: position, origin_m, rotation, ..Pose::WORLD };
+        Ok(Placed { pose, velocity, spin, time: state.time })
+    }
+}
+
+/// What never moves.
+const WORLD: Placed = Placed { pose: Pose::WORLD, velocity: DVec3::ZERO, spin: DVec3::ZERO, time: SimTime::ZERO };
+
+impl Placed {
+    /// The velocity of its matter at a point of space, m/s.
+    fn at(&self, point_m: DVec3) -> DVec3 {
+        self.velocity + self.spin.cross(point_m - self.pose.centre_m)
+    }
+}
+
+/// How fast b moves from a in the way that a joint leaves free.
+fn rate(joint: &Joint, [a, b]: [&Placed; 2]) -> f64 {
+    let (on_a, on_b) = (a.pose.place(joint.anchor_a_m), b.pose.place(joint.anchor_b_m));
+    match joint.kind {
+        JointKind::Revolute { axis, .. } => (b.spin - a.spin).dot((a.pose.rotation * axis).normalize_or_zero()),
+        // the axis is a's, so its matter beside b's anchor counts
+        JointKind::Prismatic { axis, .. } => {
+            (b.at(on_b) - a.at(on_b)).dot((a.pose.rotation * axis).normalize_or_zero())
+        }
+        _ => (b.at(on_b) - a.at(on_a)).dot((on_b - on_a).normalize_or_zero()),
+    }
+}
+
+/// The state of a rigid body, or of a tool's tip; at rest in the origin for all else.
+fn rigid(body: &Body) -> RigidState {
+    match body {
+        Body::Rigid(state) => *state,
+        body => {
+            let (position, velocity) = body.point(Anchor::Local(DVec3::ZERO)).unwrap_or_default();
+            RigidState { position, velocity, rotation: DQuat::IDENTITY, spin: DVec3::ZERO }
+        }
+    }
+}
