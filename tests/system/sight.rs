@@ -102,7 +102,7 @@ fn drifting(group: &str, apart_m: f64) -> Value {
     let text = format!(
         "[target]\nframe_hz = 30.0\npolicy = \"hierarchical\"\n[world]\ngravity_m_s2 = [0, 0, 0]\n\
          [machine]\ndraw_setup_ms = 0.1\ndraw_pixel_ns = 0.0\ndraw_object_us = 0.0\ndraw_triangle_us = 1000.0\nnoise = 0.0\n\
-         [camera]\nkeyframe = [{{ at_s = 0, eye_m = [0, -60, 0], look_at_m = [0, 0, 0] }}]\n{}{}{}{}{group}",
+         [camera]\nkeyframe = [\n{{ at_s = 0, {FAR} }},\n{{ at_s = 9, {FAR} }},\n]\n{}{}{}{}{group}",
         ball("a", 0.0),
         ball("b", 2.0),
         ball("c", 4.0),
@@ -111,8 +111,7 @@ fn drifting(group: &str, apart_m: f64) -> Value {
     Folder::with(&text).lockstep(&["--seconds", "3"])
 }
 
-const GROUP: &str =
-    "[[group]]\nname = \"all\"\nmembers = [\"a\", \"b\", \"c\"]\nproxy = { generate = \"sphere\", triangles = 12, scale = 2 }\n";
+const GROUP: &str = "[[group]]\nname = \"all\"\nmembers = [\"a\", \"b\", \"c\"]\nproxy = { generate = \"sphere\", triangles = 12, scale = 2 }\n";
 
 #[test]
 fn what_is_drawn_as_one_far_away_is_simulated_as_often_as_that_shows_unless_it_may_touch_what_is_not() {

@@ -1,7 +1,7 @@
 //! Where the impostor of a group stands once the group's members have moved.
 //!
 //! In: poses of the members, at first and now. Out: the turn, scale and shift that bring the first nearest to the present ones in the sense of
-//! least squares (Umeyama 1991, eq. 40 … 43), applied to the impostor. Never here: whether the impostor is drawn.
+//! least squares (UME91, eq. 40 … 43), applied to the impostor. Never here: whether the impostor is drawn.
 //! A member that is rigid says by its own rotation how the group has turned, so that a group of one turns too.
 
 use super::scene_view::{BodyShape, Bounds, Form, SceneView, Track};
@@ -83,7 +83,7 @@ impl Group {
     }
 
     /// The rotation from `first` nearest to these members, sought from `turned` by Newton's method, or where that would not approach it by the
-    /// safe step of (Müller, Bender, Chentanez and Macklin 2016).
+    /// safe step of (MBCM16).
     fn turned_from(&self, first: &Self, mut turned: DQuat) -> DQuat {
         let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
         let mut moments = DMat3::ZERO;

@@ -38,7 +38,7 @@ impl Groups {
 
     /// The group of an object.
     pub fn parent(&self, at: usize) -> Option<usize> {
-        self.parent[at]
+        self.parent.get(at).copied().flatten()
     }
 
     /// Whether `closed` holds for a group of the object at any level above it.

@@ -3,7 +3,7 @@
 //! In: a scene, a policy, a target, the way to the place. Out: a [`Still`]; without pictures where no adapter can draw and times are declared.
 //! Never here: sheets, rows.
 
-use super::walk::{Opening, Times, opened};
+use super::walk::{LEAD_IN, Opening, Times, opened};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Colouring, PictureFile, Style};
@@ -29,7 +29,7 @@ pub(in super::super) struct Above {
     pub(in super::super) ahead_m: f64,
 }
 
-/// The frames before a picture: evenly along this part of the path, or all at one place, where the last half of them counts.
+/// The frames before a picture: some at the beginning of a part of the path and then evenly along it, or all at one place, where the last half of them counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Approach {
     pub(in super::super) from: f64,
@@ -73,6 +73,11 @@ pub(in super::super) fn still(request: &StillRequest<'_>) -> anyhow::Result<Stil
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / request.target_s);
     control.set_policy(Policy::named(request.policy).context("no such policy")?);
+    if from != to {
+        for _ in 0..LEAD_IN {
+            fly_through.step(from)?;
+        }
+    }
     let part = |frame: usize| from + (to - from) * (frame + 1) as f64 / frames as f64;
     let mut records = (0..frames).map(|frame| fly_through.step(part(frame))).collect::<Result<Vec<_>, _>>()?;
     let last = *records.last().context("no frames")?;

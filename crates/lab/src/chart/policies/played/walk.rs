@@ -48,7 +48,7 @@ const PICTURES: usize = 5;
 const APART: usize = 10;
 /// Frames at the first place before the first that counts: they warm up pipelines, caches and prices; and that many where times are measured
 /// and scatter, which has to be known, or as many as there are of the path.
-const LEAD_IN: usize = 20;
+pub(super) const LEAD_IN: usize = 20;
 const MEASURED_LEAD_IN: usize = 100;
 /// A measured play is bounded: one of full detail, and one at the target, seconds; and fewest frames for all that. Places along the path are
 /// then fewer, and the same for all policies.
