@@ -182,12 +182,13 @@ pub(super) const PLATES: [Plate; 8] = [
         from: 0.5,
         to: 0.5,
         frames: [20, 4],
+        // at a sixth of full detail every tree has a triangle a pixel, past which no policy goes
         panels: &[
-            panel("T", "robin-hood", 32.0),
-            panel("2 T", "robin-hood", 16.0),
-            panel("4 T", "robin-hood", 8.0),
-            panel("8 T", "robin-hood", 4.0),
-            panel("16 T", "robin-hood", 2.0),
+            panel("T", "robin-hood", 96.0),
+            panel("2 T", "robin-hood", 48.0),
+            panel("4 T", "robin-hood", 24.0),
+            panel("8 T", "robin-hood", 12.0),
+            panel("16 T", "robin-hood", 6.0),
         ],
         sights: &[Sight::Eye],
     },
