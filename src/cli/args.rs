@@ -27,6 +27,7 @@ const RUN_EXAMPLES: &str = "\
 Examples:
   metachron run                                        the tube demo
   metachron run tube --headless --seconds 10 --report report.json --png last.png
+  metachron run domes --headless --executor lockstep --seconds 24 --video domes.y4m
   metachron run tube --headless --target-fps 30 --fail-on 'missed_share>0.01'
   metachron run pendulum --executor lockstep --frames 300 --headless --report -
   metachron run yard --set object.hose.young_pa=5e5 --set target.frame_hz=30
@@ -220,6 +221,9 @@ pub struct RunArgs {
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
+    /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Needs --headless
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub video: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or colours by resolution, age or detail; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,

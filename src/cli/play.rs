@@ -99,13 +99,13 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
 fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
     let size = Size { width, height };
-    let drawing = drawing(&session, request, png.is_some(), size)?;
+    let drawing = drawing(&session, request, png.is_some() || request.video.is_some(), size)?;
     let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
     let end = match request.headless_end() {
         RunLength::Frames(frames) => End::Frames(frames),
         RunLength::Seconds(seconds) => End::Seconds(seconds),
     };
-    let plan = Headless { end, size, style: request.style, drawing, png };
+    let plan = Headless { end, size, style: request.style, drawing, png, film: request.video.clone() };
     // the second run takes about as long as the first, so each is half of the whole
     let half = if request.oracle { 0.5 } else { 1.0 };
     let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(half * done))))?;
@@ -142,7 +142,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
     }
     let gpu = match Gpu::headless() {
         Ok(gpu) => gpu,
-        Err(error @ GpuError::NoAdapter { .. }) if request.png.is_none() => {
+        Err(error @ GpuError::NoAdapter { .. }) if request.png.is_none() && request.video.is_none() => {
             if !request.quiet {
                 metachron_console::output::message(&format!("nothing is drawn: {error}"));
             }
@@ -150,7 +150,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
         }
         Err(error) => {
             let error = anyhow::Error::from(error);
-            return Err(match &request.png {
+            return Err(match request.png.as_ref().or(request.video.as_ref()) {
                 Some(path) => error.context(format!("the picture {} cannot be drawn", path.display())),
                 None => error,
             });

@@ -49,6 +49,8 @@ pub struct Request {
     pub oracle: bool,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
+    /// Where to write the film of all frames (YUV4MPEG2); only without a window.
+    pub video: Option<PathBuf>,
     /// Where to write it when the requested window could not be opened, and `png` is `None`.
     pub png_without_window: PathBuf,
 }
@@ -158,6 +160,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         style: style(&args.style),
         oracle: args.oracle,
         png: args.png.clone(),
+        video: args.video.clone(),
         png_without_window,
     })
 }
@@ -190,7 +193,10 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
         let why = "--oracle runs the scene twice without a window; add --headless";
         return Err(BadInput(why.to_owned()).into());
     }
-    for (flag, path) in [("--png", &args.png), ("--frames-csv", &args.frames_csv)] {
+    if args.video.is_some() && !args.headless {
+        return Err(BadInput("--video films a run without a window; add --headless".to_owned()).into());
+    }
+    for (flag, path) in [("--png", &args.png), ("--video", &args.video), ("--frames-csv", &args.frames_csv)] {
         if path.as_deref() == Some(Path::new("-")) {
             return Err(BadInput(format!(
                 "{flag} - would write to standard output, which only the report may use; name a file"
@@ -198,7 +204,7 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
             .into());
         }
     }
-    for path in [&args.png, &args.report, &args.frames_csv].into_iter().flatten() {
+    for path in [&args.png, &args.video, &args.report, &args.frames_csv].into_iter().flatten() {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         if folder.is_some_and(|f| !f.is_dir()) {
             return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -211,16 +217,18 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
     check_extension(args)
 }
 
-/// Refuses a picture file with another ending than .png, because the content is PNG.
+/// Refuses a picture or film whose file has the ending of something else.
 fn check_extension(args: &RunArgs) -> anyhow::Result<()> {
-    let Some((path, ending)) = args.png.as_deref().and_then(|path| Some((path, path.extension()?))) else {
-        return Ok(());
-    };
-    if ending.eq_ignore_ascii_case("png") {
-        return Ok(());
+    let outputs = [("--png", &args.png, "PNG picture", "png"), ("--video", &args.video, "YUV4MPEG2 film", "y4m")];
+    for (flag, path, what, ending) in outputs {
+        let other = |path: &&PathBuf| path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));
+        if let Some(path) = path.as_ref().filter(other) {
+            let found = path.extension().unwrap_or_default().display();
+            let why = format!("{flag} {} would be a {what} in a .{found} file", path.display());
+            return Err(BadInput(format!("{why}; name one that ends in .{ending}")).into());
+        }
     }
-    let why = format!("--png {} would be a PNG picture in a .{} file", path.display(), ending.display());
-    Err(BadInput(format!("{why}; name one that ends in .png")).into())
+    Ok(())
 }
 
 /// Refuses an output that would overwrite another one, or an input.
@@ -231,6 +239,7 @@ fn check_distinct(args: &RunArgs) -> anyhow::Result<()> {
         ("--gains", args.gains.as_deref()),
         ("--report", args.report.as_deref().filter(|path| *path != Path::new("-"))),
         ("--png", args.png.as_deref()),
+        ("--video", args.video.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
     ];
     let places: Vec<_> =

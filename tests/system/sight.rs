@@ -1,6 +1,6 @@
 //! An agent is simulated as finely as somebody can see it, and comes back without a jump.
 
-use crate::play::{Folder, lockstep};
+use crate::play::{Folder, agent, lockstep, number};
 use serde_json::Value;
 
 /// A soft tube that hangs from two pins.
@@ -88,4 +88,36 @@ fn a_rope_and_a_sheet_are_as_coarse_as_a_tolerance_allows() {
         assert!(tight.0 < 0.7 * loose.0, "{tight:?} {loose:?}");
         assert!(tight.1 < 2e-4 && loose.1 < 1e-2, "{tight:?} {loose:?}");
     }
+}
+
+/// Three balls that drift slowly, a group or not, and a fourth that is not in the group, so far from the first; where time is short a group
+/// is drawn as its impostor.
+fn drifting(group: &str, apart_m: f64) -> Value {
+    let ball = |name: &str, x: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.2\nsleep = false\nposition_m = [{x}, 0, 0]\n\
+             velocity_m_s = [0, 0, 0.05]\ndt_ms = [5, 50]\n"
+        )
+    };
+    let text = format!(
+        "[target]\nframe_hz = 30.0\npolicy = \"hierarchical\"\n[world]\ngravity_m_s2 = [0, 0, 0]\n\
+         [machine]\ndraw_setup_ms = 0.1\ndraw_pixel_ns = 0.0\ndraw_object_us = 0.0\ndraw_triangle_us = 1000.0\nnoise = 0.0\n\
+         [camera]\nkeyframe = [\n{{ at_s = 0, {FAR} }},\n{{ at_s = 9, {FAR} }},\n]\n{}{}{}{}{group}",
+        ball("a", 0.0),
+        ball("b", 2.0),
+        ball("c", 4.0),
+        ball("outside", -apart_m),
+    );
+    Folder::with(&text).lockstep(&["--seconds", "3"])
+}
+
+const GROUP: &str = "[[group]]\nname = \"all\"\nmembers = [\"a\", \"b\", \"c\"]\nproxy = { generate = \"sphere\", triangles = 12, scale = 2 }\n";
+
+#[test]
+fn what_is_drawn_as_one_far_away_is_simulated_as_often_as_that_shows_unless_it_may_touch_what_is_not() {
+    let steps_ms = |report: &Value| ["a", "b", "c", "outside"].map(|name| number(agent(report, name), "/dt_ms"));
+    assert_eq!(steps_ms(&drifting("", 5.0)), [5.0; 4]);
+    // 12 triangles on 200 pixels, over which a ball takes ten seconds: the longest step that the scene allows
+    assert_eq!(steps_ms(&drifting(GROUP, 5.0)), [50.0, 50.0, 50.0, 5.0]);
+    assert_eq!(steps_ms(&drifting(GROUP, 0.401)), [5.0; 4]);
 }

@@ -70,6 +70,7 @@ fn stage() -> Vec<ObjectView> {
         off_centre: 0.0,
         from_focus_m: 0.0,
         visible: true,
+        group: None,
         may_vanish: false,
     };
     let tube = Kind::Tube { length_m: 1.6, radius_m: 0.015 };

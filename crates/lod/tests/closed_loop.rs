@@ -121,6 +121,7 @@ fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
         off_centre: 0.0,
         from_focus_m: 0.0,
         visible: true,
+        group: None,
         may_vanish: false,
     };
     let polygon_s = 0.6 / hz / start;

@@ -107,9 +107,12 @@ pub(super) fn add_solid(
 /// Adds visible scenery with the triangles that its level gives.
 fn add_scenery(track: &mut Track, level: Level, framed: Framed<'_>, solids: &mut Solids, allowance: &mut Allowance) {
     let mut paint = Paint::of(track.actor.appearance, tint(framed.picture.style, level, track.age_s));
-    let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.mesh_index, track.seen) else {
+    let (Form::Scenery(model, at), Body::Rigid(pose), Some(number), true) =
+        (&track.actor.form, &track.pose, track.body.mesh_index, track.seen)
+    else {
         return;
     };
+    let place = pose.position - framed.picture.origin;
     match model {
         Model::Mesh(progressive) => {
             let (mesh, share) = if level.triangles < progressive.range().0 {
@@ -129,14 +132,14 @@ fn add_scenery(track: &mut Track, level: Level, framed: Framed<'_>, solids: &mut
                 None => (kind(level.shading, mesh), 0.0),
             };
             let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: 0.0 };
-            let still = instance(at.position - framed.picture.origin, at.rotation, size, paint);
+            let still = instance(place, pose.rotation, size, paint);
             solids.push((kind, SolidInstance { geomorph: share, wrap: [wrap, 0.0], ..still }));
         }
         Model::Foliage(foliage) => {
             let pixels = framed.pixels_per_m(track.bounds.centre) * at.scale;
             for (mesh, growth) in foliage_runs(foliage, number, level.triangles, pixels) {
                 let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
-                let still = instance(at.position - framed.picture.origin, at.rotation, size, paint);
+                let still = instance(place, pose.rotation, size, paint);
                 solids.push((kind(level.shading, mesh), still));
             }
         }

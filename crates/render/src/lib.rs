@@ -29,6 +29,7 @@ mod draw;
 mod environment;
 #[cfg(feature = "gpu")]
 mod image_metrics;
+mod impostor_fit;
 mod instances;
 mod level;
 mod light_volume;

@@ -22,7 +22,7 @@ pub enum Colouring {
     Resolution,
     /// The age of the displayed state: from blue (now) to red (0.1 s and older).
     Age,
-    /// The fraction of its detail that an object is drawn with, from nearly black (its coarsest) to white (its finest), as in (FS93).
+    /// The fraction of its detail that an object is drawn with, from white (its coarsest) to nearly black (its finest), as in (FS93, fig. 8).
     Detail,
 }
 
@@ -287,11 +287,11 @@ pub fn resolution_colour(at: Resolution) -> [u8; 3] {
     HUES[usize::from(at.n).min(HUES.len() - 1)]
 }
 
-/// The shade of a level: dark grey is the coarsest an object has, white its finest.
+/// The shade of a level: white is the coarsest an object has, dark grey its finest (FS93, fig. 8).
 #[must_use]
 pub fn detail_colour(detail: f32) -> [u8; 3] {
     // a cast of floats saturates, and maps NaN to 0
-    [(28.0 + 227.0 * detail.clamp(0.0, 1.0)) as u8; 3]
+    [255 - (227.0 * detail.clamp(0.0, 1.0)) as u8; 3]
 }
 
 /// Ages beyond this are drawn fully red, seconds.
@@ -313,9 +313,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn detail_runs_from_dark_to_white_and_takes_any_number() {
-        assert_eq!([0.0, 0.5, 1.0, 7.0].map(|d| detail_colour(d)[0]), [28, 141, 255, 255]);
-        assert_eq!(detail_colour(f32::NAN), [0; 3]);
+    fn detail_runs_from_white_to_dark_and_takes_any_number() {
+        assert_eq!([0.0, 0.5, 1.0, 7.0].map(|d| detail_colour(d)[0]), [255, 142, 28, 28]);
+        assert_eq!(detail_colour(f32::NAN), [255; 3]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
 use super::environment::Environment;
+use super::impostor_fit::ImpostorFit;
 use super::lod_transition::Geomorph;
 use super::picture::{MeshCorner, Picture};
 use super::pose;
@@ -15,7 +16,7 @@ use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use metachron_geometry::{Aabb, CollisionShape, ShapeKind, SurfaceShape};
 use metachron_geometry::{
-    Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, compound_mesh, creased_mesh,
+    Extent, Model, Motion, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, compound_mesh, creased_mesh,
     hull_mesh,
 };
 use std::sync::Arc;
@@ -69,7 +70,7 @@ pub enum Form {
     Solid(Solid),
     /// A grasping tool.
     Tool(ToolShape),
-    /// Static geometry without snapshots; its level gives the number of triangles.
+    /// Geometry without snapshots, at rest or in a declared motion ([`SceneView::set_motion`]); its level gives the number of triangles.
     Scenery(Model, Placement),
     /// The skin of a sheet or soft solid.
     Skin(SkinForm),
@@ -164,8 +165,9 @@ pub struct SceneView {
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
     pub(super) survey: Survey,
-    /// How many of the last actors are drawn in place of groups of others.
+    /// How many of the last actors are drawn in place of groups of others, and those of them that move.
     pub(super) impostors: usize,
+    pub(super) fits: Vec<ImpostorFit>,
     /// Results of the last survey, and the camera and picture size of that survey.
     pub(super) found: Vec<Visibility>,
     /// The actors that the last survey updated.
@@ -202,6 +204,8 @@ pub(super) struct Track {
     pub rope: CurveState,
     /// Texture of scenery.
     pub painting: Option<Painting>,
+    /// The motion of scenery that moves by itself.
+    pub motion: Option<Motion>,
 }
 
 /// A static solid with its drawing data.
@@ -273,9 +277,11 @@ impl SceneView {
         Self { tracks, statics, picture, ..Self::default() }
     }
 
-    /// Says how many of the last actors are drawn in place of groups of others: they are not counted as objects.
-    pub fn set_impostors(&mut self, count: usize) {
-        self.impostors = count;
+    /// Lets an actor that is scenery move; an unknown actor is ignored.
+    pub fn set_motion(&mut self, id: AgentId, motion: Motion) {
+        if let Some(track) = self.tracks.iter_mut().find(|track| track.actor.id == id) {
+            track.motion = Some(motion);
+        }
     }
 
     /// Chooses what lights the scene from the next picture on.
@@ -324,6 +330,7 @@ impl SceneView {
         for track in self.tracks.iter_mut().filter(|track| !track.still) {
             posed += usize::from(track.pose_at(time, states));
         }
+        self.fit_impostors();
         posed
     }
 
@@ -376,6 +383,7 @@ impl Track {
             geomorph: None,
             rope: CurveState::default(),
             painting: None,
+            motion: None,
         };
         track.bounds = track.find_bounds();
         track
@@ -395,8 +403,22 @@ impl Track {
         }
     }
 
-    /// Whether there was a snapshot to pose it by.
+    /// Whether there was a snapshot or a motion to pose it by.
     fn pose_at(&mut self, time: SimTime, states: States) -> bool {
+        if let (Some(motion), Form::Scenery(_, rest)) = (&self.motion, &self.actor.form) {
+            if self.shown == time {
+                return false;
+            }
+            let (at, velocity) = motion.at(rest, time.as_secs_f64());
+            self.shown = time;
+            self.show(Body::Rigid(RigidState {
+                position: at.position,
+                rotation: at.rotation,
+                velocity,
+                ..RigidState::default()
+            }));
+            return true;
+        }
         let Some(newest) = &self.newest else { return false };
         self.age_s = if self.awake { time.secs_after(newest.moment()).max(0.0) } else { 0.0 };
         self.shown = match (states, &self.before) {
@@ -407,10 +429,21 @@ impl Track {
                 newest.moment()
             }
         };
-        self.bounds = self.find_bounds();
         self.still = !self.awake && self.shown == newest.moment();
-        (self.fresh, self.cut_m) = (true, None);
+        self.renew();
         true
+    }
+
+    /// Takes this pose from the next survey on.
+    pub fn show(&mut self, pose: Body) {
+        self.pose = pose;
+        self.renew();
+    }
+
+    /// Finds what depends on the pose.
+    fn renew(&mut self) {
+        self.bounds = self.find_bounds();
+        (self.fresh, self.cut_m) = (true, None);
     }
 
     fn find_bounds(&self) -> Bounds {
@@ -481,6 +514,16 @@ impl Models {
 }
 
 impl BodyShape {
+    /// The same body, so many times as large.
+    pub fn scaled(self, scale: f64) -> Self {
+        Self {
+            middle_m: scale * self.middle_m,
+            radius_m: scale * self.radius_m,
+            mean_area_m2: scale * scale * self.mean_area_m2,
+            ..self
+        }
+    }
+
     fn of(solid: &Solid, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         use std::f64::consts::PI;
         let mesh_index = |mesh: PrimitiveMesh, meshes: &mut Vec<PrimitiveMesh>| {

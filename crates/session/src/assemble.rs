@@ -124,12 +124,15 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         throws_shadow: !scene.walls.contains(&at),
     });
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
-    scene_view.set_impostors(scene.groups.len());
+    scene_view.set_groups(&members(scene));
     scene_view.set_cells(scene.cells.clone());
     scene_view.set_environment(environment(scene.environment));
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
             scene_view.paint(AgentId(id), texture);
+        }
+        if let Some(motion) = it.motion {
+            scene_view.set_motion(AgentId(id), motion);
         }
     }
     scene_view
@@ -141,6 +144,28 @@ const fn environment(kind: EnvironmentKind) -> Environment {
         EnvironmentKind::Sky => Environment::Sky,
         EnvironmentKind::Endoscope => Environment::Endoscope,
     }
+}
+
+/// For every group the actors in it and in its groups: agents, then scenery.
+pub fn members(scene: &Scene) -> Vec<Vec<usize>> {
+    let of = |group: &metachron_world::Group| {
+        let agents = group.agents.iter().map(|id| id.0 as usize);
+        agents.chain(group.members.clone().map(|at| scene.agents.len() + at)).collect()
+    };
+    scene.groups.iter().map(of).collect()
+}
+
+/// For every actor the actor of the innermost group that it is in.
+pub fn parents(scene: &Scene) -> Vec<Option<usize>> {
+    let first = scene.agents.len() + scene.scenery.len();
+    let mut parents = vec![None; first + scene.groups.len()];
+    // inner groups come first
+    for (at, (group, members)) in scene.groups.iter().zip(members(scene)).enumerate() {
+        for member in members.into_iter().chain(group.groups.clone().map(|inner| first + inner)) {
+            parents[member] = parents[member].or(Some(first + at));
+        }
+    }
+    parents
 }
 
 /// All scenery in the order of its actors.
@@ -230,15 +255,24 @@ pub fn law(target: &metachron_world::Target) -> Law {
     }
 }
 
+/// A scene and for every actor of it the group that it is in ([`parents`]).
+#[derive(Clone, Copy)]
+pub struct Grouped<'a> {
+    pub scene: &'a Scene,
+    pub parents: &'a [Option<usize>],
+}
+
 /// Updates `views`, control's description of every object of the scene view in the order of its actors, for the objects in `updated`.
-pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], scene: &Scene) {
+pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], of: Grouped<'_>) {
+    let view =
+        |at: usize| ObjectView { group: of.parents.get(at).copied().flatten(), ..view_at(at, &seen[at], of.scene) };
     if views.len() != seen.len() {
         views.clear();
-        views.extend((0..seen.len()).map(|at| view_at(at, &seen[at], scene)));
+        views.extend((0..seen.len()).map(view));
         return;
     }
     for &at in updated {
-        views[at] = view_at(at, &seen[at], scene);
+        views[at] = view(at);
     }
 }
 
@@ -263,10 +297,8 @@ fn view_and_appearance<'a>(
         return (still_view(seen, it, kind), &it.appearance);
     }
     let group = &scene.groups[at - agents - members];
-    let groups = (agents + members + group.groups.start, group.groups.len());
-    let members = (agents + group.members.start, group.members.len());
     let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
-    let kind = Kind::Group { radius_m: seen.radius_m, members, groups, impostors };
+    let kind = Kind::Group { radius_m: seen.radius_m, impostors };
     (still_view(seen, &group.proxy, kind), &group.proxy.appearance)
 }
 
@@ -309,6 +341,7 @@ fn view_of(
     ObjectView {
         id: seen.id,
         kind,
+        group: None,
         range,
         shading: shading(appearance),
         pixels: seen.pixels,

@@ -9,7 +9,7 @@
 use super::assemble::{ROOM, SHARE_MAX};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_lod::adaptive::joint::{Between, Drawing, SharedPrice, Worker, price, temporal_error_px};
-use metachron_lod::control::ObjectView;
+use metachron_lod::control::{ObjectView, VisibleDetail};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -27,20 +27,21 @@ pub(super) struct AgentBudget {
     /// Its load at its finest as a share of one core, and the share of its period that its work may take; bits of f64.
     full: AtomicU64,
     share: AtomicU64,
-    /// The finest ε that makes a visible difference, metres, +∞ out of view; bits of f64.
+    /// The finest ε and step that make a visible difference, metres and seconds, +∞ out of view; bits of f64.
     visible_eps: AtomicU64,
+    visible_dt: AtomicU64,
 }
 
 impl AgentBudget {
     /// Nothing is reported yet.
     pub fn new(id: AgentId, rate_hz: f64, least: f64, fair: f64) -> Self {
-        let [full, share, visible_eps] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
-        Self { id, rate_hz, least, fair, full, share, visible_eps }
+        let [full, share, visible_eps, visible_dt] = [0.0, fair, 0.0, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
+        Self { id, rate_hz, least, fair, full, share, visible_eps, visible_dt }
     }
 
     /// Writes or reads the numbers exchanged.
     pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        for number in [&self.full, &self.share, &self.visible_eps] {
+        for number in [&self.full, &self.share, &self.visible_eps, &self.visible_dt] {
             let mut bits = number.load(Ordering::Relaxed);
             archive.value(&mut bits)?;
             number.store(bits, Ordering::Relaxed);
@@ -53,14 +54,16 @@ impl AgentBudget {
         self.id
     }
 
-    /// The frame loop sets the finest ε that makes a visible difference, metres.
-    pub fn set_visible_eps(&self, visible_eps_m: f64) {
-        self.visible_eps.store(visible_eps_m.to_bits(), Ordering::Relaxed);
+    /// The frame loop sets what makes a visible difference.
+    pub fn set_visible(&self, detail: VisibleDetail) {
+        self.visible_eps.store(detail.eps_m.to_bits(), Ordering::Relaxed);
+        self.visible_dt.store(detail.dt_s.to_bits(), Ordering::Relaxed);
     }
 
-    /// The finest ε that makes a visible difference, metres, +∞ out of view; 0 until it is set.
-    pub fn visible_eps_m(&self) -> f64 {
-        f64::from_bits(self.visible_eps.load(Ordering::Relaxed))
+    /// What makes a visible difference: all, until it is set.
+    pub fn visible(&self) -> VisibleDetail {
+        let of = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
+        VisibleDetail { eps_m: of(&self.visible_eps), dt_s: of(&self.visible_dt) }
     }
 
     /// The agent reports its load at its finest, as a share of one core.

@@ -3,6 +3,8 @@
 #[cfg(feature = "picture")]
 use metachron_render::GpuError;
 use metachron_world::WorldError;
+#[cfg(feature = "picture")]
+use std::path::PathBuf;
 
 /// Reason why a scene could not be played, or not to its end.
 #[derive(Debug, thiserror::Error)]
@@ -19,4 +21,13 @@ pub enum SessionError {
     #[cfg(feature = "picture")]
     #[error(transparent)]
     Picture(GpuError),
+    /// The film could not be written.
+    #[cfg(feature = "picture")]
+    #[error("the film could not be written to {path}")]
+    Film {
+        /// The intended path.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
 }

@@ -5,7 +5,7 @@
 //! In lockstep a frame takes its declared time, and only the requested pictures are drawn.
 
 use super::error::SessionError;
-use super::headless::{Drawing, PictureFormat, frame_seen_by};
+use super::headless::{Drawing, PictureFormat, frame_seen_by, pictured};
 use super::outcome::FrameRecord;
 use super::session::Session;
 use metachron_render::{Camera, PictureFile, Size, Style};
@@ -59,14 +59,32 @@ impl FlyThrough {
     /// # Errors
     /// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where it cannot be read back.
     pub fn picture(&mut self) -> Result<Option<PictureFile>, SessionError> {
-        let screen = match &mut self.drawing {
-            Drawing::Nothing => return Ok(None),
-            Drawing::Every(screen) => screen,
-            Drawing::Last(screen) => {
-                screen.render(self.session.picture(), &self.camera).map_err(SessionError::Draw)?;
-                screen
-            }
-        };
-        screen.read_back().map(Some).map_err(SessionError::Picture)
+        let drawn = !matches!(self.drawing, Drawing::Nothing);
+        drawn.then(|| pictured(&self.session, &self.camera, &mut self.drawing)).transpose()
+    }
+
+    /// The levels of the last frame in another style, and where `from` is given seen by that camera: what the frame did not see is left out.
+    /// `None` where nothing draws.
+    ///
+    /// # Errors
+    /// As [`FlyThrough::picture`].
+    pub fn picture_of_levels(
+        &mut self,
+        from: Option<&Camera>,
+        style: Style,
+    ) -> Result<Option<PictureFile>, SessionError> {
+        let camera = *from.unwrap_or(&self.camera);
+        let (Drawing::Every(screen) | Drawing::Last(screen)) = &mut self.drawing else { return Ok(None) };
+        let picture = self.session.compose_levels(&camera, self.size, style);
+        screen.render(picture, &camera).map_err(SessionError::Draw)?;
+        let drawn = screen.read_back().map_err(SessionError::Picture)?;
+        self.session.compose_again(&self.camera, self.size);
+        Ok(Some(drawn))
+    }
+
+    /// The camera of the last frame.
+    #[must_use]
+    pub const fn camera(&self) -> &Camera {
+        &self.camera
     }
 }

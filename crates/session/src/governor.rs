@@ -17,7 +17,7 @@ impl Governor for RateGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
         let Self(control, budget) = self;
         control.set_share(budget.share());
-        control.set_plain(budget.visible_eps_m());
+        control.set_visible(budget.visible());
         let turn = control::TurnMeasure {
             work_s: measure.work_s,
             wanted_period_s: measure.wanted_period_s,

@@ -4,12 +4,16 @@
 //! Never here: arguments, progress bars (the caller is called back at every frame).
 
 use super::error::SessionError;
+#[cfg(feature = "picture")]
+use super::film::Film;
 use super::outcome::{FrameRecord, Outcome};
 use super::session::{Finished, Session};
 use metachron_render::{Camera, Size, Style};
 #[cfg(feature = "picture")]
-use metachron_render::{Offscreen, RendererOptions};
+use metachron_render::{Offscreen, PictureFile, RendererOptions};
 use std::path::PathBuf;
+#[cfg(feature = "picture")]
+use std::time::Duration;
 
 /// When a run ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,7 +32,7 @@ pub enum Drawing {
     #[cfg(feature = "picture")]
     Every(Box<Offscreen>),
     #[cfg(feature = "picture")]
-    /// Only the last frame is drawn, for its picture, without a time limit; costs are declared.
+    /// Only frames of which a picture is wanted are drawn, without a time limit; costs are declared.
     Last(Box<Offscreen>),
 }
 
@@ -64,13 +68,15 @@ pub struct Headless {
     pub drawing: Drawing,
     /// File for the picture of the last frame.
     pub png: Option<PathBuf>,
+    /// File for the film of all frames (YUV4MPEG2).
+    pub film: Option<PathBuf>,
 }
 
 /// Plays `session` to its end. `go_on` receives every frame and the share of the run that is done, 0 … 1; if it returns `false` the run
 /// ends.
 ///
 /// # Errors
-/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where the picture cannot be written.
+/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] and [`SessionError::Film`] where a file cannot be written.
 pub fn play_headless(
     mut session: Session,
     mut plan: Headless,
@@ -82,6 +88,8 @@ pub fn play_headless(
     session.begin();
     let period = session.period();
     let mut due = session.now();
+    #[cfg(feature = "picture")]
+    let mut film = film(&plan, period, due)?;
     let mut interrupted = false;
     loop {
         session.wait_until(due);
@@ -90,12 +98,19 @@ pub fn play_headless(
             break;
         }
         let format = PictureFormat { size: plan.size, style: plan.style };
-        let record = one_frame(&mut session, format, &mut plan.drawing, false)?;
+        let camera = frame_camera(&mut session);
+        let record = frame_seen_by(&mut session, &camera, format, &mut plan.drawing, false)?;
+        #[cfg(feature = "picture")]
+        if let Some(film) = &mut film {
+            film.push(session.now(), pictured(&session, &camera, &mut plan.drawing)?)?;
+        }
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
     }
     // the picture shows the state at the end of the run, however long drawing takes
     session.hold();
+    #[cfg(feature = "picture")]
+    film.map_or(Ok(()), |film| film.finish(session.now()))?;
     #[cfg(feature = "picture")]
     write_picture(&mut session, &mut plan)?;
     let adapter = plan.drawing.adapter();
@@ -131,9 +146,14 @@ pub(super) fn one_frame(
     drawing: &mut Drawing,
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
-    let camera = session.scene_camera();
-    let camera = session.predict_camera(camera);
+    let camera = frame_camera(session);
     frame_seen_by(session, &camera, format, drawing, skip)
+}
+
+/// The scene's camera at the time when the frame that begins now is shown.
+fn frame_camera(session: &mut Session) -> Camera {
+    let camera = session.scene_camera();
+    session.predict_camera(camera)
 }
 
 /// As [`one_frame`], seen by `camera` instead of the scene's camera.
@@ -180,6 +200,27 @@ pub fn draw_frame(
     let done = session.now();
     let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
     Ok(session.finish(started, Finished { work, draw, gpu, skip }))
+}
+
+/// The film that a plan wants, if anything is drawn.
+#[cfg(feature = "picture")]
+fn film(plan: &Headless, period: Duration, begun: Duration) -> Result<Option<Film>, SessionError> {
+    let drawn = plan.film.as_ref().filter(|_| !matches!(plan.drawing, Drawing::Nothing));
+    drawn.map(|path| Film::create(path, plan.size, period, begun)).transpose()
+}
+
+/// The picture of the last frame, which was seen by `camera`; drawn now where frames are not.
+#[cfg(feature = "picture")]
+pub(super) fn pictured(session: &Session, camera: &Camera, drawing: &mut Drawing) -> Result<PictureFile, SessionError> {
+    let screen = match drawing {
+        Drawing::Nothing => return Ok(PictureFile::default()),
+        Drawing::Every(screen) => screen,
+        Drawing::Last(screen) => {
+            screen.render(session.picture(), camera).map_err(SessionError::Draw)?;
+            screen
+        }
+    };
+    screen.read_back().map_err(SessionError::Picture)
 }
 
 /// Draws the last frame once more, without a time limit.

@@ -52,6 +52,8 @@ pub struct Session {
     visible_resolution: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
+    /// For every actor the group that it is in.
+    parents: Vec<Option<usize>>,
     levels: Vec<Level>,
     couplings: Couplings,
     trace: Option<Trace>,
@@ -143,7 +145,7 @@ impl Session {
         Ok(Self {
             control: assemble::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep && !machine.graphics_card,
-            visible_resolution: VisibleResolution::new(&controlled.budgets),
+            visible_resolution: VisibleResolution::new(&controlled.budgets, &scene),
             cpu_budget: CpuBudget::new(controlled.budgets),
             frame_cpu_s: 0.0,
             thread_time: None,
@@ -154,6 +156,7 @@ impl Session {
             machine,
             world,
             views: Vec::new(),
+            parents: assemble::parents(&scene),
             levels: Vec::new(),
             couplings: Couplings::default(),
             trace: None,

@@ -15,7 +15,7 @@ use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::stepper::DEPTH_RANGE_M;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Cells, Model, Obstacle, Placement, Texture};
+use metachron_geometry::{Cells, Model, Motion, Obstacle, Placement, Texture};
 use metachron_models::rigid::Joint;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
@@ -54,9 +54,9 @@ pub struct Scene {
     pub obstacles: Arc<[Obstacle]>,
     /// Looks of the obstacles, in their order.
     pub obstacle_appearances: Vec<Appearance>,
-    /// Objects that are only drawn and never move; the members of a group are adjacent.
+    /// Objects that are only drawn; the members of a group are adjacent.
     pub scenery: Vec<Scenery>,
-    /// Scenery that may be drawn as one mesh; a group comes after the groups in it.
+    /// Objects that may be drawn as one mesh; a group comes after the groups in it.
     pub groups: Vec<Group>,
     /// Rooms and the openings between them.
     pub cells: Cells,
@@ -253,7 +253,7 @@ pub struct Member {
     pub faults: Faults,
 }
 
-/// An object that is only drawn: it never moves, and nothing collides with it.
+/// An object that is only drawn: nothing collides with it, and it moves as is declared, if at all.
 #[derive(Debug, Clone)]
 pub struct Scenery {
     /// Its name, unique in the scene.
@@ -266,18 +266,22 @@ pub struct Scenery {
     pub appearance: Appearance,
     /// Its texture.
     pub texture: Option<Arc<Texture>>,
+    /// How it moves; `None` where it never does.
+    pub motion: Option<Motion>,
 }
 
 /// Most levels of a group.
 pub const GROUP_LEVELS_MAX: usize = 8;
 
-/// Scenery that may be drawn as one mesh.
+/// Objects that may be drawn as one mesh, which moves as they do.
 #[derive(Debug, Clone)]
 pub struct Group {
     /// The mesh that replaces all of it, with the group's name.
     pub proxy: Scenery,
     /// Triangles of its impostors: 1 … [`GROUP_LEVELS_MAX`] rising numbers, each a cut of the mesh.
     pub levels: Vec<u32>,
+    /// All agents in it and in its groups.
+    pub agents: Vec<AgentId>,
     /// All scenery in it and in its groups, a range of [`Scene::scenery`].
     pub members: Range<usize>,
     /// All groups in it and in those, a range of [`Scene::groups`] that ends before it.

@@ -92,6 +92,25 @@ fn a_picture_has_the_size_that_was_asked_for() {
 }
 
 #[test]
+fn a_film_has_a_frame_for_every_tick_of_a_lockstep_run() {
+    let scene = Folder::with(BALL);
+    let path = scene.file("film.y4m");
+    if let Err(error) = metachron_render::Gpu::headless() {
+        assert!(std::env::var("METACHRON_REQUIRE_ADAPTER").is_err(), "{error}");
+        return eprintln!("film test skipped: {error}");
+    }
+    run(&scene, &["--target-fps", "50", "--size", "32x16", "--video", &path]);
+    let film = std::fs::read(&path).unwrap();
+    let head = b"YUV4MPEG2 W32 H16 F50000:1000 Ip A1:1 C420jpeg\n";
+    assert!(film.starts_with(head), "{}", String::from_utf8_lossy(&film[..head.len()]));
+    assert_eq!(film.len(), head.len() + 7 * (b"FRAME\n".len() + 32 * 16 * 3 / 2));
+    for (wrong, said) in [("film.mp4", "name one that ends in .y4m"), ("-", "would write to standard output")] {
+        let refused = metachron(&["run", scene.scene(), "--headless", "--video", wrong]);
+        assert!(String::from_utf8_lossy(&refused.stderr).contains(said), "{wrong}");
+    }
+}
+
+#[test]
 fn the_overrides_reach_the_run() {
     let scene = Folder::with(BALL);
     let report = report_of(

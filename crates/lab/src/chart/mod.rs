@@ -31,6 +31,7 @@ use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
 use metachron_render::{Gpu, PictureFile};
 use policies::live::Live;
+use policies::plates::Figures;
 use rows::RowFile;
 use scaling::growth::Scaling;
 use serde::Serialize;
@@ -125,6 +126,14 @@ const POLICIES: &[Entry] = &[
     entry::<policies::scanline::Scanline>(),
     entry::<policies::rooms::Rooms>(),
     entry::<policies::every::Every>(),
+    entry::<Figures<0, false>>(),
+    entry::<Figures<1, false>>(),
+    entry::<Figures<2, false>>(),
+    entry::<Figures<3, false>>(),
+    entry::<Figures<4, false>>(),
+    entry::<Figures<5, false>>(),
+    entry::<Figures<6, false>>(),
+    entry::<Figures<7, false>>(),
 ];
 
 const POLICIES_LIVE: &[Entry] = &[
@@ -134,7 +143,8 @@ const POLICIES_LIVE: &[Entry] = &[
     entry::<Live<3>>(),
     entry::<Live<4>>(),
     entry::<policies::live::held::Held>(),
-    entry::<policies::live::views::Views>(),
+    entry::<Figures<0, true>>(),
+    entry::<Figures<1, true>>(),
     entry::<policies::live::prediction::Prediction>(),
     entry::<policies::live::traversal::Traversal>(),
 ];

@@ -66,6 +66,7 @@ mod tests {
             off_centre: 0.0,
             from_focus_m: 0.0,
             visible,
+            group: None,
             may_vanish: false,
         };
         let mut changes = Changes::default();

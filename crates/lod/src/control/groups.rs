@@ -6,7 +6,6 @@
 use super::ladder::Rung;
 use super::plan::SizedView;
 use super::query::FrameQuery;
-use super::view::Kind;
 
 /// Benefit of a group's finest impostor relative to its members in their lowest forms: less than any form of the members, as (MB97, §3)
 /// assumes.
@@ -22,20 +21,14 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// Reads the groups anew. An object belongs to the first group that names it; an object given after its group belongs to none.
+    /// Reads the groups anew. An object that is given after its group, or whose group is none, belongs to none.
     pub fn update(&mut self, views: &[SizedView]) {
+        let is_group = |at: usize| views.get(at).is_some_and(|seen| seen.view.is_group());
+        let parent = |(at, seen): (usize, &SizedView)| seen.view.group.filter(|group| *group > at && is_group(*group));
         self.parent.clear();
-        self.parent.resize(views.len(), None);
+        self.parent.extend(views.iter().enumerate().map(parent));
         self.groups.clear();
-        for (at, SizedView { view, .. }) in views.iter().enumerate() {
-            let Kind::Group { members, groups, .. } = view.kind else { continue };
-            self.groups.push(at);
-            for (first, count) in [members, groups] {
-                let end = first.saturating_add(count).min(at);
-                let free = self.parent[first.min(end)..end].iter_mut().filter(|parent| parent.is_none());
-                free.for_each(|parent| *parent = Some(at));
-            }
-        }
+        self.groups.extend((0..views.len()).filter(|at| is_group(*at)));
     }
 
     /// Numbers of the groups, each after its members.
@@ -45,7 +38,7 @@ impl Groups {
 
     /// The group of an object.
     pub fn parent(&self, at: usize) -> Option<usize> {
-        self.parent[at]
+        self.parent.get(at).copied().flatten()
     }
 
     /// Whether `closed` holds for a group of the object at any level above it.
@@ -122,24 +115,31 @@ impl Impostors {
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::ObjectView;
+    use super::super::view::{Kind, ObjectView};
     use super::*;
 
-    fn object(id: usize, kind: Kind) -> SizedView {
-        SizedView::of(ObjectView::plain(id as u32, kind))
-    }
-
     #[test]
-    fn groups_contain_objects_before_them_and_none_twice() {
+    fn objects_are_in_groups_after_them_and_in_nothing_else() {
         let leaf = Kind::Counted { radius_m: 0.1, least: 4, most: 100 };
-        let impostors = [12, 0, 0, 0, 0, 0, 0, 0];
-        let group = |members| Kind::Group { radius_m: 1.0, members, groups: (0, 0), impostors };
-        let kinds = [leaf, leaf, group((0, 2)), leaf, group((1, 9)), group((usize::MAX, usize::MAX)), group((6, 3))];
-        let views: Vec<_> = kinds.into_iter().enumerate().map(|(id, kind)| object(id, kind)).collect();
+        let group = Kind::Group { radius_m: 1.0, impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
+        let given = [
+            (leaf, Some(2)),
+            (leaf, Some(2)),
+            (group, Some(4)),
+            (leaf, Some(4)),
+            (group, Some(4)),
+            (group, Some(usize::MAX)),
+            (group, Some(2)),
+            (leaf, Some(3)),
+        ];
+        let view = |(id, (kind, group)): (usize, (Kind, Option<usize>))| {
+            SizedView::of(ObjectView { group, ..ObjectView::plain(id as u32, kind) })
+        };
+        let views: Vec<_> = given.into_iter().enumerate().map(view).collect();
         let mut groups = Groups::default();
         groups.update(&views);
         assert_eq!(groups.all(), [2, 4, 5, 6]);
-        assert_eq!(groups.parent, [Some(2), Some(2), Some(4), Some(4), None, None, None]);
+        assert_eq!(groups.parent, [Some(2), Some(2), Some(4), Some(4), None, None, None, None]);
         assert!(groups.is_within(0, |group| group == 4) && !groups.is_within(4, |_| true));
     }
 }

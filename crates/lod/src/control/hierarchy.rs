@@ -155,28 +155,19 @@ mod tests {
 
     /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a separate mesh.
     fn rows() -> Vec<SizedView> {
-        let row = |first: usize| Kind::Group {
-            radius_m: 1.0,
-            members: (first, 4),
-            groups: (0, 0),
-            impostors: [12, 48, 0, 0, 0, 0, 0, 0],
-        };
+        let row = Kind::Group { radius_m: 1.0, impostors: [12, 48, 0, 0, 0, 0, 0, 0] };
         let mesh = |most| Kind::Counted { radius_m: 0.2, least: 16, most };
         let mut kinds = vec![mesh(900); 4];
-        kinds.push(row(0));
+        kinds.push(row);
         kinds.extend([mesh(300); 4]);
-        kinds.push(row(5));
-        kinds.push(Kind::Group {
-            radius_m: 3.0,
-            members: (0, 9),
-            groups: (9, 1),
-            impostors: [8, 16, 0, 0, 0, 0, 0, 0],
-        });
+        kinds.push(row);
+        kinds.push(Kind::Group { radius_m: 3.0, impostors: [8, 16, 0, 0, 0, 0, 0, 0] });
         kinds.push(mesh(900));
         let pixels = |at: usize| if at < 5 { 3000.0 } else { 700.0 };
         let view = |(at, kind)| ObjectView {
             range: ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) },
             pixels: pixels(at),
+            group: [4, 4, 4, 4, 10, 9, 9, 9, 9, 10].get(at).copied(),
             ..ObjectView::plain(at as u32, kind)
         };
         let views = kinds.into_iter().enumerate().map(view);
@@ -288,12 +279,8 @@ mod tests {
     /// The number of pictures that show each mesh: its own, its row's, that of both rows.
     fn covered(views: &[SizedView], levels: &[LevelDemand]) -> Vec<usize> {
         let of = |at: usize| {
-            let holds = |group: &usize| match views[*group].view.kind {
-                // of both rows the second row's own picture is not a mesh
-                Kind::Group { members: (first, count), .. } => (first..first + count).contains(&at),
-                _ => *group == at,
-            };
-            (0..views.len()).filter(holds).filter(|it| levels[*it].polygons > 0.0).count()
+            let around = std::iter::successors(Some(at), |it| views[*it].view.group);
+            around.filter(|it| levels[*it].polygons > 0.0).count()
         };
         (0..views.len()).filter(|at| !views[*at].view.is_group()).map(of).collect()
     }

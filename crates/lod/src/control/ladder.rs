@@ -296,7 +296,7 @@ mod tests {
 
     fn ladder(impostors: [u32; 8]) -> Ladder {
         let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-        let kind = Kind::Group { radius_m: 1.0, members: (0, 0), groups: (0, 0), impostors };
+        let kind = Kind::Group { radius_m: 1.0, impostors };
         let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
         let mut ladders = Ladders::default();
         ladders.update(&[SizedView::of(view)], true, &Prices::default(), &Sliders::default());

@@ -211,7 +211,7 @@ impl PictureControl {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
         let sliders = self.policy.sliders(self.sliders());
         self.ladders.update(&self.views, raised, &prices, &sliders);
-        self.groups.update(&self.views);
+        self.groups.update(if self.policy.chooses_groups() { &self.views } else { &[] });
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
         let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);

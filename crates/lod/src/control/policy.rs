@@ -94,6 +94,12 @@ impl Policy {
         !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
     }
 
+    /// Whether the policy chooses between a group's impostor and its members; for the others there are members alone.
+    #[must_use]
+    pub const fn chooses_groups(self) -> bool {
+        matches!(self, Self::Hierarchical | Self::HierarchicalFlat | Self::MacielShirley | Self::Adaptive)
+    }
+
     /// Whether the policy weighs levels by the benefit as it is printed (FS93, §5): accuracy by samples, motion and hysteresis by level.
     #[must_use]
     pub const fn has_printed_benefit(self) -> bool {

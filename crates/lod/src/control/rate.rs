@@ -38,6 +38,15 @@ pub struct RateLimits {
     pub share: f64,
 }
 
+/// The finest detail of an agent's simulation that makes a visible difference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VisibleDetail {
+    /// Its ε, metres, > 0; +∞ if nothing of the agent is seen.
+    pub eps_m: f64,
+    /// Length of its steps, simulated seconds, from 0, where every step is seen, to +∞.
+    pub dt_s: f64,
+}
+
 /// The requested step and spacing of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateDemand {
@@ -103,7 +112,7 @@ pub struct RateControl {
     aim: f64,
     /// z at the last change of the target for the agent's own load.
     own_target: f64,
-    /// The same of the finest ε that makes a visible difference, from 0.
+    /// The same of the finest detail that makes a visible difference, from 0.
     visible: f64,
     /// z of the last demand sent to the agent.
     sent: f64,
@@ -164,13 +173,14 @@ impl RateControl {
         self.limits.share
     }
 
-    /// Sets the finest ε that makes a visible difference, metres, > 0; +∞ if the agent is not seen. Until the next call no finer ε is
-    /// demanded; afterwards the agent returns to its own target.
-    pub fn set_plain(&mut self, eps_m: f64) {
-        if let Some((fine, _)) = self.limits.eps_m {
-            let seen = self.limits.work_power * ratio_ln(eps_m, fine);
-            self.visible = if eps_m == f64::INFINITY { self.eps_end } else { seen.min(self.eps_end) };
-        }
+    /// Sets what makes a visible difference. Until the next call nothing finer is demanded; afterwards the agent returns to its own target.
+    /// A longer step counts where the coarsest ε is fine enough.
+    pub fn set_visible(&mut self, detail: VisibleDetail) {
+        let RateLimits { dt_wanted_s, dt_max_s, work_power, .. } = self.limits;
+        let coarsened = |(fine, coarse): (f64, f64)| work_power * ratio_ln(detail.eps_m.min(coarse), fine);
+        let of_eps = self.limits.eps_m.map_or(0.0, coarsened).min(self.eps_end);
+        let of_dt = if of_eps < self.eps_end { 0.0 } else { ratio_ln(detail.dt_s.min(dt_max_s), dt_wanted_s) };
+        self.visible = (of_eps + of_dt).min(self.top);
     }
 
     /// The present target of z: by load, and by visibility.

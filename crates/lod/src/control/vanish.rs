@@ -1,7 +1,7 @@
 //! Objects that are left out where not even the coarsest of everything fits: "no polygons at all" (FS93, §3), as the last resort.
 //!
-//! In: ladders, a time. Out: which of the objects that may vanish are left out of this frame. Never here: objects of groups, for which an
-//! impostor stands. Theory: `docs/theory/budget.md`, section 3.
+//! In: ladders, a time. Out: which of the objects that may vanish are left out of this frame. Never here: objects of groups, where the policy
+//! may draw an impostor for them. Theory: `docs/theory/budget.md`, section 3.
 
 use super::groups::Groups;
 use super::query::FrameQuery;

@@ -56,10 +56,6 @@ pub enum Kind {
     Group {
         /// Radius of a bounding ball, metres, > 0.
         radius_m: f64,
-        /// Its members among the objects given with it, those of its groups included: the number of the first, and how many.
-        members: (usize, usize),
-        /// The groups in it, those within them included; given before it.
-        groups: (usize, usize),
         /// Triangles of its impostors, rising; 0 past the last.
         impostors: [u32; IMPOSTORS_MAX],
     },
@@ -72,6 +68,8 @@ pub struct ObjectView {
     pub id: AgentId,
     /// The kind of the object.
     pub kind: Kind,
+    /// The number of the group that it is in, among the objects given with it: a group comes after all that is in it.
+    pub group: Option<usize>,
     /// The pairs (ε, n) allowed for the picture. For a primitive only n counts; for a mesh with a free triangle count or a group, neither.
     pub range: ResolutionRange,
     /// The cheapest and the best shading allowed, equal if it is fixed.
@@ -135,6 +133,7 @@ impl ObjectView {
         Self {
             id: AgentId(id),
             kind,
+            group: None,
             range: ResolutionRange::fixed(metachron_core::Resolution { eps_m: 1.0, n: 0 }),
             shading: Default::default(),
             pixels: 100.0,

@@ -199,6 +199,7 @@ pub(super) mod tests {
             speed_px_s: 0.0,
             importance: 1.0,
             visible: true,
+            group: None,
             may_vanish: false,
         };
         let ball = Kind::Primitive { radius_m: 0.02, triangles: std::array::from_fn(|n| 48 << n) };

@@ -127,7 +127,7 @@ fn impostors_of_groups_are_not_counted_and_what_moves_is_counted_anew() {
     let ball = |id| Actor { id: AgentId(id), form: Form::Solid(Solid::Ball { radius_m: 0.1 }), appearance };
     let mut view = SceneView::new((0..4).map(ball).collect(), vec![]);
     view.set_cells(cells.unwrap());
-    view.set_impostors(1);
+    view.set_groups(&[vec![]]);
     let put = |view: &mut SceneView, id: u32, at: DVec3, steps: u64| {
         let body = Body::Rigid(RigidState { position: at, ..RigidState::default() });
         let time = SimTime::from_nanos(1_000_000 * steps);

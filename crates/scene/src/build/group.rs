@@ -1,15 +1,16 @@
-//! Reads the groups of a scene file: scenery, and groups of it, that may be drawn as one mesh.
+//! Reads the groups of a scene file: objects, and groups of them, that may be drawn as one mesh.
 //!
-//! In: `[[group]]` tables and all scenery. Out: groups, inner ones first, and the scenery reordered so that the members of a group are
+//! In: `[[group]]` tables and all objects. Out: groups, inner ones first, and the scenery reordered so that the members of a group are
 //! adjacent.
 //! Never here: the mesh that replaces them, and when it is drawn.
 
-use super::impostors::impostors;
+use super::impostors::{GroupMembers, impostors};
 use super::object::{NamedObject, Objects};
 use crate::check::{Checker, Place};
 use crate::format::GroupFile;
 use crate::source::Source;
-use metachron_world::Group;
+use metachron_core::AgentId;
+use metachron_world::{Group, Member};
 
 /// Most groups of a scene.
 const GROUPS_MAX: usize = 1000;
@@ -26,7 +27,11 @@ pub(crate) fn groups(
         c.wrong(&Place::new("", ""), "group", format_args!("has {} entries", files.len()), expected);
         return Vec::new();
     }
-    let mut owners = Owners { scenery: vec![None; objects.scenery.len()], groups: vec![None; files.len()] };
+    let mut owners = Owners {
+        scenery: vec![None; objects.scenery.len()],
+        agents: vec![None; objects.agents.len()],
+        groups: vec![None; files.len()],
+    };
     for (number, file) in files.iter().enumerate() {
         let place = group_place(number, file);
         if objects.names.is_known(&file.name) || files[..number].iter().any(|other| other.name == file.name) {
@@ -58,16 +63,20 @@ pub(crate) fn groups(
         let first = at - order[..at].iter().filter(|&&other| owners.is_within(other, number)).count();
         let members = before(first)..before(at + 1);
         let place = group_place(number, &files[number]);
-        if let Some((proxy, levels)) = impostors(c, &place, &files[number], &objects.scenery[members.clone()], source) {
-            made.push(Group { proxy, levels, members, groups: first..at });
+        let held = owners.agents_in(number, &objects.agents);
+        let of_group = GroupMembers { scenery: &objects.scenery[members.clone()], agents: &held };
+        if let Some((proxy, levels)) = impostors(c, &place, &files[number], &of_group, source) {
+            let agents: Vec<AgentId> = held.iter().map(|agent| agent.id).collect();
+            made.push(Group { proxy, levels, agents, members, groups: first..at });
         }
     }
     made
 }
 
-/// For every object of the scenery and for every group the group that it is in.
+/// For every object of the scenery, for every agent and for every group the group that it is in.
 struct Owners {
     scenery: Vec<Option<usize>>,
+    agents: Vec<Option<usize>>,
     groups: Vec<Option<usize>>,
 }
 
@@ -81,6 +90,12 @@ impl Owners {
     fn in_itself(&self) -> Option<usize> {
         let all = self.groups.len();
         (0..all).find(|group| self.around(*group).take(all).any(|outer| outer == *group))
+    }
+
+    /// The agents of a group and of those in it.
+    fn agents_in<'a>(&self, group: usize, agents: &'a [Member]) -> Vec<&'a Member> {
+        let is_in = |owner: &Option<usize>| owner.is_some_and(|inner| inner == group || self.is_within(inner, group));
+        agents.iter().zip(&self.agents).filter(|(_, owner)| is_in(owner)).map(|(agent, _)| agent).collect()
     }
 
     fn is_within(&self, inner: usize, outer: usize) -> bool {
@@ -111,25 +126,27 @@ fn group_place(number: usize, file: &GroupFile) -> Place {
 fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &Objects, owners: &mut Owners) {
     let place = &group_place(number, &files[number]);
     if files[number].members.is_empty() {
-        c.wrong(place, "members", "is empty", "expected names of meshes, trees and groups");
+        c.wrong(place, "members", "is empty", "expected names of objects and groups");
     }
     for (at, wanted) in files[number].members.iter().enumerate() {
         let key = format!("members.{at}");
-        let others = objects.names.only(|named| named != NamedObject::Scenery);
+        let others = objects.names.only(|named| matches!(named, NamedObject::Fixed | NamedObject::Synthetic(_)));
         if let Some(other) = others.into_iter().find(|name| is_meant(name, wanted)) {
-            let what = format_args!("names `{other}`, which is neither mesh nor tree");
-            let expected = "expected scenery and groups: simulated and fixed objects cannot be members of a group";
+            let what = format_args!("names `{other}`, which is fixed or never drawn");
+            let expected = "expected meshes, trees, groups, and simulated objects with a shape";
             return c.wrong(place, &key, what, expected);
         }
         let scenery = objects.scenery.iter().map(|it| &it.name).zip(&mut owners.scenery);
+        let agents = objects.agents.iter().map(|it| &it.name).zip(&mut owners.agents);
         // a pattern that many names match does not mean the group that has it
         let itself = &files[number].name;
         let groups = files.iter().map(|file| &file.name).zip(&mut owners.groups);
         let groups = groups.filter(|(name, _)| *name != itself || *name == wanted);
         let mut found = 0;
-        let vanishes =
-            |name: &str| objects.scenery.iter().any(|it| it.name == name && it.appearance.may_vanish == Some(true));
-        for (name, owner) in scenery.chain(groups).filter(|(name, _)| is_meant(name, wanted)) {
+        let scene_looks = || objects.scenery.iter().map(|it| (&it.name, &it.appearance));
+        let looks = || scene_looks().chain(objects.agents.iter().map(|it| (&it.name, &it.appearance)));
+        let vanishes = |name: &str| looks().any(|(known, look)| known == name && look.may_vanish == Some(true));
+        for (name, owner) in scenery.chain(agents).chain(groups).filter(|(name, _)| is_meant(name, wanted)) {
             if vanishes(name) {
                 let what = format_args!("names `{name}`, whose `may_vanish = true` has no effect in a group");
                 return c.wrong(
@@ -148,7 +165,8 @@ fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &
         }
         if found == 0 {
             let groups = files.iter().map(|file| file.name.as_str()).filter(|name| *name != itself);
-            let known = objects.names.only(|named| named == NamedObject::Scenery).chain(groups);
+            let drawn = |named| !matches!(named, NamedObject::Fixed | NamedObject::Synthetic(_));
+            let known = objects.names.only(drawn).chain(groups);
             c.reference(place, &key, wanted, known);
         }
     }
@@ -167,23 +185,34 @@ mod tests {
     use crate::{Source, load};
     use metachron_world::Scene;
 
-    /// The problems of a scene with a group of these members, a mesh `a1` and a falling ball `a2`; empty if there are none.
-    fn message(members: &str) -> String {
+    /// A scene of a mesh `a1`, a falling ball `a2` and a fixed ball `c`, and a group with these keys.
+    fn mixed(keys: &str) -> Result<Scene, String> {
+        let ball = |name: &str, more: &str| {
+            format!("[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n{more}\n")
+        };
         let text = format!(
-            "format = 1\n[[object]]\nname = \"a1\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n[[object]]\nname = \"a2\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n[[group]]\nname = \"g\"\nmembers = {members}\n"
+            "format = 1\n[[object]]\nname = \"a1\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n{}{}[[group]]\nname = \"g\"\n{keys}\n",
+            ball("a2", "position_m = [0, 0, 1]"),
+            ball("c", "fixed = true"),
         );
         let loaded = Source::memory("group", text.as_bytes()).and_then(|source| load(&source, &[]));
-        loaded.err().map_or(String::new(), |problems| format!("{problems:?}"))
+        loaded.map_err(|problems| format!("{problems:?}"))
     }
 
     #[test]
-    fn a_simulated_object_is_refused_as_a_group_member_by_name_and_by_star() {
-        assert_eq!(message("[\"a1\"]"), "");
-        for members in ["[\"a2\"]", "[\"a1\", \"a2\"]", "[\"a*\"]"] {
-            let message = message(members);
-            assert!(message.contains("names `a2`, which is neither mesh nor tree"), "{members}: {message}");
+    fn a_group_holds_simulated_objects_if_it_has_a_proxy_and_nothing_fixed() {
+        let proxy = "proxy = { generate = \"sphere\", triangles = 20 }";
+        for (members, agents) in [("[\"a1\"]", 0), ("[\"a2\"]", 1), ("[\"a*\"]", 1)] {
+            let scene = mixed(&format!("members = {members}\n{proxy}")).unwrap();
+            assert_eq!((scene.groups[0].agents.len(), scene.groups[0].levels.len()), (agents, 1), "{members}");
         }
-        assert!(message("[\"b*\"]").contains("does not exist"));
+        let message = mixed("members = [\"a*\"]").unwrap_err();
+        assert!(message.contains("`proxy` of group `g` is missing, and member `a2` is simulated"), "{message}");
+        let message = mixed(&format!("members = [\"a1\", \"c\"]\n{proxy}")).unwrap_err();
+        assert!(message.contains("names `c`, which is fixed or never drawn"), "{message}");
+        let message = mixed("members = [\"a1\"]\nproxy = { generate = \"sphere\", motion = { swing_m = [1, 0, 0] } }");
+        assert!(message.unwrap_err().contains("moves a proxy by itself"));
+        assert!(mixed("members = [\"b*\"]").unwrap_err().contains("does not exist"));
     }
 
     /// Four meshes and these groups of name and members.

@@ -1,6 +1,6 @@
 //! Builds the impostor of a group: one mesh, and the levels that it is cut to.
 //!
-//! In: a `[[group]]` table, the scenery that it names. Out: the mesh as scenery, and the triangles of each level.
+//! In: a `[[group]]` table, the objects that it names. Out: the mesh as scenery, and the triangles of each level.
 //! Never here: membership of groups, choice of the level drawn. Theory: `docs/theory/multiresolution.md`, section 2.
 
 use super::scenery::mesh_model;
@@ -9,21 +9,39 @@ use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Model, Placement, ProgressiveMesh, proxy};
-use metachron_world::{Appearance, GROUP_LEVELS_MAX, Scenery};
+use metachron_world::{Appearance, GROUP_LEVELS_MAX, Member, Scenery};
 use std::sync::Arc;
 
 /// By default the finest level has this share of its members' triangles, within these bounds.
 const SHARE: f64 = 0.05;
 const TRIANGLES: (u32, u32) = (12, 2000);
+/// Triangles of a simulated member in the mean colour of its group.
+const AGENT_TRIANGLES: f64 = 320.0;
 /// Each coarser level has this many times fewer triangles.
 const COARSER: u32 = 4;
+
+/// The objects of a group.
+pub(super) struct GroupMembers<'a> {
+    /// Meshes and trees.
+    pub(super) scenery: &'a [Scenery],
+    /// Simulated objects.
+    pub(super) agents: &'a [&'a Member],
+}
+
+impl GroupMembers<'_> {
+    /// Looks of all of them, each with its part in their mean: its triangles, or those of a ball of a simulated object.
+    fn appearances(&self) -> impl Iterator<Item = (&Appearance, f64)> {
+        let scenery = self.scenery.iter().map(|it| (&it.appearance, f64::from(it.model.range().1)));
+        scenery.chain(self.agents.iter().map(|it| (&it.appearance, AGENT_TRIANGLES)))
+    }
+}
 
 /// The mesh of a group and its levels; `None` where something is wrong, which is reported.
 pub(super) fn impostors(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: &GroupFile,
-    members: &[Scenery],
+    members: &GroupMembers<'_>,
     source: &Source,
 ) -> Option<(Scenery, Vec<u32>)> {
     let before = c.count();
@@ -31,7 +49,8 @@ pub(super) fn impostors(
     if let Some(levels) = wanted {
         check(c, place, levels);
     }
-    let first = members.first()?;
+    let (first, _) = members.appearances().next()?;
+    let first = *first;
     let (mesh, at) = match &file.proxy {
         Some(given) => {
             let (mesh, at) = mesh_model(c, &place.table("proxy"), given, source)?;
@@ -43,7 +62,12 @@ pub(super) fn impostors(
             (mesh, at)
         }
         None if c.count() > before => return None,
-        None => merged_mesh(c, place, members, wanted)?,
+        None if !members.agents.is_empty() => {
+            let what = format_args!("is missing, and member `{}` is simulated", members.agents[0].name);
+            c.wrong(place, "proxy", what, "expected a mesh, such as `proxy = { generate = \"sphere\" }`");
+            return None;
+        }
+        None => merged_mesh(c, place, members.scenery, wanted)?,
     };
     if c.count() > before {
         return None;
@@ -52,9 +76,10 @@ pub(super) fn impostors(
         Some(levels) => cuts(c, place, levels, &mesh)?,
         None => default_levels(&mesh),
     };
-    let importance = members.iter().map(|m| m.appearance.importance).fold(0.0, f64::max);
-    let appearance = Appearance { colour: mean_colour(members), importance, ..first.appearance };
-    Some((Scenery { name: file.name.clone(), model: Model::Mesh(mesh), at, appearance, texture: None }, levels))
+    let importance = members.appearances().map(|(look, _)| look.importance).fold(0.0, f64::max);
+    let appearance = Appearance { colour: mean_colour(members), importance, ..first };
+    let (name, model) = (file.name.clone(), Model::Mesh(mesh));
+    Some((Scenery { name, model, at, appearance, texture: None, motion: None }, levels))
 }
 
 /// Reports levels that are wrong whatever mesh they are cut from.
@@ -135,12 +160,11 @@ fn default_levels(mesh: &ProgressiveMesh) -> Vec<u32> {
 }
 
 /// Mean colour of the members, weighted by their triangles.
-fn mean_colour(members: &[Scenery]) -> [u8; 3] {
-    let weight = |m: &Scenery| f64::from(m.model.range().1);
-    let all: f64 = members.iter().map(weight).sum();
+fn mean_colour(members: &GroupMembers<'_>) -> [u8; 3] {
+    let all: f64 = members.appearances().map(|(_, weight)| weight).sum();
     std::array::from_fn(|i| {
-        (members.iter().map(|m| weight(m) * f64::from(m.appearance.colour[i])).sum::<f64>() / all.max(1.0)).round()
-            as u8
+        let sum: f64 = members.appearances().map(|(look, weight)| weight * f64::from(look.colour[i])).sum();
+        (sum / all.max(1.0)).round() as u8
     })
 }
 

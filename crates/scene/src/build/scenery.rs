@@ -8,13 +8,13 @@ use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
 use super::texture::Textures;
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, mesh};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, mesh};
 use crate::check::{Checker, Place, allowed};
-use crate::format::{GeneratorKind, MeshFile, Point, TreeFile, TreeLod};
+use crate::format::{GeneratorKind, MeshFile, MotionFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{
-    Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
+    Generator, Model, Motion, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
 };
 use metachron_world::kinds::Material;
 use metachron_world::{Appearance, Scenery};
@@ -29,6 +29,8 @@ const TREE_DEFAULT: (u32, u32) = (62, 240);
 const PIECES_MAX: f64 = 1e5;
 /// Leaves are less important than the trunk (RH05, §6 gives no number).
 const LEAVES_IMPORTANCE: f64 = 0.5;
+/// Default swings of a motion, Hz.
+const SWING_HZ: f64 = 0.1;
 /// Default colours.
 const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
@@ -73,6 +75,7 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
             scenery.extend(parts.iter().map(|(suffix, part)| Scenery {
                 name: format!("{name}{suffix}"),
                 at: Placement { position: part.at.position + copy.offset_m, ..part.at },
+                motion: part.motion.map(|motion| Motion { about_m: motion.about_m + copy.offset_m, ..motion }),
                 ..part.clone()
             }));
         }
@@ -92,6 +95,9 @@ pub(super) fn mesh_model(
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     if file.dome_m.is_some() {
         c.wrong(place, "dome_m", "makes many meshes of one proxy", "expected a single mesh");
+    }
+    if file.motion.is_some() {
+        c.wrong(place, "motion", "moves a proxy by itself", "expected a proxy without it: it moves as its group does");
     }
     mesh_of(c, place, file, &mut Meshes::new(source))
 }
@@ -235,8 +241,9 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
     }
     let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
     let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
-    let part =
-        |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&mesh)), at, appearance, texture: None };
+    let motion = file.motion.as_ref().map(|file| motion(c, &entry.place.table("motion"), file, at.position));
+    let model = Model::Mesh(Arc::clone(&mesh));
+    let part = |at| Scenery { name: String::new(), model: model.clone(), at, appearance, texture: None, motion };
     match dome {
         None => vec![(String::new(), part(at))],
         Some(radius_m) => {
@@ -245,6 +252,19 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
             in_bounds(c, &entry.place, "dome_m", scale, reach(&mesh));
             places.into_iter().enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect()
         }
+    }
+}
+
+/// The motion of a mesh about the origin of its axes.
+fn motion(c: &mut Checker<'_, '_>, place: &Place, file: &MotionFile, about_m: DVec3) -> Motion {
+    if file.swing_hz.is_some() && file.swing_m.is_none() {
+        c.wrong(place, "swing_hz", "has no effect alone", "expected `swing_m` beside it");
+    }
+    Motion {
+        about_m,
+        spin_rad_s: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
+        swing_m: point_or_zero(c, place, "swing_m", file.swing_m, POSITION_MAX_M),
+        swing_hz: c.optional(place, "swing_hz", file.swing_hz, &allowed(1e-4..=100.0, "Hz")).unwrap_or(SWING_HZ),
     }
 }
 
@@ -275,7 +295,7 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let bark = Appearance { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
     let at = placement(c, place, file.position_m, file.rotation_deg);
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
-    let part = |model, appearance| Scenery { name: String::new(), model, at, appearance, texture: None };
+    let part = |model, appearance| Scenery { name: String::new(), model, at, appearance, texture: None, motion: None };
     vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]
 }
 

@@ -28,7 +28,7 @@ pub use scene::{
     CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
     TargetFile, WorldFile,
 };
-pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
+pub use scenery::{GeneratorKind, GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};
 pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;

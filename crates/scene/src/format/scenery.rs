@@ -1,4 +1,4 @@
-//! `model = "mesh"` and `model = "tree"`: scenery that is drawn and never moves; and `[[group]]`, scenery drawn as one mesh from afar.
+//! `model = "mesh"` and `model = "tree"`: scenery that is only drawn; and `[[group]]`, objects drawn as one mesh from afar.
 
 use super::Point;
 use schemars::JsonSchema;
@@ -39,6 +39,20 @@ pub struct MeshFile {
     /// Makes a dome: 120 copies along the edges of a geodesic sphere of this radius, metres, 0.001 … 1e4, each spanning its edge from −1 to
     /// 1 on its z axis; their names are `NAME-0` … `NAME-119`. Not with `scale`, nor in a `proxy`.
     pub dome_m: Option<f64>,
+    /// How it moves, by itself and whatever is in its way. Not in a `proxy`, which moves as the members of its group do. Default: never.
+    pub motion: Option<MotionFile>,
+}
+
+/// The motion of a mesh: it turns about its own origin, which swings along a line.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionFile {
+    /// Angular velocity about the origin of the mesh's axes (of a dome: about its centre), rad/s, each −1e4 … 1e4. Default none.
+    pub spin_rad_s: Option<Point>,
+    /// Greatest offset of the swing, metres. At the start it is 0 and grows. Default none.
+    pub swing_m: Option<Point>,
+    /// Swings per second, Hz, 1e-4 … 100. Default 0.1.
+    pub swing_hz: Option<f64>,
 }
 
 /// A tree of boughs and leaves: two drawn objects, `NAME` and `NAME.leaves`, with levels from points and lines up to triangles.
@@ -69,18 +83,22 @@ pub struct TreeFile {
     pub rotation_deg: Option<Point>,
 }
 
-/// Meshes, trees and groups of them that may be drawn as one mesh instead, which has levels of its own.
+/// Objects that may be drawn as one mesh instead, which has levels of its own and moves as they do.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupFile {
     /// The group's name: unique among objects and groups.
     #[schemars(length(min = 1, max = 64))]
     pub name: String,
-    /// Names of its meshes, trees and groups; one that ends in `*` selects every name that begins with the part before it. Nothing is
-    /// in two groups, and no group in itself.
+    /// Names of its meshes, trees, simulated objects and groups; one that ends in `*` selects every name that begins with the part before
+    /// it. Nothing is in two groups, and no group in itself.
+    ///
+    /// While a group is drawn as one mesh, and its simulated members touch nothing outside it, they are simulated as finely and as often
+    /// as that mesh shows, within their `eps_m` and `dt_ms`.
     #[schemars(length(min = 1, max = 10_000))]
     pub members: Vec<String>,
-    /// The mesh that replaces all of them, reduced to `levels`. Default: one made of their own coarse meshes.
+    /// The mesh that replaces all of them where they are at the start, reduced to `levels`. Default: one made of their own coarse meshes; a
+    /// group with simulated members needs one.
     pub proxy: Option<MeshFile>,
     /// Triangles of the group's impostors, coarsest first: 1 to 8 rising numbers, each 1 … 100000, to which its mesh is reduced. The more
     /// time there is, the finer the impostor that is drawn, and past the finest its members. Default: the finest has a twentieth of the

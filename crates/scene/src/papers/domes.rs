@@ -1,7 +1,7 @@
 //! The domes of (MB97, §8): 8 spheres of 120 struts each, and a coarse sphere that replaces each from afar.
 //!
 //! In: nothing. Out: the scene's text. A strut has 4 to 24 triangles, so the cheapest picture without groups has the paper's 3840.
-//! In the paper domes spin and swing; here the camera circles them at a varying distance.
+//! As in the paper the domes turn about their own axes and swing towards the viewer and away; here the camera circles them too.
 
 use super::camera_path::{CameraPath, Stop, point};
 use super::head;
@@ -12,6 +12,10 @@ use std::f64::consts::TAU;
 const GRID: [u32; 2] = [2, 4];
 const APART_M: [f64; 2] = [5.0, 3.4];
 const FIRST_M: DVec3 = DVec3::new(-2.5, -5.1, 0.0);
+/// How fast the domes turn, rad/s, and how far and how often they swing along x, towards the first place of the camera and away.
+const SPIN_RAD_S: f64 = 0.5;
+const SWING_M: f64 = 2.0;
+const SWING_HZ: f64 = 0.125;
 /// Path of the camera: seconds of one turn, number of stops, mean distance and its amplitude, metres.
 const ROUND_S: f64 = 24.0;
 const STOPS: u32 = 36;
@@ -37,6 +41,7 @@ position_m = {}
 grid = [{x}, {y}, 1]
 spacing_m = [{:?}, {:?}, 0.0]
 colour = "#c7b58a"
+motion = {{ spin_rad_s = [0.0, 0.0, {SPIN_RAD_S:?}], swing_m = [{SWING_M:?}, 0.0, 0.0], swing_hz = {SWING_HZ:?} }}
 "##,
         point(FIRST_M),
         APART_M[0],

@@ -4,6 +4,7 @@
 
 use super::super::assemble;
 use super::super::cpu_budget::{FrameLoop, FramePeriod};
+use super::super::visible_resolution::Seen;
 use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
@@ -20,7 +21,8 @@ impl Session {
         self.scene_view.set_scale(self.control.render_scale());
         self.scene_view.set_shadows(self.control.shadows());
         self.survey(camera, size);
-        self.visible_resolution.update(started, self.scene_view.seen(), camera, size);
+        let of = Seen { actors: self.scene_view.seen(), levels: &self.levels, states: self.reader.newest() };
+        self.visible_resolution.update(started, of, camera, size);
         let culled = self.now();
         self.chosen.cull = culled.saturating_sub(started) + self.declared_cull();
         self.choose(started, size);
@@ -31,6 +33,23 @@ impl Session {
         self.chosen.select += chosen.saturating_sub(culled);
         self.chosen.build = self.world.now().saturating_sub(chosen);
         self.scene_view.picture()
+    }
+
+    /// Makes the picture of the last frame's levels as `camera` sees it, without what that frame did not see.
+    pub fn compose_levels(&mut self, camera: &Camera, size: Size, style: Style) -> &Picture {
+        let seen = |(view, level): (&ObjectView, &Level)| {
+            let triangles = if view.visible { level.triangles } else { 0 };
+            Level { triangles, ..*level }
+        };
+        let levels: Vec<Level> = self.views.iter().zip(&self.levels).map(seen).collect();
+        self.scene_view.survey(camera, size);
+        self.scene_view.compose(camera, &levels, style, None)
+    }
+
+    /// Makes the picture of the last frame's levels once more, after another camera had a look at them.
+    pub fn compose_again(&mut self, camera: &Camera, size: Size) {
+        self.survey(camera, size);
+        self.scene_view.compose(camera, &self.levels, Style::default(), None);
     }
 
     /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Returns the part of it from the
@@ -55,7 +74,8 @@ impl Session {
     /// Finds the objects seen by `camera`, with the pixels that they are drawn with.
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         self.scene_view.survey(camera, size.scaled(self.control.render_scale()));
-        assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), &self.scene);
+        let of = assemble::Grouped { scene: &self.scene, parents: &self.parents };
+        assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), of);
     }
 
     /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.

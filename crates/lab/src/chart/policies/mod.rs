@@ -18,6 +18,7 @@ pub(super) mod library;
 pub(super) mod live;
 mod machine;
 mod metrics;
+pub(super) mod plates;
 mod played;
 pub(super) mod rooms;
 pub(super) mod scanline;

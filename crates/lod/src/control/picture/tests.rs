@@ -220,7 +220,8 @@ fn an_object_out_of_view_takes_no_polygons_and_returns_at_once() {
 #[test]
 fn feedback_draws_the_members_of_a_group_as_themselves() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
-    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), groups: (0, 0), impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
+    let kind = Kind::Group { radius_m: 1.0, impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
+    run.objects[..6].iter_mut().for_each(|it| it.group = Some(6));
     run.objects.push(object(9, kind, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
     let mesh = Kind::Counted { radius_m: 0.1, least: 20, most: 50_000 };
     run.objects.push(object(7, mesh, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) }));

@@ -191,7 +191,7 @@ fn no_resolution_finer_than_visible_is_demanded_and_the_own_target_returns() {
         for (plain_m, eps_m) in
             [(0.015, 0.015), (f64::INFINITY, limits().eps_m.unwrap().1), (0.001, held.eps_m.unwrap())]
         {
-            agent.control.set_plain(plain_m);
+            agent.control.set_visible(VisibleDetail { eps_m: plain_m, dt_s: 0.0 });
             agent.run(1.0);
             let now = agent.now.eps_m.unwrap();
             assert!((now / eps_m - 1.0).abs() < 1e-9, "{full}: as fine as {plain_m} m can be seen, {now} for {eps_m}");
@@ -202,9 +202,31 @@ fn no_resolution_finer_than_visible_is_demanded_and_the_own_target_returns() {
 }
 
 #[test]
+fn steps_are_as_long_as_can_be_seen_once_the_coarsest_spacing_is_fine_enough() {
+    let mut agent = Agent::new(0.1 * PERIOD_S);
+    agent.run(20.0);
+    let held = agent.now;
+    let RateLimits { dt_wanted_s, dt_max_s, eps_m, .. } = limits();
+    let coarse_m = eps_m.unwrap().1;
+    for (seen_m, seen_s, dt_s) in [
+        (0.5 * coarse_m, 1.0, dt_wanted_s),
+        (coarse_m, 1.5 * dt_wanted_s, 1.5 * dt_wanted_s),
+        (f64::INFINITY, f64::INFINITY, dt_max_s),
+        (f64::INFINITY, 0.0, dt_wanted_s),
+    ] {
+        agent.control.set_visible(VisibleDetail { eps_m: seen_m, dt_s: seen_s });
+        agent.run(1.0);
+        assert!((agent.now.dt_s / dt_s - 1.0).abs() < 1e-9, "{seen_m} m, {seen_s} s: {:?}", agent.now);
+    }
+    agent.control.set_visible(VisibleDetail { eps_m: 1e-6, dt_s: 0.0 });
+    agent.run(20.0);
+    assert_eq!(agent.now, held);
+}
+
+#[test]
 fn a_late_agent_out_of_view_still_slows_down() {
     let mut agent = Agent::new(4.0 * PERIOD_S);
-    agent.control.set_plain(0.01);
+    agent.control.set_visible(VisibleDetail { eps_m: 0.01, dt_s: 0.0 });
     agent.run(20.0);
     assert!(agent.load() < 1.06 && agent.now.eps_m.unwrap() > 0.01, "{:?}", agent.now);
 }

@@ -7,7 +7,6 @@ pub(in super::super) mod held;
 pub(in super::super) mod prediction;
 mod rounds;
 pub(in super::super) mod traversal;
-pub(in super::super) mod views;
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::Figure;

@@ -3,6 +3,7 @@
 //! In: a scene, a policy, the source of times. Out: a row of [`Row`]. Never here: a model of a scene.
 
 mod row;
+pub(super) mod still;
 pub(super) mod walk;
 
 use super::super::figure::{Axis, Colour, Layer, Mark, Panel};

@@ -48,7 +48,7 @@ const PICTURES: usize = 5;
 const APART: usize = 10;
 /// Frames at the first place before the first that counts: they warm up pipelines, caches and prices; and that many where times are measured
 /// and scatter, which has to be known, or as many as there are of the path.
-const LEAD_IN: usize = 20;
+pub(super) const LEAD_IN: usize = 20;
 const MEASURED_LEAD_IN: usize = 100;
 /// A measured play is bounded: one of full detail, and one at the target, seconds; and fewest frames for all that. Places along the path are
 /// then fewer, and the same for all policies.
@@ -85,6 +85,12 @@ pub(in super::super) struct Shown<'a> {
     pub(in super::super) text: &'a str,
     /// Mean time of full detail over the target.
     pub(in super::super) times_over: f64,
+}
+
+impl<'a> Shown<'a> {
+    fn opening(&self) -> Opening<'a> {
+        Opening { name: self.name, text: self.text, changes: &[] }
+    }
 }
 
 /// Measures the row of a case.
@@ -138,7 +144,7 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
 
 /// As many of these frames as can be played in the time of a play.
 fn frames_in_time(shown: &Shown<'_>, frames: usize) -> anyhow::Result<usize> {
-    let (_, mut fly_through) = opened(shown.name, shown.text, Times::Measured)?;
+    let (_, mut fly_through) = opened(&shown.opening(), Times::Measured)?;
     fly_through.session().control().set_policy(Policy::Full);
     let mut sum_s = 0.0;
     for trial in 0..TRIALS {
@@ -153,7 +159,7 @@ fn frames_in_time(shown: &Shown<'_>, frames: usize) -> anyhow::Result<usize> {
 }
 
 fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow::Result<PlayedPath> {
-    let (adapter, mut fly_through) = opened(shown.name, shown.text, times)?;
+    let (adapter, mut fly_through) = opened(&shown.opening(), times)?;
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
@@ -210,7 +216,9 @@ pub(in super::super) fn predicted(
     asked: &[PathPoint],
     drawings: usize,
 ) -> anyhow::Result<(String, Vec<Predicted>)> {
-    let (adapter, mut fly_through) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
+    let text = paper.text(&Choices::default());
+    let (adapter, mut fly_through) =
+        opened(&Opening { name: paper.name(), text: &text, changes: &[] }, Times::Measured)?;
     fly_through.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
         fly_through.step(0.0)?;
@@ -232,16 +240,26 @@ pub(in super::super) fn predicted(
     Ok((adapter, pictures))
 }
 
-/// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
-fn opened(name: &str, text: &str, times: Times) -> anyhow::Result<(String, FlyThrough)> {
+/// A scene to be opened.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Opening<'a> {
+    pub(in super::super) name: &'a str,
+    pub(in super::super) text: &'a str,
+    /// Keys of the scene and their values instead.
+    pub(in super::super) changes: &'a [(&'static str, &'static str)],
+}
+
+/// Opens a scene before the first frame; also names the adapter that draws it.
+pub(super) fn opened(scene: &Opening<'_>, times: Times) -> anyhow::Result<(String, FlyThrough)> {
     let declared = if times == Times::Declared { DECLARED.as_slice() } else { &[] };
     // the policies of the papers are compared at one number of pixels
     let overrides: Vec<_> = [("target.render_scale", "1.0")]
         .iter()
         .chain(declared)
+        .chain(scene.changes)
         .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
         .collect();
-    let scene = load(&Source::memory(name, text.as_bytes())?, &overrides)?;
+    let scene = load(&Source::memory(scene.name, scene.text.as_bytes())?, &overrides)?;
     let gpu = match times {
         Times::Measured => Some(Gpu::headless()?),
         Times::Declared => Gpu::headless().ok(),
@@ -257,38 +275,4 @@ fn opened(name: &str, text: &str, times: Times) -> anyhow::Result<(String, FlyTh
         (None, _) => Drawing::Nothing,
     };
     Ok((adapter, FlyThrough::open(scene, drawing, SIZE)?))
-}
-
-/// One view of a scene after a policy has settled.
-pub(in super::super) struct Still {
-    pub(in super::super) adapter: String,
-    /// Median of the last frames.
-    pub(in super::super) frame_ms: f64,
-    pub(in super::super) triangles: u64,
-    pub(in super::super) picture: PictureFile,
-}
-
-/// A place on a scene's path, the target time of a frame, and the number of frames drawn there; the last half of them counts.
-#[derive(Debug, Clone, Copy)]
-pub(in super::super) struct StillRequest {
-    pub(in super::super) part: f64,
-    pub(in super::super) target_s: f64,
-    pub(in super::super) frames: usize,
-}
-
-/// Draws frames at one place of a scene's path.
-///
-/// # Errors
-/// Errors of the scene and of the adapter.
-pub(in super::super) fn still(paper: Paper, policy: &str, request: StillRequest) -> anyhow::Result<Still> {
-    let StillRequest { part, target_s, frames } = request;
-    let (adapter, mut fly_through) = opened(paper.name(), &paper.text(&Choices::default()), Times::Measured)?;
-    let control = fly_through.session().control();
-    control.set_target_hz(1.0 / target_s);
-    control.set_policy(Policy::named(policy).context("no such policy")?);
-    let mut records = (0..frames).map(|_| fly_through.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(frames / 2);
-    let triangles = records.last().map_or(0, |row| row.triangles);
-    records.sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
-    let frame_ms = records.get(records.len() / 2).context("no frames")?.frame_ms;
-    Ok(Still { adapter, frame_ms, triangles, picture: fly_through.picture()?.context("nothing draws")? })
 }

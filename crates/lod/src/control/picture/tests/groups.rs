@@ -9,9 +9,12 @@ const MEMBERS: usize = 15;
 /// Four groups of fifteen meshes, each farther than the one before; members first, then the groups.
 fn woods() -> Vec<ObjectView> {
     let sizes = [4000.0, 1000.0, 250.0, 60.0];
-    let members = (0..4 * MEMBERS).map(|i| mesh(i as u32, sizes[i / MEMBERS], 2000));
+    let members = (0..4 * MEMBERS).map(|i| {
+        let group = Some(4 * MEMBERS + i / MEMBERS);
+        ObjectView { group, ..mesh(i as u32, sizes[i / MEMBERS], 2000) }
+    });
     let group = |k: usize| {
-        let kind = Kind::Group { radius_m: 3.0, members: (k * MEMBERS, MEMBERS), groups: (0, 0), impostors: LEVELS };
+        let kind = Kind::Group { radius_m: 3.0, impostors: LEVELS };
         let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) };
         let pixels = 10.0 * sizes[k];
         ObjectView { pixels, ..object((4 * MEMBERS + k) as u32, kind, range) }
@@ -78,8 +81,9 @@ fn every_level_of_a_group_is_chosen_between_closed_and_open() {
 #[test]
 fn a_groups_level_rises_with_a_falling_price_and_skips_none() {
     // the last wood alone, and a mesh of fine steps that asks for all the time: by it the price falls smoothly
-    let mut views: Vec<_> = (0..MEMBERS).map(|i| mesh(i as u32, 250.0, 2000)).collect();
-    let kind = Kind::Group { radius_m: 3.0, members: (0, MEMBERS), groups: (0, 0), impostors: LEVELS };
+    let mut views: Vec<_> =
+        (0..MEMBERS).map(|i| ObjectView { group: Some(MEMBERS), ..mesh(i as u32, 250.0, 2000) }).collect();
+    let kind = Kind::Group { radius_m: 3.0, impostors: LEVELS };
     views.push(ObjectView { pixels: 2500.0, ..object(MEMBERS as u32, kind, views[0].range) });
     views.push(mesh(MEMBERS as u32 + 1, 3e5, 200_000));
     let level = |step: i32| {

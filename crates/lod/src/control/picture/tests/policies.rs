@@ -44,7 +44,8 @@ pub(super) fn mesh(id: u32, pixels: f64, most: u32) -> ObjectView {
 /// Meshes of all sizes, a tube, bodies, and a group of eight meshes.
 fn hall() -> Vec<ObjectView> {
     let mut all: Vec<_> = (0..40).map(|i| mesh(i, 40.0 * 1.2_f64.powi(i as i32), 2000 + 500 * i)).collect();
-    let group = Kind::Group { radius_m: 2.0, members: (0, 8), groups: (0, 0), impostors: [24, 0, 0, 0, 0, 0, 0, 0] };
+    let group = Kind::Group { radius_m: 2.0, impostors: [24, 0, 0, 0, 0, 0, 0, 0] };
+    all[..8].iter_mut().for_each(|it| it.group = Some(44));
     all.push(ObjectView { pixels: 2e4, ..tube(40) });
     all.extend((41..44).map(ball));
     all.push(object(44, group, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
@@ -71,13 +72,7 @@ fn frame(control: &mut PictureControl, views: &[ObjectView], times: f64) -> f64 
 
 /// Objects in view of which nothing is drawn: neither they nor a group of theirs.
 pub(super) fn holes(plan: &Plan, views: &[ObjectView]) -> usize {
-    let group = |at: usize| {
-        let of = |(g, view): (usize, &ObjectView)| match view.kind {
-            Kind::Group { members: (first, count), .. } if (first..first + count).contains(&at) => Some(g),
-            _ => None,
-        };
-        views.iter().enumerate().find_map(of)
-    };
+    let group = |at: usize| views[at].group;
     let drawn = |at: usize| plan.levels[at].polygons > 0.0;
     let is_group = |view: &ObjectView| matches!(view.kind, Kind::Group { .. });
     let bare = |at: &usize| !drawn(*at) && !group(*at).is_some_and(drawn);
@@ -354,7 +349,8 @@ proptest! {
         let shading = [stages, prices().of(Shading::Flat), stages, stages];
         control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), enlarge_s: at(5), shading, areas: None });
         let mut views: Vec<_> = (0..8).map(|i| if i % 2 == 0 { tube(i as u32) } else { mesh(i as u32, 1e3, 5000) }).collect();
-        let members = Kind::Group { radius_m: 1.0, members: (1, 3), groups: (0, 0), impostors: [0, 0, 0, 0, 0, 0, 0, 0] };
+        let members = Kind::Group { radius_m: 1.0, impostors: [0, 0, 0, 0, 0, 0, 0, 0] };
+        views[1..4].iter_mut().for_each(|it| it.group = Some(6));
         views[6].kind = members;
         for (i, view) in views.iter_mut().enumerate() {
             (view.pixels, view.distance_m, view.speed_px_s) = (at(5 * i), at(5 * i + 1), at(5 * i + 2));

@@ -45,6 +45,20 @@ fn a_frame_that_the_coarsest_do_not_fit_is_feasible_where_objects_may_vanish() {
 }
 
 #[test]
+fn members_of_a_group_vanish_where_the_policy_knows_no_groups_and_else_become_one() {
+    let mut views = crowd(0, true);
+    views[..1000].iter_mut().for_each(|it| it.group = Some(1001));
+    let impostor = Kind::Group { radius_m: 3.0, impostors: [20, 0, 0, 0, 0, 0, 0, 0] };
+    views.push(object(1001, impostor, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
+    for (policy, together) in [(Policy::Greedy, false), (Policy::Hierarchical, true), (Policy::Adaptive, true)] {
+        let mut control = control(policy, 100.0);
+        let plan = control.plan(&views);
+        assert_eq!((plan.promise.holes == 0, plan.levels[1001].polygons > 0.0), (together, together), "{policy:?}");
+        assert!(plan.promise.feasible, "{policy:?}");
+    }
+}
+
+#[test]
 fn what_may_vanish_is_drawn_where_there_is_time() {
     let views = crowd(0, true);
     for policy in WITH_NULL {
