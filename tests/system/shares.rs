@@ -1,7 +1,8 @@
 //! What the time of a frame is shared among: steps and levels at one price, a bounded lag, quality beyond the finest.
 
 use crate::play::Folder;
-use metachron_render::{Camera, Size, Style};
+use metachron_lod::control;
+use metachron_render::{Camera, Shading, Size, Style};
 use metachron_scene::Source;
 use metachron_session::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
 use std::fmt::Write;
@@ -283,4 +284,45 @@ fn time_that_stays_unspent_goes_into_quality_where_the_scene_says_so() {
     let ends = [&plain, &raised].map(|outcome| outcome.frames[89].frame_ms);
     assert!(ends[1] > 1.2 * ends[0] && ends[1] <= plain.target_ms, "{ends:?}");
     assert_eq!(plain.frames[10].frame_ms, raised.frames[10].frame_ms, "not at once");
+}
+
+/// The library halfway along its path, drawn on the declared machine, with a frame and a pixel as they were measured with its shadings, at `frame_hz`: milliseconds of the 30th frame, how many of the objects
+/// in view that have a texture are drawn with it, of how many, and their triangles.
+fn library(policy: &str, frame_hz: f64) -> (f64, [u32; 2], f64) {
+    let set = [
+        ("executor", "\"lockstep\"".to_owned()),
+        ("target.policy", format!("\"{policy}\"")),
+        ("target.frame_hz", format!("{frame_hz:?}")),
+        ("target.render_scale", "[1.0, 1.0]".to_owned()),
+        ("machine.draw_setup_ms", "0.24".to_owned()),
+        ("machine.draw_pixel_ns", "4.8".to_owned()),
+    ];
+    let source = Source::open(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/library.toml")).expect("a built-in scene");
+    let scene = metachron_scene::load(&source, &set.map(|(key, value)| (key.to_owned(), value)));
+    let mut session = Session::open(scene.unwrap_or_else(|why| panic!("{:?}", why.problems))).expect("a scene");
+    let (camera, mut frame_ms) = (session.camera_at(3.0), 0.0);
+    for _ in 0..30 {
+        let started = session.now();
+        session.compose(&camera, SIZE, Style::default(), None);
+        let draw = session.spend_declared(SIZE);
+        let work = session.now() - started;
+        frame_ms = session.finish(started, Finished { work, draw, gpu: None, skip: false }).frame_ms;
+    }
+    let seen = session.views().iter().zip(session.levels()).filter(|(view, _)| view.visible && !view.is_group());
+    let textured: Vec<_> = seen.filter(|(view, _)| view.shading.1 == control::Shading::Textured).collect();
+    let with_it = textured.iter().filter(|(_, level)| level.shading == Shading::Textured).count() as u32;
+    let triangles = textured.iter().map(|(_, level)| f64::from(level.triangles)).sum();
+    (frame_ms, [with_it, textured.len() as u32], triangles)
+}
+
+#[test]
+fn textures_of_the_library_go_before_its_shapes_do_where_time_is_tighter() {
+    // (FS93, fig. 11): at the tighter target textures are gone and the triangles that remain are more than the fewest
+    let (full_ms, [all, of], _) = library("full", 30.0);
+    assert!(all == of && of > 100, "{all} of {of}");
+    let at = |times_over: f64| library("adaptive", 1e3 * times_over / full_ms);
+    let ((loose_ms, loose, _), (tight_ms, tight, triangles), (_, _, fewest)) = (at(2.0), at(3.0), at(5.0));
+    assert!(loose[0] == of && tight[0] == 0, "{loose:?} {tight:?}");
+    assert!(triangles > 1.2 * fewest, "{triangles} {fewest}");
+    assert!(2.0 * loose_ms <= full_ms && 3.0 * tight_ms <= full_ms, "{full_ms} {loose_ms} {tight_ms}");
 }

@@ -30,7 +30,7 @@ fn choose_levels(c: &mut Criterion) {
                 for id in 0..objects {
                     adaptive.weigh(id, 1.0 + ((id * 31 + frame * 7) % 997) as f64);
                 }
-                let plan = adaptive.choose(frame, Time { target, fixed: 0.0 });
+                let plan = adaptive.choose(frame, Time { target, fixed: 0.0, reserved: 0.0 });
                 adaptive.observe(frame, 0, plan.predicted);
                 plan.predicted
             });

@@ -28,7 +28,7 @@ fn main() {
                 adaptive.weigh(id, 1.0 + ((id * 31 + frame * 7) % 997) as f64);
             }
             let start = Instant::now();
-            let plan = adaptive.choose(frame, Time { target, fixed: 0.0 });
+            let plan = adaptive.choose(frame, Time { target, fixed: 0.0, reserved: 0.0 });
             times.push(start.elapsed().as_secs_f64() * 1e3);
             gap = gap.max(plan.gap());
             adaptive.observe(frame, 0, plan.predicted);

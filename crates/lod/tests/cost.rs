@@ -296,7 +296,7 @@ fn pairs_gain_the_product_of_their_accuracies() {
 
 /// A controller for the choice alone.
 fn bare() -> Adaptive {
-    Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, hysteresis: 0.0, dwell: 0, trim: false })
+    Adaptive::new(Settings { margin: 0.0, late: 1.0, hysteresis: 0.0, dwell: 0, trim: false })
 }
 
 /// Forty agents, each with five rates (stage 0) and five levels (stage 1): the joint budget, and each budget alone.
@@ -332,7 +332,7 @@ fn one_budget_for_simulation_and_drawing_is_better_than_two_halves() {
     for seed in 0..INSTANCES {
         let (mut both, mut simulate, mut draw, least, most) = joint(seed);
         let total = least + 0.15 * (most - least);
-        let time = |target| Time { target, fixed: 0.0 };
+        let time = |target| Time { target, fixed: 0.0, reserved: 0.0 };
         let base = both.choose(0, time(least)).value;
         let plan = both.choose(1, time(total));
         let gain = plan.upper - base;

@@ -88,7 +88,7 @@ impl Machine {
         }
     }
 
-    /// Two cores that also draw (Mesa): 1.4 ms + 0.22 µs per triangle + 6 ns per pixel.
+    /// Two cores that also draw (Mesa): 1.4 ms + 6 ns per pixel of the picture + what its objects take by their shading ([`SOFTWARE`]).
     #[must_use]
     pub fn two_cores_software() -> Self {
         Self {
@@ -102,12 +102,7 @@ impl Machine {
                 price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
-            draw: DrawPrice {
-                setup_ms: 1.4,
-                pixel_ns: 6.0,
-                enlarge_ns: 2.0,
-                objects: [price_of_objects(5.0, 0.22); 4],
-            },
+            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, enlarge_ns: 2.0, objects: SOFTWARE },
             graphics_card: false,
             choice_ns: (0.0, 0.0),
             noise_sd: 0.0,
@@ -130,7 +125,7 @@ impl Machine {
                 setup_ms: setup_ms / 20.0,
                 pixel_ns: pixel_ns / 20.0,
                 enlarge_ns: enlarge_ns / 20.0,
-                objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 4],
+                objects: SOFTWARE.map(|price| price.faster(20.0)),
             },
             graphics_card: true,
             ..base
@@ -209,8 +204,29 @@ const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
     StepPrice { model: Cow::Borrowed(model), base_us, unit_us }
 }
 
-const fn price_of_objects(setup_us: f64, triangle_us: f64) -> ObjectPrice {
-    ObjectPrice { setup_us, triangle_us, vertex_us: 0.0, pixel_ns: 0.0 }
+/// Objects by their shading on two cores with llvmpipe, as `metachron calibrate` measured them: flat, Gouraud, light at every pixel,
+/// textured.
+const SOFTWARE: [ObjectPrice; 4] = [
+    price_of_objects(0.20, 1.7),
+    price_of_objects(0.22, 4.0),
+    price_of_objects(0.22, 4.3),
+    price_of_objects(0.35, 9.9),
+];
+
+const fn price_of_objects(triangle_us: f64, pixel_ns: f64) -> ObjectPrice {
+    ObjectPrice { setup_us: 5.0, triangle_us, vertex_us: 0.0, pixel_ns }
+}
+
+impl ObjectPrice {
+    /// The price where drawing is so many times as fast.
+    fn faster(self, times: f64) -> Self {
+        Self {
+            setup_us: self.setup_us / times,
+            triangle_us: self.triangle_us / times,
+            vertex_us: self.vertex_us / times,
+            pixel_ns: self.pixel_ns / times,
+        }
+    }
 }
 
 /// The factor in force at a time.
@@ -328,6 +344,17 @@ mod tests {
         let machine = Machine { spikes: f64::NAN, ..Machine::default() };
         assert_eq!(machine.frame_time(f64::NAN, 0, Duration::ZERO), Duration::ZERO);
         assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);
+    }
+
+    #[test]
+    fn better_shading_is_never_cheaper() {
+        for name in PRESETS {
+            let objects = Machine::preset(name).expect("a preset").draw.objects;
+            for pair in objects.windows(2) {
+                let [worse, better] = [pair[0], pair[1]];
+                assert!(better.triangle_us >= worse.triangle_us && better.pixel_ns > worse.pixel_ns, "{name}");
+            }
+        }
     }
 
     #[test]

@@ -1,43 +1,16 @@
-//! When a choice may change: the miss ladder, the deadline, and the hysteresis of a still picture.
+//! When a choice may change: the deadline, the hysteresis of a still picture, and the trim.
 //!
-//! In: times of frames. Out: a margin, a verdict. Never here: a clock; the caller measures.
-//! Theory: `docs/theory/budget.md`, eq. 37 … 40.
+//! In: times of frames. Out: a verdict, a correction. Never here: a clock; the caller measures.
+//! Theory: `docs/theory/budget.md`, eq. 39, 40.
 
-/// A frame that exceeds T by more than this fraction is a miss that the ladder counts.
-const MISS: f64 = 0.10;
-/// This many in a row raise the margin …
-const MISSES: u8 = 2;
-/// … for this many frames.
-const RAISED_FRAMES: u8 = 30;
+/// A still picture is coarsened where it is predicted past its budget by as much as the least margin is worth: where that is the margin,
+/// past T.
+const PAST_BUDGET: f64 = 1.0 / (1.0 - super::DEFAULT_MARGIN);
 /// A still picture is refined where this fraction of T was to spare …
 const SPARE: f64 = 0.05;
 /// … this often in a row: initially about as long as it takes to see that a machine has calmed down; doubled after each time that the
 /// picture had to be coarsened, up to the greatest, some ten seconds.
 const SPARE_IN_A_ROW: (u16, u16) = (8, 512);
-
-/// Raises the margin for about half a second after two misses in a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct MissCounter {
-    misses: u8,
-    raised_frames: u8,
-}
-
-impl MissCounter {
-    /// Reports that a frame took `part` of its time.
-    pub fn observe(&mut self, part: f64) {
-        self.raised_frames = self.raised_frames.saturating_sub(1);
-        self.misses = if part > 1.0 + MISS { self.misses.saturating_add(1) } else { 0 };
-        if self.misses >= MISSES {
-            self.raised_frames = RAISED_FRAMES;
-        }
-    }
-
-    /// Number added to the σ in the margin: 1 while the margin is raised.
-    #[must_use]
-    pub fn extra_sigmas(&self) -> f64 {
-        if self.raised_frames > 0 { 1.0 } else { 0.0 }
-    }
-}
 
 /// Whether the rest of a frame must be drawn in its lowest forms: `elapsed` is past 85 % of `target`.
 ///
@@ -67,7 +40,7 @@ impl ChoiceHold {
     /// not everything is at its finest.
     pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
         self.spare = if can_rise && goal - predicted > SPARE { self.spare.saturating_add(1) } else { 0 };
-        let (late, rises) = (predicted > 1.0, self.spare >= self.patience);
+        let (late, rises) = (predicted > (PAST_BUDGET * goal).min(1.0), self.spare >= self.patience);
         if late {
             self.patience = (2 * self.patience).min(SPARE_IN_A_ROW.1);
         }

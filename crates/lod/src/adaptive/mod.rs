@@ -12,7 +12,7 @@
 //!     adaptive.set(id, 0, false, &[offer(100.0, 0.5), offer(400.0, 0.8), offer(2000.0, 1.0)]);
 //!     adaptive.weigh(id, 1000.0 / (1.0 + id as f64)); // the pixels it covers
 //! }
-//! let plan = adaptive.choose(0, Time { target: 50_000.0, fixed: 2_000.0 });
+//! let plan = adaptive.choose(0, Time { target: 50_000.0, fixed: 2_000.0, reserved: 0.0 });
 //! assert!(plan.feasible && plan.predicted <= 50_000.0);
 //! assert!(adaptive.level(0) > adaptive.level(99));
 //! adaptive.observe(0, 0, 1.1 * (plan.predicted - 2_000.0)); // measured
@@ -20,11 +20,13 @@
 
 mod hysteresis;
 pub mod joint;
+mod late_margin;
 mod options;
 mod pick;
 mod speed_estimator;
 
-pub use hysteresis::{MissCounter, Trim, is_late};
+pub use hysteresis::{Trim, is_late};
+pub use late_margin::{LATE, LATE_SHARE, LateMargin};
 pub use options::Offer;
 pub use speed_estimator::{FilterUpdate, SpeedEstimator};
 #[cfg(feature = "std")]
@@ -37,7 +39,7 @@ use pick::{Picker, Terms};
 
 /// The fraction of a frame that a policy with a prediction leaves free where a scene sets none.
 pub const DEFAULT_MARGIN: f64 = 0.02;
-/// The greatest margin, as a fraction of T.
+/// The greatest margin that may be asked for, as a fraction of T.
 pub const MARGIN_MAX: f64 = 0.5;
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
@@ -53,11 +55,11 @@ const EASING: f64 = 0.95;
 /// The settings of [`Adaptive`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The least margin, as a fraction of T; 0 … 0.5. If it is below the machine's noise, every other frame is late.
+    /// The least margin, as a fraction of T; 0 … 0.5.
     pub margin: f64,
-    /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. On a machine that errs by 5 %, 0.5 is late
-    /// by 5 % once in 400 frames and leaves 2 % of the time; 1.5 less than once in 1250, and leaves 4 %.
-    pub sigmas: f64,
+    /// The share of frames that may be late, 0 … 1: the margin is as large as the measured scatter requires for it. With 1 there is no
+    /// margin but the least; less than 1/128 is 1/128, for one slow frame is a hiccup.
+    pub late: f64,
     /// h: additional weight of a step that was taken in the last choice; 0 … 2. At 0 levels change visibly often; above 1 little is gained.
     pub hysteresis: f64,
     /// Frames after a change for which an object is reluctant to reverse it: one that fell may not rise, one that rose falls after others;
@@ -69,14 +71,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { margin: DEFAULT_MARGIN, sigmas: 0.5, hysteresis: 0.25, dwell: 8, trim: false }
+        Self { margin: DEFAULT_MARGIN, late: LATE_SHARE, hysteresis: 0.25, dwell: 8, trim: false }
     }
 }
 
 impl Settings {
     fn sound(self) -> Self {
-        let (margin, sigmas) = (crate::within(self.margin, 0.0, MARGIN_MAX), crate::within(self.sigmas, 0.0, 5.0));
-        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
+        let (margin, late) = (crate::within(self.margin, 0.0, MARGIN_MAX), crate::within(self.late, 0.0, 1.0));
+        Self { margin, late, hysteresis: crate::within(self.hysteresis, 0.0, 2.0), ..self }
     }
 }
 
@@ -87,6 +89,9 @@ pub struct Time {
     pub target: f64,
     /// Ticks spent before anything is chosen, ≥ 0.
     pub fixed: f64,
+    /// Ticks among `fixed` that the frame does not spend but leaves to others, 0 … `fixed`: a frame that takes longer than predicted takes
+    /// it from them before it is late.
+    pub reserved: f64,
 }
 
 /// A choice, with its predicted time and value.
@@ -122,6 +127,8 @@ struct Prediction {
     frame: u64,
     target: f64,
     table: [u64; STAGES],
+    /// Ticks of the whole frame by the table alone, without what is reserved for others.
+    whole: f64,
     usable: bool,
 }
 
@@ -134,9 +141,11 @@ pub struct Adaptive {
     estimators: [SpeedEstimator; STAGES],
     /// κ used in plans: follows the estimators up immediately and down slowly.
     kappa: [f64; STAGES],
-    misses: MissCounter,
+    late: LateMargin,
     hold: ChoiceHold,
     trim: Trim,
+    /// The fraction of T that the last choice left to others.
+    reserved: f64,
     predictions: [Option<Prediction>; IN_FLIGHT],
     unsettled: u8,
     plan: Plan,
@@ -149,15 +158,17 @@ impl Adaptive {
     /// A controller without measurements.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
+        let settings = settings.sound();
         Self {
-            settings: settings.sound(),
+            settings,
             options: Options::default(),
             picker: Picker::default(),
             estimators: [SpeedEstimator::default(); STAGES],
             kappa: [1.0; STAGES],
-            misses: MissCounter::default(),
+            late: LateMargin::new(settings.late),
             hold: ChoiceHold::default(),
             trim: Trim::default(),
+            reserved: 0.0,
             predictions: [None; IN_FLIGHT],
             unsettled: UNSETTLED,
             plan: Plan::default(),
@@ -187,6 +198,7 @@ impl Adaptive {
     /// Takes other settings from the next choice on.
     pub fn set_settings(&mut self, settings: Settings) {
         self.settings = settings.sound();
+        self.late.set_share(self.settings.late);
         self.chosen_for = None;
     }
 
@@ -197,6 +209,8 @@ impl Adaptive {
             (target, fixed) = (1.0, 1.0); // no time at all: everything at its lowest, reported as infeasible
         }
         fixed = if fixed > 0.0 { fixed } else { 0.0 };
+        let reserved = crate::within(time.reserved, 0.0, fixed);
+        self.reserved = reserved / target;
         for (planned, estimator) in self.kappa.iter_mut().zip(&self.estimators) {
             *planned = estimator.kappa().max(EASING * *planned);
         }
@@ -213,7 +227,9 @@ impl Adaptive {
         self.plan.budget = budget;
         let usable = self.unsettled == 0;
         self.unsettled = self.unsettled.saturating_sub(1);
-        self.predictions[frame as usize % IN_FLIGHT] = Some(Prediction { frame, target, table: self.table, usable });
+        let table = self.table;
+        let whole = fixed - reserved + table.iter().sum::<u64>() as f64;
+        self.predictions[frame as usize % IN_FLIGHT] = Some(Prediction { frame, target, table, whole, usable });
         self.plan
     }
 
@@ -227,12 +243,12 @@ impl Adaptive {
         }
     }
 
-    /// Reports the time that a whole frame took, ticks: for the miss ladder and the trim.
+    /// Reports the time that a whole frame took with its fixed part, without what was reserved, ticks: for the margin and the trim.
     pub fn finished(&mut self, frame: u64, took: f64) {
         match self.predictions[frame as usize % IN_FLIGHT] {
             Some(prediction) if prediction.frame == frame && prediction.usable && took.is_finite() => {
-                self.misses.observe(took / prediction.target);
-                let left_over = 1.0 - self.settings.margin - took / prediction.target;
+                self.late.observe(prediction.whole, took);
+                let left_over = 1.0 - self.margin() - took / prediction.target;
                 self.trim.observe(left_over, self.plan.lambda == 0.0);
             }
             _ => {}
@@ -243,6 +259,7 @@ impl Adaptive {
     pub fn disturb(&mut self) {
         self.unsettled = UNSETTLED;
         self.predictions = [None; IN_FLIGHT];
+        self.late.interrupt();
     }
 
     /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
@@ -270,12 +287,10 @@ impl Adaptive {
         self.kappa[stage.min(STAGES - 1)]
     }
 
-    /// The present margin, as a fraction of T.
+    /// The present margin, as a fraction of T: what the scatter requires, as far as it is not reserved for others, who may be made to wait.
     #[must_use]
     pub fn margin(&self) -> f64 {
-        let used = self.estimators.iter().zip(&self.table).filter(|(_, table)| **table > 0);
-        let sigma = used.map(|(estimator, _)| estimator.sigma()).fold(0.0, f64::max);
-        self.settings.margin.max((self.settings.sigmas + self.misses.extra_sigmas()) * sigma).min(MARGIN_MAX)
+        self.settings.margin.max(self.late.margin() - self.reserved)
     }
 
     fn cost(&self, terms: &Terms) -> f64 {

@@ -42,6 +42,7 @@ struct DrawnChoice {
     frame: u64,
     plan: Plan,
     fixed_s: f64,
+    reserve_s: f64,
 }
 
 /// The law and the objects given to it.
@@ -53,6 +54,7 @@ pub(super) struct AdaptiveChoice {
     group_choice: ImpostorChoice,
     offers: Vec<Offer>,
     fixed_s: f64,
+    reserve_s: f64,
     /// Number of the last frame chosen for, as the law counts them.
     frame: u64,
     plan: Plan,
@@ -71,6 +73,7 @@ impl Default for AdaptiveChoice {
             group_choice: ImpostorChoice::default(),
             offers: Vec::new(),
             fixed_s: 0.0,
+            reserve_s: 0.0,
             frame: 0,
             plan: Plan::default(),
             drawn: DrawnChoice::default(),
@@ -86,8 +89,9 @@ impl AdaptiveChoice {
         self.set_margin(query);
         self.group_choice.decide(query, groups, self.plan.lambda, self.kappa());
         self.update_objects(query, groups);
-        self.fixed_s = query.fixed_s;
-        let time = Time { target: TICKS * query.target_s, fixed: TICKS * query.fixed_s };
+        (self.fixed_s, self.reserve_s) = (query.fixed_s, query.reserve_s);
+        let [target, fixed, reserved] = [query.target_s, query.fixed_s, query.reserve_s].map(|s| TICKS * s);
+        let time = Time { target, fixed, reserved };
         self.frame += 1;
         self.plan = self.law.choose(self.frame, time);
         self.write_levels(query, levels);
@@ -97,15 +101,16 @@ impl AdaptiveChoice {
 
     /// Marks the last choice as the one being drawn.
     pub fn take_up(&mut self) {
-        self.drawn = DrawnChoice { frame: self.frame, plan: self.plan, fixed_s: self.fixed_s };
+        let Self { frame, plan, fixed_s, reserve_s, .. } = *self;
+        self.drawn = DrawnChoice { frame, plan, fixed_s, reserve_s };
     }
 
     /// Reports times of the frame that was drawn, seconds: `drawn_s` for drawing the choice, `work_s` in all, `others_s` reserved for
     /// others.
     pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) {
-        let DrawnChoice { frame, plan, fixed_s } = self.drawn;
+        let DrawnChoice { frame, plan, fixed_s, reserve_s } = self.drawn;
         self.law.observe(frame, DRAWING, TICKS * drawn_s);
-        self.law.finished(frame, TICKS * work_s);
+        self.law.finished(frame, TICKS * (work_s + (others_s - reserve_s).max(0.0)));
         let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
         let spent_s = plan.predicted / TICKS - fixed_s;
         let in_time = work_s <= (1.0 - self.margin()) * target_s;
@@ -133,9 +138,10 @@ impl AdaptiveChoice {
         self.law.planned_kappa(DRAWING)
     }
 
-    /// Gain of one more second, in the unit of the objects' gains; 0 where everything is at its finest.
+    /// Gain of one more second that others leave, in the unit of the objects' gains; 0 where everything is at its finest, or where the
+    /// scatter bounds the picture: it leaves more free than what is reserved, so that another reserve would change nothing.
     pub fn lambda(&self) -> f64 {
-        TICKS * self.plan.lambda
+        if self.margin() > self.settings.margin { 0.0 } else { TICKS * self.plan.lambda }
     }
 
     /// The fraction of the target that is left free now.

@@ -186,6 +186,7 @@ mod tests {
             choose_s: None,
             margin: 0.0,
             fixed_s: 0.0,
+            reserve_s: 0.0,
             spend_rest: false,
             out: &[],
         }

@@ -234,6 +234,7 @@ impl PictureControl {
             choose_s: split.map(|split| split.choose),
             margin: self.margin_now(),
             fixed_s: self.fixed_s,
+            reserve_s: self.reserve_s,
             spend_rest: self.raise.is_some(),
             out: &[],
         };
@@ -316,7 +317,7 @@ impl PictureControl {
     }
 
     /// Time that the default policy would take of a frame without competition, seconds, and the gain of one more second, pixels: 0 if it
-    /// has all it can use. `None` for policies without a price.
+    /// has all it can use, be it that what others leave is less than what the scatter of frames makes it leave free. `None` for policies without a price.
     #[must_use]
     pub fn wants(&self) -> Option<(f64, f64)> {
         if self.policy != Policy::Adaptive || self.plan.levels.is_empty() {

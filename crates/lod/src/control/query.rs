@@ -36,6 +36,8 @@ pub(super) struct FrameQuery<'a> {
     pub margin: f64,
     /// Time that is spent whatever is chosen, seconds, ≥ 0.
     pub fixed_s: f64,
+    /// Time in it that the frame does not spend but leaves to agents, seconds, ≥ 0.
+    pub reserve_s: f64,
     /// Whether Robin Hood shares once more what no object took.
     pub spend_rest: bool,
     /// Which objects are left out of this frame; empty for none.

@@ -212,7 +212,7 @@ impl Policy for AdaptivePolicy {
             self.adaptive.weigh(s.id, s.pixels);
         }
         self.present = now;
-        let plan = self.adaptive.choose(frame as u64, Time { target: TARGET, fixed: 0.0 });
+        let plan = self.adaptive.choose(frame as u64, Time { target: TARGET, fixed: 0.0, reserved: 0.0 });
         assert!(!plan.feasible || plan.predicted <= plan.budget || plan.held, "over the budget: {plan:?}");
         self.gaps.push(plan.gap());
         seen.iter().map(|s| self.adaptive.level(s.id)).collect()

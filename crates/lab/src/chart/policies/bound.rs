@@ -163,14 +163,14 @@ fn counter_example() -> Problem {
 
 /// Benefit of the default policy on a problem, without a margin for prediction errors; zero where it exceeds the budget.
 fn ours(problem: &Problem) -> u64 {
-    let mut adaptive = Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, ..Settings::default() });
+    let mut adaptive = Adaptive::new(Settings { margin: 0.0, late: 1.0, ..Settings::default() });
     let droppable = problem.mode() == Mode::AtMostOne;
     for object in 0..problem.len() {
         let offer = |e: &Entry| Offer { cost: e.cost as f64, gain: e.benefit as f64 };
         let offers: Vec<_> = problem.levels(object).iter().map(offer).collect();
         adaptive.set(object as u64, 0, droppable, &offers);
     }
-    adaptive.choose(0, Time { target: problem.budget() as f64, fixed: 0.0 });
+    adaptive.choose(0, Time { target: problem.budget() as f64, fixed: 0.0, reserved: 0.0 });
     let levels: Vec<_> = (0..problem.len()).map(|i| adaptive.level(i as u64)).collect();
     if problem.cost(&levels) > problem.budget() { 0 } else { problem.value(&levels) }
 }

@@ -138,7 +138,8 @@ fn ours(objects: usize) -> Vec<f64> {
     }
     let one = |frame: usize| {
         (0..objects).for_each(|id| _ = adaptive.weigh(id as u64, weight(id, frame)));
-        let (plan, took) = timed(|| adaptive.choose(frame as u64, Time { target: target(objects), fixed: 0.0 }));
+        let (plan, took) =
+            timed(|| adaptive.choose(frame as u64, Time { target: target(objects), fixed: 0.0, reserved: 0.0 }));
         adaptive.observe(frame as u64, 0, plan.predicted);
         took
     };

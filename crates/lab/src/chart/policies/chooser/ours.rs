@@ -27,7 +27,9 @@ impl Chooser for Ours {
     fn choose(&mut self, frame: u64, scene: &Scene, seen: &[VisibleObject], time: Time) -> Choice {
         self.update_objects(scene, seen);
         let fixed = time.target - time.drawing();
-        let plan = self.adaptive.choose(frame, adaptive::Time { target: TICKS * time.target, fixed: TICKS * fixed });
+        let plan = self
+            .adaptive
+            .choose(frame, adaptive::Time { target: TICKS * time.target, fixed: TICKS * fixed, reserved: 0.0 });
         let picks = seen.iter().map(|s| Pick::whole(self.adaptive.level(s.object as u64))).collect();
         Choice { picks, predicted: plan.predicted / TICKS, gap: plan.gap() }
     }
