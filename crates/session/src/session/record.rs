@@ -107,7 +107,7 @@ mod tests {
         let mut session = Session::open(scene).unwrap();
         let (camera, size) = (session.scene_camera(), Size { width: 200, height: 200 });
         session.begin();
-        let mut drawn = |session: &mut Session, milliseconds: u64| {
+        let drawn = |session: &mut Session, milliseconds: u64| {
             session.wait_until(Duration::from_millis(milliseconds));
             session.compose(&camera, size, Style::default(), None).skins.triangles.len()
         };
