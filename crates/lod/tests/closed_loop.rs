@@ -126,6 +126,7 @@ fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
         from_focus_m: 0.0,
         visible: true,
         may_vanish: false,
+        pieces: None,
     };
     let polygon_s = 0.6 / hz / start;
     let frame = |k: u32| {

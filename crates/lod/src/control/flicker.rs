@@ -67,6 +67,7 @@ mod tests {
             from_focus_m: 0.0,
             visible,
             may_vanish: false,
+            pieces: None,
         };
         let mut changes = Changes::default();
         let mut frame = |n, visible| {

@@ -200,6 +200,7 @@ pub(super) mod tests {
             importance: 1.0,
             visible: true,
             may_vanish: false,
+            pieces: None,
         };
         let ball = Kind::Primitive { radius_m: 0.02, triangles: std::array::from_fn(|n| 48 << n) };
         vec![

@@ -25,7 +25,7 @@ pub use joint::{JointFile, JointKind, MotorFile};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
-    TargetFile, WorldFile,
+    ShadingCostFile, TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
 pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
