@@ -224,7 +224,7 @@ const SOFTWARE: [ObjectPrice; 4] = [
 ];
 
 /// Objects drawn as points and as lines there.
-const SOFTWARE_STROKES: [ObjectPrice; 2] = [price_of_objects(0.20, 1.7), price_of_objects(0.20, 1.7)];
+const SOFTWARE_STROKES: [ObjectPrice; 2] = [price_of_objects(0.20, 0.7), price_of_objects(0.22, 1.2)];
 
 const fn price_of_objects(triangle_us: f64, pixel_ns: f64) -> ObjectPrice {
     ObjectPrice { setup_us: 5.0, triangle_us, vertex_us: 0.0, pixel_ns }
