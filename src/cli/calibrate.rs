@@ -8,7 +8,7 @@ use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message};
-use metachron_lod::control::{AREAS_PX, Prices, Shading, Stages};
+use metachron_lod::control::{AREAS_PX, Prices, Shading, Stages, Stroke};
 use metachron_render::Gpu;
 use metachron_session::calibrate::PriceTable;
 use std::fmt::Write;
@@ -48,6 +48,8 @@ fn table(args: &CalibrateArgs, gpu: &Gpu) -> anyhow::Result<PriceTable> {
 
 /// Names of the shadings that are priced.
 const SHADINGS: [&str; Shading::ALL.len()] = ["flat", "gouraud", "per-pixel", "textured"];
+/// Names of the strokes that are priced.
+const STROKES: [&str; Stroke::ALL.len()] = ["points", "lines"];
 
 fn text(table: &PriceTable) -> String {
     let PriceTable { adapter, prices, misses } = table;
@@ -65,8 +67,9 @@ fn text(table: &PriceTable) -> String {
         "pixel ns",
         "beside %"
     );
-    for (name, shading) in SHADINGS.into_iter().zip(Shading::ALL) {
-        let Stages { setup, polygon, vertex, pixel, serial } = prices.of(shading);
+    let shadings = SHADINGS.into_iter().zip(Shading::ALL.map(|shading| prices.of(shading)));
+    for (name, stages) in shadings.chain(STROKES.into_iter().zip(prices.strokes)) {
+        let Stages { setup, polygon, vertex, pixel, serial } = stages;
         let (setup_us, beside) = (1e6 * setup, 100.0 * (1.0 - serial));
         let [polygon, vertex, pixel] = [polygon, vertex, pixel].map(|seconds| 1e9 * seconds);
         let _ = writeln!(text, "{name:<10} {setup_us:>10.2} {polygon:>12.1} {vertex:>10.1} {pixel:>9.2} {beside:>9.0}");

@@ -72,6 +72,7 @@ fn stage() -> Vec<ObjectView> {
         visible: true,
         group: None,
         may_vanish: false,
+        pieces: None,
     };
     let tube = Kind::Tube { length_m: 1.6, radius_m: 0.015 };
     let mut stage = vec![object(0, tube, ResolutionRange { eps_m: (5e-4, 0.04), n: (0, 5) }, 1e9)];

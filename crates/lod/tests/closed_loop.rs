@@ -127,6 +127,7 @@ fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
         visible: true,
         group: None,
         may_vanish: false,
+        pieces: None,
     };
     let polygon_s = 0.6 / hz / start;
     let frame = |k: u32| {

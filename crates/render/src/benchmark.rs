@@ -15,7 +15,7 @@ use super::scene_view::{Actor, Appearance, Form, Material, SceneView, States};
 use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Resolution, SimTime};
-use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, generate};
+use metachron_geometry::{Generator, Model, Pattern, PieceKind, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -34,6 +34,8 @@ pub struct Drawn {
     pub pixels: f64,
     /// Shading of the objects.
     pub shading: Shading,
+    /// The pieces that are drawn as strokes instead of shaded triangles: leaves as points, boughs as lines.
+    pub strokes: Option<PieceKind>,
     /// Median of its drawing times, seconds.
     pub seconds: f64,
 }
@@ -64,6 +66,20 @@ const DRAWINGS: usize = 2;
 const ROUNDS: usize = 4;
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
+/// Equal trees of which the leaves are drawn as points, or the boughs as lines: triangles of each tree's strokes, and pixels that it covers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Trees {
+    kind: PieceKind,
+    triangles: u32,
+    pixels: f64,
+}
+
+/// Triangles of a tree's strokes, and the pixels that it covers: few of both, many of one, many of both.
+const STROKE_TRIANGLES: [u32; 3] = [16, 64, 256];
+const STROKE_PX: [f64; 3] = [500.0, 2e3, 17e3];
+/// The tree: as many leaves, and boughs, as there are triangles of the most strokes.
+const TREE: TreeSpec = TreeSpec { seed: 1, height_m: 2.0 * RADIUS_M, branches: 128, leaves: 256, prefix: false };
+
 /// Equal balls: shading, requested triangles and covered pixels of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Balls {
@@ -77,6 +93,7 @@ struct Balls {
 enum TestPicture {
     Empty(Size, f64),
     Balls(Balls),
+    Trees(Trees),
 }
 
 /// All pictures: balls whose triangles cover the least and the greatest area come first.
@@ -87,7 +104,12 @@ fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
         })
     };
     let empty = EMPTY.map(|size| (size, 1.0)).into_iter().chain([ENLARGED]);
-    empty.map(|(size, scale)| TestPicture::Empty(size, scale)).chain(ends_first(areas_px).flat_map(of)).collect()
+    let trees = [PieceKind::Leaf, PieceKind::Bough].into_iter().flat_map(|kind| {
+        let at = move |triangles| STROKE_PX.map(|pixels| TestPicture::Trees(Trees { kind, triangles, pixels }));
+        STROKE_TRIANGLES.into_iter().flat_map(at)
+    });
+    let balls = ends_first(areas_px).flat_map(of);
+    empty.map(|(size, scale)| TestPicture::Empty(size, scale)).chain(trees).chain(balls).collect()
 }
 
 /// The numbers below `count` in an order that depends on the round alone (Fisher and Yates; a multiplicative generator).
@@ -117,10 +139,14 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
         return Ok(Vec::new());
     };
     let ball = Arc::new(ball);
+    let trees = tree(&TREE).map(|foliage| Model::Foliage(Arc::new(foliage)));
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
     // shaders are compiled at their first use, which must not count as drawing time
     for shading in SHADINGS {
         measure(&mut screen, &ball, Balls { shading, triangles: TRIANGLES[0], pixels: SQUARES[0].1 })?;
+    }
+    for kind in [PieceKind::Leaf, PieceKind::Bough] {
+        measure_trees(&mut screen, &trees, Trees { kind, triangles: STROKE_TRIANGLES[0], pixels: STROKE_PX[0] })?;
     }
     let begun = Instant::now();
     let wanted: Vec<_> = test_pictures(areas_px).into_iter().skip(known).collect();
@@ -134,6 +160,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
             }
             let timed = match wanted[at] {
                 TestPicture::Balls(wanted) => measure(&mut screen, &ball, wanted)?,
+                TestPicture::Trees(wanted) => measure_trees(&mut screen, &trees, wanted)?,
                 TestPicture::Empty(size, scale) => {
                     screen = screen.resized(size)?;
                     let timed = empty(&mut screen, scale)?;
@@ -173,7 +200,8 @@ fn empty(screen: &mut Offscreen, scale: f64) -> Result<Timed, GpuError> {
     let times_s = times(screen, &mut nothing, 1.0, &[])?;
     let (shown, shading) = (screen.size(), Shading::PerPixel);
     let (picture_px, enlarged_px) = (shown.scaled(scale).pixels(), if scale < 1.0 { shown.pixels() } else { 0.0 });
-    let drawn = Drawn { picture_px, enlarged_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds: 0.0 };
+    let (objects, strokes) = (0, None);
+    let drawn = Drawn { picture_px, enlarged_px, objects, polygons: 0.0, pixels: 0.0, shading, strokes, seconds: 0.0 };
     Ok(Timed { drawn, times_s })
 }
 
@@ -200,8 +228,25 @@ fn measure(screen: &mut Offscreen, ball: &Arc<ProgressiveMesh>, wanted: Balls) -
     let times_s = times(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
     let pixels = seen_pixels(&mut scene_view, distance_m);
     let polygons = f64::from(cut);
-    let picture_px = SIZE.pixels();
-    let drawn = Drawn { picture_px, enlarged_px: 0.0, objects: side * side, polygons, pixels, shading, seconds: 0.0 };
+    let (picture_px, enlarged_px, objects, strokes) = (SIZE.pixels(), 0.0, side * side, None);
+    let drawn = Drawn { picture_px, enlarged_px, objects, polygons, pixels, shading, strokes, seconds: 0.0 };
+    Ok(Timed { drawn, times_s })
+}
+
+/// As [`measure`], of trees: `trees` has the boughs, then the leaves.
+fn measure_trees(screen: &mut Offscreen, trees: &[Model; 2], wanted: Trees) -> Result<Timed, GpuError> {
+    let Trees { kind, triangles, pixels } = wanted;
+    let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
+    let model = &trees[usize::from(kind == PieceKind::Leaf)];
+    // a tree's own height is a ball's width
+    let mut scene_view = square(side, |at| Placement { position: at, rotation: DQuat::IDENTITY, scale: 1.0 }, model);
+    let level = Level { shading: Shading::PerPixel, triangles, ..Resolution { eps_m: 1.0, n: 0 }.into() };
+    let distance_m = (seen_pixels(&mut scene_view, 1.0) / pixels).sqrt();
+    let times_s = times(screen, &mut scene_view, distance_m, &vec![level; (side * side) as usize])?;
+    let pixels = seen_pixels(&mut scene_view, distance_m);
+    let (picture_px, polygons, strokes) = (SIZE.pixels(), f64::from(triangles), Some(kind));
+    let (enlarged_px, objects, shading) = (0.0, side * side, Shading::PerPixel);
+    let drawn = Drawn { picture_px, enlarged_px, objects, polygons, pixels, shading, strokes, seconds: 0.0 };
     Ok(Timed { drawn, times_s })
 }
 
@@ -235,17 +280,22 @@ fn camera(distance_m: f64) -> Camera {
 
 /// A square of balls across the view, with or without a pattern on them.
 fn balls(ball: &Arc<ProgressiveMesh>, side: u32, painted: bool) -> SceneView {
-    let appearance = Appearance { colour: [200, 120, 100], material: Material::Plastic };
     let model = Model::Mesh(Arc::clone(ball));
-    let actor = |id| {
-        let at = Placement { position: place(id, side), rotation: DQuat::IDENTITY, scale: RADIUS_M };
-        Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), appearance }
-    };
-    let mut scene_view = SceneView::new((0..side * side).map(actor).collect(), Vec::new());
+    let mut scene_view =
+        square(side, |at| Placement { position: at, rotation: DQuat::IDENTITY, scale: RADIUS_M }, &model);
     if painted {
         let texture = Arc::new(Pattern::Checker.texture(RADIUS_M as f32));
         (0..side * side).for_each(|id| scene_view.paint(AgentId(id), &texture));
     }
+    scene_view.pose(SimTime::ZERO, States::Latest);
+    scene_view
+}
+
+/// A square of one model, each copy placed where it is told.
+fn square(side: u32, placed: impl Fn(DVec3) -> Placement, model: &Model) -> SceneView {
+    let appearance = Appearance { colour: [200, 120, 100], material: Material::Plastic };
+    let actor = |id| Actor { id: AgentId(id), form: Form::Scenery(model.clone(), placed(place(id, side))), appearance };
+    let mut scene_view = SceneView::new((0..side * side).map(actor).collect(), Vec::new());
     scene_view.pose(SimTime::ZERO, States::Latest);
     scene_view
 }
@@ -266,7 +316,8 @@ mod tests {
         let all = test_pictures(&areas);
         assert_eq!(all[..3], EMPTY.map(|size| TestPicture::Empty(size, 1.0)));
         assert_eq!(all[3], TestPicture::Empty(ENLARGED.0, ENLARGED.1));
-        assert!(all.len() > 20 && all[4..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
+        assert!(all.len() > 38 && all[4..22].iter().all(|wanted| matches!(wanted, TestPicture::Trees(..))));
+        assert!(all[22..].iter().all(|wanted| matches!(wanted, TestPicture::Balls(..))));
         assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
     }
 

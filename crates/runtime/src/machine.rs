@@ -56,6 +56,8 @@ pub struct DrawPrice {
     pub enlarge_ns: f64,
     /// Price of objects by their shading: flat, Gouraud, light at every pixel, textured.
     pub objects: [ObjectPrice; 4],
+    /// Price of objects drawn as strokes: points, lines.
+    pub strokes: [ObjectPrice; 2],
 }
 
 /// Price of an object: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
@@ -88,7 +90,8 @@ impl Machine {
         }
     }
 
-    /// Two cores that also draw (Mesa): 1.4 ms + 6 ns per pixel of the picture + what its objects take by their shading ([`SOFTWARE`]).
+    /// Two cores that also draw (Mesa): 1.4 ms + 6 ns per pixel of the picture + what its objects take by their shading: a triangle 0.20 to 0.35 µs, a
+    /// pixel of an object 1.7 to 9.9 ns.
     #[must_use]
     pub fn two_cores_software() -> Self {
         Self {
@@ -102,7 +105,13 @@ impl Machine {
                 price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
-            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, enlarge_ns: 2.0, objects: SOFTWARE },
+            draw: DrawPrice {
+                setup_ms: 1.4,
+                pixel_ns: 6.0,
+                enlarge_ns: 2.0,
+                objects: SOFTWARE,
+                strokes: SOFTWARE_STROKES,
+            },
             graphics_card: false,
             choice_ns: (0.0, 0.0),
             noise_sd: 0.0,
@@ -126,6 +135,7 @@ impl Machine {
                 pixel_ns: pixel_ns / 20.0,
                 enlarge_ns: enlarge_ns / 20.0,
                 objects: SOFTWARE.map(|price| price.faster(20.0)),
+                strokes: SOFTWARE_STROKES.map(|price| price.faster(20.0)),
             },
             graphics_card: true,
             ..base
@@ -212,6 +222,9 @@ const SOFTWARE: [ObjectPrice; 4] = [
     price_of_objects(0.22, 4.3),
     price_of_objects(0.35, 9.9),
 ];
+
+/// Objects drawn as points and as lines there.
+const SOFTWARE_STROKES: [ObjectPrice; 2] = [price_of_objects(0.20, 0.7), price_of_objects(0.22, 1.2)];
 
 const fn price_of_objects(triangle_us: f64, pixel_ns: f64) -> ObjectPrice {
     ObjectPrice { setup_us: 5.0, triangle_us, vertex_us: 0.0, pixel_ns }

@@ -14,7 +14,13 @@ const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
 fn machine() -> Machine {
     let price = StepPrice { model: "rigid".into(), base_us: 1.0, unit_us: 0.0 };
-    let draw = DrawPrice { setup_ms: 0.0, pixel_ns: 0.0, enlarge_ns: 0.0, objects: Default::default() };
+    let draw = DrawPrice {
+        setup_ms: 0.0,
+        pixel_ns: 0.0,
+        enlarge_ns: 0.0,
+        objects: Default::default(),
+        strokes: Default::default(),
+    };
     Machine { cores: 4, steps: vec![price], draw, ..Machine::default() }
 }
 

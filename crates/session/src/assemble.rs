@@ -9,10 +9,11 @@ use super::error_control::ErrorStatus;
 use super::governor::{ErrorGovernor, RateGovernor};
 use glam::DVec3;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
+use metachron_geometry::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices,
-    RateControl, RateDemand, RateLimits, Stages, Value,
+    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PictureControl, Pieces, Policy,
+    Prices, RateControl, RateDemand, RateLimits, Stages, Stroke, Value,
 };
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
@@ -232,6 +233,7 @@ pub fn prices(draw: &DrawPrice) -> Prices {
         pixel_s: draw.pixel_ns * 1e-9,
         enlarge_s: draw.enlarge_ns * 1e-9,
         shading: draw.objects.each_ref().map(object),
+        strokes: draw.strokes.each_ref().map(object),
         areas: None,
     }
 }
@@ -294,12 +296,27 @@ fn view_and_appearance<'a>(
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
         let kind = Kind::Counted { radius_m: seen.radius_m, least, most };
-        return (still_view(seen, it, kind), &it.appearance);
+        let view = ObjectView { pieces: pieces(&it.model), ..still_view(seen, it, kind) };
+        return (view, &it.appearance);
     }
     let group = &scene.groups[at - agents - members];
     let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
     let kind = Kind::Group { radius_m: seen.radius_m, impostors };
     (still_view(seen, &group.proxy, kind), &group.proxy.appearance)
+}
+
+/// The pieces of foliage that may be drawn as strokes.
+fn pieces(model: &Model) -> Option<Pieces> {
+    let Model::Foliage(foliage) = model else { return None };
+    if foliage.full_only() {
+        return None;
+    }
+    let stroke = match foliage.kind() {
+        PieceKind::Leaf => Stroke::Point,
+        PieceKind::Bough => Stroke::Line,
+    };
+    let [least, full] = [foliage.kind().stroke_triangles(), foliage.kind().full_triangles()];
+    Some(Pieces { stroke, count: foliage.strokes().len() as u32, least, full })
 }
 
 fn still_view(seen: &Visibility, it: &Scenery, kind: Kind) -> ObjectView {
@@ -352,6 +369,7 @@ fn view_of(
         from_focus_m: seen.from_focus_m,
         visible: seen.visible,
         may_vanish: false,
+        pieces: None,
     }
 }
 

@@ -3,14 +3,15 @@
 //! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the renderer has it).
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
-use metachron_lod::control::{AREAS_PX, Areas, Measured, Misses, Prices, Shading, Stages};
+use metachron_geometry::PieceKind;
+use metachron_lod::control::{AREAS_PX, Areas, Measured, Misses, Prices, Shading, Stages, Stroke};
 use metachron_render::{Drawn, Gpu, GpuError, RendererOptions};
 use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Version of the cache files; changes whenever the benchmark or the renderer that it measures changes.
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 
 /// Kinds of cache files: finished prices, and measured pictures that are still too few for prices.
 const DRAWING: &str = "drawing";
@@ -34,6 +35,8 @@ struct CachedPrices {
     enlarge_s: f64,
     /// Per shading: setup, polygon, vertex, pixel, and the part of the faster stage that shows.
     shading: [[f64; 5]; 4],
+    /// The same of points and of lines.
+    strokes: [[f64; 5]; 2],
     /// Per shading, by area: setup, and a triangle at each of [`AREAS_PX`].
     areas: Option<[(f64, [f64; AREAS_PX.len()]); 4]>,
 }
@@ -43,8 +46,9 @@ struct CachedPrices {
 struct PartialBenchmark {
     version: u32,
     adapter: String,
-    /// Pixels of the picture, pixels that it was enlarged to, objects, polygons, pixels, number of the shading, seconds.
-    pictures: Vec<[f64; 7]>,
+    /// Pixels of the picture, pixels that it was enlarged to, objects, polygons, pixels, number of the shading, number of the stroke from 1 on
+    /// or 0 for none, seconds.
+    pictures: Vec<[f64; 8]>,
 }
 
 /// What drawing costs on an adapter, and how well that is known.
@@ -228,8 +232,12 @@ fn measured(drawn: &Drawn) -> Measured {
         // the benchmark draws no soft shadows
         metachron_render::Shading::Textured | metachron_render::Shading::Shadowed => Shading::Textured,
     };
+    let stroke = drawn.strokes.map(|kind| match kind {
+        PieceKind::Leaf => Stroke::Point,
+        PieceKind::Bough => Stroke::Line,
+    });
     let Drawn { picture_px, enlarged_px, polygons, pixels, seconds, .. } = *drawn;
-    Measured { picture_px, enlarged_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }
+    Measured { picture_px, enlarged_px, objects: f64::from(drawn.objects), polygons, pixels, shading, stroke, seconds }
 }
 
 /// The cache folder of this user.
@@ -258,10 +266,11 @@ impl CachedPrices {
     fn of(table: &PriceTable) -> Self {
         let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel, s.serial];
         let PriceTable { adapter, misses: Misses { half, most }, prices } = table;
-        let Prices { frame_s, pixel_s, enlarge_s, shading, areas } = *prices;
+        let Prices { frame_s, pixel_s, enlarge_s, shading, strokes, areas } = *prices;
         let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
-        let (adapter, misses, shading) = (adapter.clone(), [*half, *most], shading.map(stages));
-        Self { version: VERSION, adapter, misses, frame_s, pixel_s, enlarge_s, shading, areas }
+        let (adapter, misses) = (adapter.clone(), [*half, *most]);
+        let (shading, strokes) = (shading.map(stages), strokes.map(stages));
+        Self { version: VERSION, adapter, misses, frame_s, pixel_s, enlarge_s, shading, strokes, areas }
     }
 
     /// The table, unless a number of it cannot be.
@@ -271,7 +280,8 @@ impl CachedPrices {
         let stages =
             |[setup, polygon, vertex, pixel, serial]: [f64; 5]| Stages { setup, polygon, vertex, pixel, serial };
         let areas = self.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
-        let prices = Prices { frame_s, pixel_s, enlarge_s, shading: self.shading.map(stages), areas };
+        let (shading, strokes) = (self.shading.map(stages), self.strokes.map(stages));
+        let prices = Prices { frame_s, pixel_s, enlarge_s, shading, strokes, areas };
         Ok(PriceTable { adapter: self.adapter, prices, misses: Misses { half, most } })
     }
 
@@ -288,12 +298,14 @@ impl CachedPrices {
         for (k, miss) in self.misses.into_iter().enumerate() {
             not_negative(format!("misses[{k}]"), miss)?;
         }
-        for (at, stages) in self.shading.iter().enumerate() {
+        let shadings = self.shading.iter().enumerate().map(|(at, stages)| (format!("shading[{at}]"), stages));
+        let strokes = self.strokes.iter().enumerate().map(|(at, stages)| (format!("strokes[{at}]"), stages));
+        for (at, stages) in shadings.chain(strokes) {
             for (k, number) in stages.iter().enumerate() {
-                not_negative(format!("shading[{at}][{k}]"), *number)?;
+                not_negative(format!("{at}[{k}]"), *number)?;
             }
             if stages[4] > 1.0 {
-                return bad(format!("shading[{at}][4]"), stages[4], "a part, 0 to 1");
+                return bad(format!("{at}[4]"), stages[4], "a part, 0 to 1");
             }
         }
         for (at, (setup, polygon)) in self.areas.iter().flatten().enumerate() {
@@ -313,11 +325,15 @@ impl CachedPrices {
 fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
     let text = std::fs::read(file(folder, adapter, PARTIAL)).unwrap_or_default();
     let Ok(partial) = serde_json::from_slice::<PartialBenchmark>(&text) else { return Vec::new() };
-    let picture = |[picture_px, enlarged_px, objects, polygons, pixels, shading, seconds]: [f64; 7]| {
+    let picture = |[picture_px, enlarged_px, objects, polygons, pixels, shading, stroke, seconds]: [f64; 8]| {
         let sound =
             [picture_px, enlarged_px, objects, polygons, pixels, seconds].iter().all(|x| x.is_finite() && *x >= 0.0);
         let shading = Shading::ALL.into_iter().find(|known| f64::from(*known as u8) == shading).filter(|_| sound)?;
-        Some(Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds })
+        let stroke = match Stroke::ALL.into_iter().find(|known| f64::from(*known as u8 + 1) == stroke) {
+            None if stroke != 0.0 => return None,
+            stroke => stroke,
+        };
+        Some(Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, stroke, seconds })
     };
     let ours = partial.version == VERSION && partial.adapter == adapter;
     partial.pictures.into_iter().map_while(picture).filter(|_| ours).collect()
@@ -325,8 +341,9 @@ fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
 
 fn store_partial(folder: Option<&Path>, adapter: &str, pictures: &[Measured]) -> Result<(), StoreError> {
     let row = |p: &Measured| {
-        let Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds } = *p;
-        [picture_px, enlarged_px, objects, polygons, pixels, f64::from(shading as u8), seconds]
+        let Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, stroke, seconds } = *p;
+        let stroke = stroke.map_or(0, |stroke| stroke as u8 + 1);
+        [picture_px, enlarged_px, objects, polygons, pixels, f64::from(shading as u8), f64::from(stroke), seconds]
     };
     let pictures = pictures.iter().map(row).collect();
     let partial = PartialBenchmark { version: VERSION, adapter: adapter.to_owned(), pictures };
@@ -371,9 +388,11 @@ mod tests {
             polygons: 32.0,
             pixels: 900.0,
             shading: Shading::Gouraud,
+            stroke: None,
             seconds,
         };
-        let pictures = [at(1e-3), Measured { shading: Shading::Textured, objects: 0.0, ..at(2e-3) }];
+        let textured = Measured { shading: Shading::Textured, objects: 0.0, ..at(2e-3) };
+        let pictures = [at(1e-3), textured, Measured { stroke: Some(Stroke::Line), ..at(3e-3) }];
         assert_eq!(read_partial(folder.path(), "one"), []);
         store_partial(Some(folder.path()), "one", &pictures).unwrap();
         assert_eq!(read_partial(folder.path(), "one"), pictures);
@@ -421,8 +440,12 @@ mod tests {
         assert_eq!(PriceTable::import(text.as_bytes(), "one"), Ok(table.clone()));
         let refused = |text: &str, adapter: &str| PriceTable::import(text.as_bytes(), adapter).unwrap_err().to_string();
         assert!(refused(&text, "two").contains("of the adapter `one`, pictures are drawn by `two`"));
-        let older = text.replace(&format!("\"version\": {VERSION}"), "\"version\": 3");
-        assert!(refused(&older, "one").contains("version 3"), "{}", refused(&older, "one"));
+        // a table of before points and lines had prices of their own: asked to be measured anew, not called malformed
+        let mut older: serde_json::Value = serde_json::from_str(&text).unwrap();
+        older["version"] = (VERSION - 1).into();
+        older.as_object_mut().unwrap().remove("strokes");
+        let said = refused(&older.to_string(), "one");
+        assert!(said.contains("version 6") && said.contains("--renew"), "{said}");
         let with = |change: &dyn Fn(&mut Prices)| {
             let mut table = table.clone();
             change(&mut table.prices);
@@ -431,6 +454,7 @@ mod tests {
         let least = "expected a finite number of at least 0";
         assert_eq!(with(&|prices| prices.frame_s = -0.0014), format!("`frame_s` is -0.0014, {least}"));
         assert_eq!(with(&|prices| prices.shading[2].pixel = -1.0), format!("`shading[2][3]` is -1, {least}"));
+        assert_eq!(with(&|prices| prices.strokes[1].pixel = -1.0), format!("`strokes[1][3]` is -1, {least}"));
         assert_eq!(with(&|prices| prices.shading[0].serial = 1.5), "`shading[0][4]` is 1.5, expected a part, 0 to 1");
         let first = |prices: &mut Prices, of: fn(&mut Areas)| prices.areas.iter_mut().flatten().take(1).for_each(of);
         assert_eq!(with(&|prices| first(prices, |a| a.setup = -1.0)), format!("`areas[0][0]` is -1, {least}"));

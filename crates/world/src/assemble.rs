@@ -166,7 +166,8 @@ pub fn machine(scene: &Scene) -> Machine {
     draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
     draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
     draw.enlarge_ns = wish.draw_enlarge_ns.unwrap_or(draw.enlarge_ns);
-    for (price, own) in draw.objects.iter_mut().zip(&wish.shading) {
+    let strokes = draw.strokes.iter_mut().zip(&wish.strokes);
+    for (price, own) in draw.objects.iter_mut().zip(&wish.shading).chain(strokes) {
         price.setup_us = own.object_us.or(wish.draw_object_us).unwrap_or(price.setup_us);
         price.triangle_us = own.triangle_us.or(wish.draw_triangle_us).unwrap_or(price.triangle_us);
         price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);

@@ -199,6 +199,8 @@ pub struct Machine {
     pub choose_object_ns: Option<f64>,
     /// Costs of objects by their shading: flat, Gouraud, per pixel, textured.
     pub shading: [ObjectCost; 4],
+    /// Costs of objects drawn as points, and as lines.
+    pub strokes: [ObjectCost; 2],
     /// Relative standard deviation of every cost, 0 … 1.
     pub noise: Option<f64>,
     /// Relative standard deviation of a slowly varying factor on the frame time, 0 … 1.

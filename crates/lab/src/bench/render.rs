@@ -7,6 +7,7 @@ use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::super::chart::table::Table;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
+use metachron_geometry::PieceKind;
 use metachron_lod::control::AREAS_PX;
 use metachron_render::{Drawn, Gpu, RendererOptions, Shading, benchmark};
 use serde::{Deserialize, Serialize};
@@ -64,10 +65,11 @@ impl Subject for Render {
         let drawn: Vec<&Row> = rows.iter().filter(|row| row.objects > 0).collect();
         let (low, high) = span(drawn.iter().map(|row| row.triangles), true);
         let (least, most) = span(drawn.iter().map(|row| row.picture_ms), true);
-        let layers = SHADINGS.into_iter().zip(Colour::LINES).map(|(shading, colour)| {
-            let here = drawn.iter().filter(|row| row.shading == name(shading));
+        let names = SHADINGS.map(name).into_iter().chain([POINTS, LINES]);
+        let layers = names.zip(Colour::LINES).map(|(name, colour)| {
+            let here = drawn.iter().filter(|row| row.shading == name);
             let points = here.map(|row| (row.triangles, row.picture_ms)).collect();
-            Layer { label: name(shading).to_owned(), colour, mark: Mark::Dots(points) }
+            Layer { label: name.to_owned(), colour, mark: Mark::Dots(points) }
         });
         let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms per picture", least, most));
         let title = rows.first().map_or_else(String::new, |row| row.adapter.clone());
@@ -77,6 +79,9 @@ impl Subject for Render {
 }
 
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
+/// Names of the strokes.
+const POINTS: &str = "points";
+const LINES: &str = "lines";
 
 const fn name(shading: Shading) -> &'static str {
     match shading {
@@ -88,6 +93,15 @@ const fn name(shading: Shading) -> &'static str {
     }
 }
 
+/// What the objects of a picture are drawn as.
+const fn drawn_as(drawn: &Drawn) -> &'static str {
+    match drawn.strokes {
+        Some(PieceKind::Leaf) => POINTS,
+        Some(PieceKind::Bough) => LINES,
+        None => name(drawn.shading),
+    }
+}
+
 fn row(adapter: &str, drawn: &Drawn) -> Row {
     let objects = f64::from(drawn.objects);
     let triangles = objects * drawn.polygons;
@@ -95,7 +109,7 @@ fn row(adapter: &str, drawn: &Drawn) -> Row {
         adapter: adapter.to_owned(),
         picture_px: drawn.picture_px,
         objects: drawn.objects,
-        shading: name(drawn.shading).to_owned(),
+        shading: drawn_as(drawn).to_owned(),
         triangles,
         pixels: objects * drawn.pixels,
         picture_ms: 1e3 * drawn.seconds,

@@ -17,7 +17,13 @@ fn free_machine() -> Machine {
     Machine {
         cores: 64,
         steps: ["tube", "rigid", "tool", "synthetic"].map(free).to_vec(),
-        draw: DrawPrice { setup_ms: 0.0, pixel_ns: 0.0, enlarge_ns: 0.0, objects: Default::default() },
+        draw: DrawPrice {
+            setup_ms: 0.0,
+            pixel_ns: 0.0,
+            enlarge_ns: 0.0,
+            objects: Default::default(),
+            strokes: Default::default(),
+        },
         ..Machine::default()
     }
 }

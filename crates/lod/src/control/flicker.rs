@@ -68,6 +68,7 @@ mod tests {
             visible,
             group: None,
             may_vanish: false,
+            pieces: None,
         };
         let mut changes = Changes::default();
         let mut frame = |n, visible| {

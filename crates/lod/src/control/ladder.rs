@@ -7,7 +7,7 @@ use super::benefit;
 use super::level::{Cut, LastCut, Span, open, polygons};
 use super::plan::SizedView;
 use super::price::Prices;
-use super::view::{Kind, ObjectView, Shading};
+use super::view::{Kind, ObjectView, Pieces, Shading};
 use crate::cost::benefit::Sliders;
 use crate::hysteresis;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange};
@@ -44,6 +44,7 @@ pub(super) struct Rung {
 struct Key {
     id: AgentId,
     kind: Kind,
+    pieces: Option<Pieces>,
     range: ResolutionRange,
     shading: (Shading, Shading),
     /// Pixels covered, in half octaves.
@@ -67,10 +68,11 @@ pub(super) struct CostLine {
 }
 
 impl CostLine {
-    fn of(prices: &Prices, shading: Shading, span: Span, pixels: f64) -> Self {
+    fn of(prices: &Prices, view: &ObjectView, span: Span, pixels: f64) -> Self {
+        let shading = view.shading.1;
         let from = prices.free_polygons(shading, pixels).clamp(span.least, span.full);
         let to = span.full.min(pixels).max(from + 1.0);
-        let [from_s, to_s] = [from, to].map(|polygons| prices.object_s(shading, polygons, pixels));
+        let [from_s, to_s] = [from, to].map(|polygons| prices.pieces_s(view.pieces, shading, polygons, pixels));
         Self { setup_s: prices.object_s(shading, 0.0, 0.0), from, from_s, polygon_s: (to_s - from_s) / (to - from) }
     }
 
@@ -166,7 +168,8 @@ impl Key {
     fn of(view: &ObjectView, steps: usize, raise: bool, before: Option<Self>) -> Self {
         let held = before.filter(|before| before.id == view.id).map(|before| before.size);
         let size = hysteresis::floor(held, 2.0 * libm::log2(benefit::pixels(view).max(1.0)));
-        Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps, raise }
+        let ObjectView { id, kind, pieces, range, shading, .. } = *view;
+        Self { id, kind, pieces, range, shading, size, steps, raise }
     }
 
     fn is_same(&self, other: &Self) -> bool {
@@ -180,6 +183,7 @@ impl Key {
             _ => false,
         };
         kinds
+            && self.pieces == other.pieces
             && (self.range, self.shading, self.size, self.steps, self.raise)
                 == (other.range, other.shading, other.size, other.steps, other.raise)
     }
@@ -217,8 +221,8 @@ impl Ladder {
         if key.raise {
             key.raise(view, &mut rungs, rung);
         }
-        let complexity_s = prices.object_s(view.shading.1, span.full, COMPLEXITY_PX);
-        let line = CostLine::of(prices, view.shading.1, *span, key.pixels());
+        let complexity_s = prices.pieces_s(view.pieces, view.shading.1, span.full, COMPLEXITY_PX);
+        let line = CostLine::of(prices, view, *span, key.pixels());
         Self { key, version, rungs, asked, complexity_s, line }
     }
 
@@ -286,7 +290,8 @@ impl Key {
         let pixels = self.pixels();
         let accuracy = benefit::accuracy(&self.kind, polygons, shading, self.shading.1, pixels);
         let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
-        Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
+        let cost_s = prices.pieces_s(self.pieces, shading, polygons, pixels);
+        Rung { resolution, polygons, shading, cost_s, accuracy: slid }
     }
 }
 

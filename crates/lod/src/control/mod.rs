@@ -45,4 +45,4 @@ pub use query::Promise;
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure, VisibleDetail};
 pub use status::Status;
 pub use tolerance::{ErrorControl, ErrorLimits, ErrorMeasure};
-pub use view::{Kind, ObjectView, Shading};
+pub use view::{Kind, ObjectView, Pieces, Shading, Stroke};

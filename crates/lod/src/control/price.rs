@@ -6,7 +6,7 @@
 
 use super::area::Areas;
 use super::plan::LevelDemand;
-use super::view::{ObjectView, Shading};
+use super::view::{ObjectView, Pieces, Shading, Stroke};
 use crate::cost::fit::{BETTER, SERIAL, Sample, fit, quantile};
 use crate::cost::stages::{Stages, Work};
 
@@ -27,7 +27,9 @@ pub struct Prices {
     pub enlarge_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
     pub shading: [Stages; 4],
-    /// The same by the area of its triangles, if that was measured: then it replaces the stages.
+    /// An object drawn as points, and one drawn as lines; its pixels are those of its strokes.
+    pub strokes: [Stages; Stroke::ALL.len()],
+    /// An object of each shading by the area of its triangles, if that was measured: then it replaces the stages.
     pub areas: Option<[Areas; 4]>,
 }
 
@@ -46,6 +48,8 @@ pub struct Measured {
     pub pixels: f64,
     /// How they are shaded.
     pub shading: Shading,
+    /// What they are drawn as instead of shaded triangles.
+    pub stroke: Option<Stroke>,
     /// Measured time of the picture.
     pub seconds: f64,
 }
@@ -74,7 +78,14 @@ impl Default for Prices {
     /// Two cores with Mesa, from one measurement: the assumption until better prices are known.
     fn default() -> Self {
         let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
-        Self { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
+        Self {
+            frame_s: 1.4e-3,
+            pixel_s: 6e-9,
+            enlarge_s: 2e-9,
+            shading: [object; 4],
+            strokes: [object; 2],
+            areas: None,
+        }
     }
 }
 
@@ -96,6 +107,7 @@ impl Prices {
             pixel_s: of(self.pixel_s, usual.pixel_s),
             enlarge_s: of(self.enlarge_s, usual.enlarge_s),
             shading: std::array::from_fn(|i| stages(self.shading[i], usual.shading[i])),
+            strokes: std::array::from_fn(|i| stages(self.strokes[i], usual.strokes[i])),
             areas: self.areas.filter(|areas| areas.iter().all(Areas::is_sound)),
         }
     }
@@ -113,11 +125,12 @@ impl Prices {
             return self;
         }
         let once = |s: Stages| Stages { polygon: 0.5 * s.polygon, vertex: 0.5 * s.vertex, ..s };
+        // points and lines throw none
         Self { shading: self.shading.map(once), areas: self.areas.map(|areas| areas.map(Areas::drawn_once)), ..self }
     }
 
-    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, one enlarged, and for each shading
-    /// eight pictures of objects.
+    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, one enlarged, and for each
+    /// shading, for points and for lines eight pictures of objects.
     #[must_use]
     pub fn fitted(pictures: &[Measured]) -> Option<Self> {
         let (enlarged, plain): (Vec<Measured>, Vec<Measured>) =
@@ -125,12 +138,15 @@ impl Prices {
         let (pixel_s, frame_s) = line(plain.iter().filter(|p| p.objects == 0.0).map(|p| (p.picture_px, p.seconds)))?;
         let enlarging = |p: &Measured| (p.seconds - frame_s - pixel_s * p.picture_px) / p.enlarged_px;
         let enlarge_s = enlarged.first().map(enlarging).filter(|s| s.is_finite())?.max(0.0);
-        let draws = |shading: Shading| {
-            let of = plain.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
+        let drawn_as = |stroke: Option<Stroke>, shading: Option<Shading>| {
+            let of = plain.iter().filter(move |p| p.objects > 0.0 && p.stroke == stroke);
+            let of = of.filter(move |p| shading.is_none_or(|shading| p.shading == shading));
             of.map(move |p| (p.polygons, p.pixels, (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects))
         };
         let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
+        let draws = |shading: Shading| drawn_as(None, Some(shading));
         let samples = Shading::ALL.map(|shading| draws(shading).map(sample).collect::<Vec<_>>());
+        let strokes = Stroke::ALL.map(|stroke| drawn_as(Some(stroke), None).map(sample).collect::<Vec<_>>());
         // whether stages work beside each other is the machine's, whatever the shading
         let fits = |serial: f64| {
             let [flat, gouraud, per_pixel, textured] = samples.each_ref().map(|of| fit(of, serial));
@@ -139,10 +155,12 @@ impl Prices {
         };
         let best = SERIAL.into_iter().filter_map(fits);
         let (_, shading) = best.reduce(|best, next| if next.0 < BETTER * best.0 { next } else { best })?;
+        let [points, lines] = strokes.each_ref().map(|of| fit(of, shading[0].serial));
+        let strokes = [points?.stages, lines?.stages];
         let [flat, gouraud, per_pixel, textured] =
             Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
         let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
-        Some(Self { frame_s, pixel_s, enlarge_s, shading, areas: areas() })
+        Some(Self { frame_s, pixel_s, enlarge_s, shading, strokes, areas: areas() })
     }
 
     /// How far these prices are from measured pictures.
@@ -157,7 +175,12 @@ impl Prices {
     #[must_use]
     pub fn predict_s(&self, picture: &Measured) -> f64 {
         let backdrop = Backdrop { pixels: picture.picture_px, enlarged: picture.enlarged_px, triangles: 0.0 };
-        self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
+        let Measured { shading, polygons, pixels, .. } = *picture;
+        let object_s = match picture.stroke {
+            Some(stroke) => self.stroke(stroke).time(work(polygons, pixels)),
+            None => self.object_s(shading, polygons, pixels),
+        };
+        self.backdrop_s(backdrop) + picture.objects * object_s
     }
 
     /// The coefficients of a shading; for [`Shading::Shadowed`] those of textured light with 2.5 times the time per pixel.
@@ -172,7 +195,30 @@ impl Prices {
         }
     }
 
-    /// Seconds of an object with `polygons` triangles that covers `pixels`.
+    /// The coefficients of an object drawn as strokes.
+    #[must_use]
+    pub fn stroke(&self, stroke: Stroke) -> Stages {
+        self.strokes[stroke as usize]
+    }
+
+    /// Seconds of an object with `polygons` triangles that covers `pixels`, by what its pieces are drawn as: strokes and pieces in full are two
+    /// draws, of which each covers the pixels of its share of the pieces.
+    #[must_use]
+    pub fn pieces_s(&self, pieces: Option<Pieces>, shading: Shading, polygons: f64, pixels: f64) -> f64 {
+        let Some(pieces) = pieces else { return self.object_s(shading, polygons, pixels) };
+        let parts = pieces.parts(polygons);
+        let strokes_s = match parts.strokes > 0.0 || parts.full <= 0.0 {
+            true => self.stroke(pieces.stroke).time(work(parts.strokes, parts.stroked * pixels)),
+            false => 0.0,
+        };
+        let full_s = match parts.full > 0.0 {
+            true => self.object_s(shading, parts.full, (1.0 - parts.stroked) * pixels),
+            false => 0.0,
+        };
+        strokes_s + full_s
+    }
+
+    /// Seconds of an object with `polygons` shaded triangles that covers `pixels`.
     #[must_use]
     pub fn object_s(&self, shading: Shading, polygons: f64, pixels: f64) -> f64 {
         match (&self.areas, shading) {
@@ -195,7 +241,9 @@ impl Prices {
     #[must_use]
     pub fn objects_s<'a>(&self, views: impl Iterator<Item = &'a ObjectView>, levels: &[LevelDemand]) -> f64 {
         let drawn = views.zip(levels).filter(|(view, level)| view.visible && level.polygons > 0.0);
-        drawn.map(|(view, level)| self.object_s(level.shading, level.polygons, view.pixels)).fold(0.0, |sum, s| sum + s)
+        drawn
+            .map(|(view, level)| self.pieces_s(view.pieces, level.shading, level.polygons, view.pixels))
+            .fold(0.0, |sum, s| sum + s)
     }
 
     /// Seconds of a picture's part that is independent of the choice.
@@ -239,8 +287,10 @@ mod tests {
                 let objects = if k % 10 == 0 { 0.0 } else { 36.0 };
                 let (polygons, pixels) = (10.0 * 400.0_f64.powf(random()), 10.0 * 500.0_f64.powf(random()));
                 let (picture_px, enlarged_px) = (1e5 + 9e5 * random(), if k == 0 { 2e6 } else { 0.0 });
+                // every fifth picture of points, every fifth of lines
+                let stroke = [Some(Stroke::Point), Some(Stroke::Line)].get(k % 5).copied().flatten();
                 let mut picture =
-                    Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, seconds: 0.0 };
+                    Measured { picture_px, enlarged_px, objects, polygons, pixels, shading, stroke, seconds: 0.0 };
                 let stall = if random() < 0.05 && objects > 0.0 { 1.6 } else { 1.0 };
                 picture.seconds = machine.predict_s(&picture) * stall * (1.0 + 0.06 * (random() - 0.5));
                 all.push(picture);
@@ -257,6 +307,7 @@ mod tests {
             pixel_s: 6e-9,
             enlarge_s: 2e-9,
             shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9), stages(0.3e-6, 55e-9)],
+            strokes: [stages(0.08e-6, 2e-9), stages(0.1e-6, 3e-9)],
             areas: None,
         };
         let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
@@ -280,7 +331,14 @@ mod tests {
     #[test]
     fn the_slower_stage_counts() {
         let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5, serial: 0.0 };
-        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, enlarge_s: 0.0, shading: [stages; 4], areas: None };
+        let prices = Prices {
+            frame_s: 0.0,
+            pixel_s: 0.0,
+            enlarge_s: 0.0,
+            shading: [stages; 4],
+            strokes: [stages; 2],
+            areas: None,
+        };
         // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 200.0), 101.0);

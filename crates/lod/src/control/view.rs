@@ -26,6 +26,57 @@ impl Shading {
     pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
 }
 
+/// The cheap form of the pieces of an object (RH05, §6).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// A point: the leaves of a tree.
+    Point,
+    /// A line: its boughs.
+    Line,
+}
+
+impl Stroke {
+    /// Both, in the order of their prices.
+    pub const ALL: [Self; 2] = [Self::Point, Self::Line];
+}
+
+/// The pieces of an object that are drawn as strokes where its triangles do not suffice for all of them in full: of n pieces p strokes up to
+/// p = n, past it p − n pieces in full and 2n − p strokes (RH05, §6.2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pieces {
+    /// What a piece is drawn as where it is not drawn in full.
+    pub stroke: Stroke,
+    /// How many there are, ≥ 1.
+    pub count: u32,
+    /// Triangles of a stroke, ≥ 1.
+    pub least: u32,
+    /// Triangles of a piece in full, > `least`.
+    pub full: u32,
+}
+
+/// An object's triangles by what they are drawn as.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Parts {
+    /// Triangles of the strokes.
+    pub strokes: f64,
+    /// Triangles of what is drawn in full.
+    pub full: f64,
+    /// The part of the pieces drawn that are strokes, 0 … 1.
+    pub stroked: f64,
+}
+
+impl Pieces {
+    /// What `polygons` triangles are drawn as.
+    pub(super) fn parts(&self, polygons: f64) -> Parts {
+        let [count, least, full] = [self.count.max(1), self.least.max(1), self.full.max(self.least + 1)].map(f64::from);
+        let in_full = ((polygons - least * count) / (full - least)).clamp(0.0, count);
+        let strokes = ((polygons - full * in_full) / least).clamp(0.0, count - in_full);
+        let drawn = strokes + in_full;
+        let stroked = if drawn > 0.0 { strokes / drawn } else { 1.0 };
+        Parts { strokes: least * strokes, full: full * in_full, stroked }
+    }
+}
+
 /// The kind of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
@@ -70,6 +121,8 @@ pub struct ObjectView {
     pub kind: Kind,
     /// The number of the group that it is in, among the objects given with it: a group comes after all that is in it.
     pub group: Option<usize>,
+    /// Its pieces, if it is drawn by strokes; `None` for what is drawn by triangles alone.
+    pub pieces: Option<Pieces>,
     /// The pairs (ε, n) allowed for the picture. For a primitive only n counts; for a mesh with a free triangle count or a group, neither.
     pub range: ResolutionRange,
     /// The cheapest and the best shading allowed, equal if it is fixed.
@@ -134,6 +187,7 @@ impl ObjectView {
             id: AgentId(id),
             kind,
             group: None,
+            pieces: None,
             range: ResolutionRange::fixed(metachron_core::Resolution { eps_m: 1.0, n: 0 }),
             shading: Default::default(),
             pixels: 100.0,

@@ -52,6 +52,7 @@ impl Candidate {
                     pixel_s: 0.0,
                     enlarge_s: 0.0,
                     shading: [object; 4],
+                    strokes: [object; 2],
                     areas: None,
                 });
                 control.set_margin(margin);

@@ -201,6 +201,7 @@ pub(super) mod tests {
             visible: true,
             group: None,
             may_vanish: false,
+            pieces: None,
         };
         let ball = Kind::Primitive { radius_m: 0.02, triangles: std::array::from_fn(|n| 48 << n) };
         vec![

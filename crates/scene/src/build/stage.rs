@@ -4,7 +4,8 @@ use super::{Names, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
-    CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, TargetFile, model_named,
+    CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, ShadingCostFile, TargetFile,
+    model_named,
 };
 use glam::DVec3;
 use metachron_core::{SimSpan, gains};
@@ -184,7 +185,12 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
     let spikes = number("spikes", file.spikes, allowed(0.0..=1.0, ""));
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
-    let shading = object_costs(c, &place.table("shading"), file);
+    let table = place.table("shading");
+    let of = file.shading.unwrap_or_default();
+    let named = [("flat", of.flat), ("gouraud", of.gouraud), ("per-pixel", of.per_pixel), ("textured", of.textured)];
+    let shading = named.map(|(name, file)| object_cost(c, &table.table(name), file));
+    let strokes = [("points", of.points), ("lines", of.lines)];
+    let strokes = strokes.map(|(name, file)| object_cost(c, &table.table(name), file));
     let step_load = load(c, &place, "step_load", &file.step_load);
     let load = load(c, &place, "load", &file.load);
     Machine {
@@ -200,6 +206,7 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
         cull_object_ns,
         choose_object_ns,
         shading,
+        strokes,
         noise,
         wander,
         spikes,
@@ -229,26 +236,16 @@ fn load(c: &mut Checker<'_, '_>, place: &Place, key: &str, entries: &[LoadFile])
     steps
 }
 
-/// Costs of objects by their shading, in control's order: flat, Gouraud, per pixel, textured.
-fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 4] {
-    let Some(files) = &file.shading else { return Default::default() };
-    let all = [
-        ("flat", files.flat),
-        ("gouraud", files.gouraud),
-        ("per-pixel", files.per_pixel),
-        ("textured", files.textured),
-    ];
-    all.map(|(name, file)| {
-        let (place, file) = (place.table(name), file.unwrap_or_default());
-        let mut number =
-            |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
-        ObjectCost {
-            object_us: number("object_us", file.object_us, allowed(0.0..=1e6, "µs")),
-            triangle_us: number("triangle_us", file.triangle_us, allowed(0.0..=1e4, "µs")),
-            vertex_us: number("vertex_us", file.vertex_us, allowed(0.0..=1e4, "µs")),
-            pixel_ns: number("pixel_ns", file.pixel_ns, allowed(0.0..=1e6, "ns")),
-        }
-    })
+/// Cost of objects that are drawn in one way, as far as the scene gives it.
+fn object_cost(c: &mut Checker<'_, '_>, place: &Place, file: Option<ShadingCostFile>) -> ObjectCost {
+    let file = file.unwrap_or_default();
+    let mut number = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(place, key, v, &range));
+    ObjectCost {
+        object_us: number("object_us", file.object_us, allowed(0.0..=1e6, "µs")),
+        triangle_us: number("triangle_us", file.triangle_us, allowed(0.0..=1e4, "µs")),
+        vertex_us: number("vertex_us", file.vertex_us, allowed(0.0..=1e4, "µs")),
+        pixel_ns: number("pixel_ns", file.pixel_ns, allowed(0.0..=1e6, "ns")),
+    }
 }
 
 fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {

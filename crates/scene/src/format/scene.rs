@@ -269,6 +269,10 @@ pub struct ShadingCostsFile {
     pub per_pixel: Option<ShadingCostFile>,
     /// Lighting at every pixel of a textured surface.
     pub textured: Option<ShadingCostFile>,
+    /// Leaves drawn as points instead of shaded triangles.
+    pub points: Option<ShadingCostFile>,
+    /// Boughs drawn as lines.
+    pub lines: Option<ShadingCostFile>,
 }
 
 /// Cost of an object: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).

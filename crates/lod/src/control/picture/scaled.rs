@@ -8,7 +8,7 @@ use super::super::plan::{LevelDemand, SizedView, steers};
 use super::super::policy::Policy;
 use super::super::price::{Backdrop, Prices};
 use super::super::render_scale::{PictureRung, ScaledFrame};
-use super::super::view::Shading;
+use super::super::view::{Pieces, Shading};
 use super::PictureControl;
 
 /// Levels that take less than this part of a frame above their least are as good as at their coarsest.
@@ -17,6 +17,7 @@ const LEVELS_LEAST: f64 = 0.05;
 /// An object of the frame with all else at its coarsest.
 #[derive(Debug, Clone, Copy)]
 struct Coarsest {
+    pieces: Option<Pieces>,
     shading: Shading,
     polygons: f64,
     /// Pixels that it covers at the present scale.
@@ -86,12 +87,12 @@ impl PictureControl {
             Some(Rung { shading, polygons, .. }) => (*shading, *polygons),
             None => (level.shading, level.polygons),
         };
-        Coarsest { shading, polygons, pixels: seen.view.pixels }
+        Coarsest { pieces: seen.view.pieces, shading, polygons, pixels: seen.view.pixels }
     }
 }
 
 fn object_s(prices: &Prices, seen: &SizedView, level: &LevelDemand) -> f64 {
-    prices.object_s(level.shading, level.polygons, seen.view.pixels)
+    prices.pieces_s(seen.view.pieces, level.shading, level.polygons, seen.view.pixels)
 }
 
 /// The backdrop of a frame drawn at the scale `here`, drawn at another.
@@ -103,6 +104,9 @@ fn scaled(backdrop: Backdrop, here: f64, asked: f64) -> Backdrop {
 
 /// Time of drawing everything at its coarsest, each object on this `part` of its pixels, seconds.
 fn coarsest_s(prices: &Prices, objects: &[Coarsest], backdrop: Backdrop, part: f64) -> f64 {
-    let objects = objects.iter().map(|object| prices.object_s(object.shading, object.polygons, part * object.pixels));
+    let objects = objects.iter().map(|object| {
+        let Coarsest { pieces, shading, polygons, pixels } = *object;
+        prices.pieces_s(pieces, shading, polygons, part * pixels)
+    });
     prices.backdrop_s(backdrop) + objects.fold(0.0, |sum, s| sum + s)
 }

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 /// Prices of the plant of these tests: its pixels are the backdrop's.
 fn prices() -> Prices {
     let object = crate::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0, serial: 0.0 };
-    Prices { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], areas: None }
+    Prices { frame_s: 1.4e-3, pixel_s: 6e-9, enlarge_s: 2e-9, shading: [object; 4], strokes: [object; 2], areas: None }
 }
 
 const PICTURE_PX: f64 = 921_600.0;
@@ -347,7 +347,7 @@ proptest! {
         let at = |i: usize| numbers[i % numbers.len()];
         let stages = crate::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3), serial: 0.0 };
         let shading = [stages, prices().of(Shading::Flat), stages, stages];
-        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), enlarge_s: at(5), shading, areas: None });
+        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), enlarge_s: at(5), shading, strokes: [shading[0]; 2], areas: None });
         let mut views: Vec<_> = (0..8).map(|i| if i % 2 == 0 { tube(i as u32) } else { mesh(i as u32, 1e3, 5000) }).collect();
         let members = Kind::Group { radius_m: 1.0, impostors: [0, 0, 0, 0, 0, 0, 0, 0] };
         views[1..4].iter_mut().for_each(|it| it.group = Some(6));
