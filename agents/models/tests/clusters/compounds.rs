@@ -55,7 +55,8 @@ fn a_table_slides_down_a_slope_as_coulomb_says_and_stays_where_it_sticks() {
             }
             table.middle(0).1.dot(lean * DVec3::X)
         };
-        let m_s2 = (speed_at(1.0) - speed_at(0.5)) / 0.5;
+        let speeds = [0.5, 1.0].map(&mut speed_at);
+        let m_s2 = (speeds[1] - speeds[0]) / 0.5;
         // the geometric mean of 0.5 and 0.02 is 0.1
         let wanted = -GRAVITY.z * (libm::sin(SLOPE_RAD) - 0.1 * libm::cos(SLOPE_RAD));
         let wanted = if slides { wanted } else { 0.0 };

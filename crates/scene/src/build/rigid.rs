@@ -409,9 +409,15 @@ fn weighted_m3(solid: &Solid) -> f64 {
     }
 }
 
-/// The volume a solid encloses; zero of one whose surface is none.
+/// The volume a solid encloses; zero of one whose surface is none. Hulls and meshes have that of their shapes in single precision, so that the
+/// masses of scenes stay what they were to the bit.
 fn volume_m3(solid: &Solid) -> f64 {
-    solid.volume_m3().unwrap_or(0.0)
+    match solid {
+        Solid::Hull { .. } | Solid::Mesh { .. } => {
+            solid.to_shared_shape().map_or(0.0, |shape| f64::from(shape.mass_properties(1.0).mass()).abs())
+        }
+        solid => solid.volume_m3().unwrap_or(0.0),
+    }
 }
 
 #[cfg(test)]
