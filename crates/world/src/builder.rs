@@ -136,14 +136,14 @@ impl From<Custom> for Part {
 }
 
 /// A rigid body before it is added.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Rigid {
     spec: RigidSpec,
     rate_hz: f64,
 }
 
 /// A tube before it is added.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Tube {
     path_m: Vec<DVec3>,
     radius_m: f64,

@@ -175,7 +175,7 @@ impl Checkpoint {
     }
 
     /// The bytes of a file.
-    fn to_bytes(&self) -> Vec<u8> {
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut archive = Archive::writer();
         let mut copy = self.clone();
         // plain values of this program can all be written
@@ -192,7 +192,7 @@ impl Checkpoint {
     }
 
     /// The checkpoint in the bytes of a file.
-    fn from_bytes(bytes: &[u8]) -> Result<Self, BadCheckpoint> {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, BadCheckpoint> {
         let Some((head, body)) = bytes.split_first_chunk::<HEAD>().filter(|(head, _)| head.starts_with(&MAGIC)) else {
             return Err(BadCheckpoint::NoCheckpoint);
         };
@@ -290,7 +290,7 @@ impl SceneIdentity {
 }
 
 /// FNV-1a, 64 bits: no change of one byte leaves it as it was.
-fn checksum(bytes: &[u8]) -> u64 {
+pub(super) fn checksum(bytes: &[u8]) -> u64 {
     const FNV_PRIME: u64 = 0x0100_0000_01b3;
     bytes.iter().fold(HASH_START, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(FNV_PRIME))
 }

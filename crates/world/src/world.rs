@@ -11,7 +11,9 @@ use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
+use super::log::{Log, logged};
 use super::object::{Object, WorldTag};
+use super::recording::{Entry, added};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
@@ -98,22 +100,24 @@ pub enum WorldError {
 /// Its time stands until [`World::advance`] or [`World::drive`] lets it pass.
 #[derive(Clone)]
 pub struct World {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
-struct Shared {
+pub(super) struct Shared {
     tag: WorldTag,
     state: Mutex<State>,
     agents: Agents,
     /// Gravity, m/s²: that of objects that join it.
-    gravity: DVec3,
+    pub gravity: DVec3,
     /// The static solids and joints.
-    surroundings: Arc<ClusterScene>,
+    pub surroundings: Arc<ClusterScene>,
     executor: ExecutorKind,
     /// By what checkpoints of its scene are known again.
-    identity: SceneIdentity,
+    pub identity: SceneIdentity,
     /// The clock of executors in real time.
     clock: Arc<SystemClock>,
+    /// What is written down of it, or followed.
+    pub log: Arc<Log>,
 }
 
 impl std::fmt::Debug for World {
@@ -129,10 +133,13 @@ impl WorldError {
 }
 
 /// What makes agents step, or where its time stood when it ended.
-enum State {
+pub(super) enum State {
     Running(Box<dyn Run>),
     Stopped { now: Duration, time: SimTime, timeline: Timeline },
 }
+
+/// Why a replay refuses what is asked of it.
+const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
 /// How often a real-time world looks whether all agents have arrived.
 const POLL_INTERVAL: Duration = Duration::from_micros(500);
@@ -151,9 +158,21 @@ impl World {
     /// # Errors
     /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
     pub fn start_governed(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Self, WorldError> {
-        let executor = assemble::executor(executor, scene.agents.len());
+        Self::start_logged(scene, executor, govern, Log::default())
+    }
+
+    pub(super) fn start_logged(
+        scene: &Scene,
+        executor: ExecutorKind,
+        govern: Govern<'_>,
+        log: Log,
+    ) -> Result<Self, WorldError> {
+        let (executor, log) = (assemble::executor(executor, scene.agents.len()), Arc::new(log));
         let surroundings = assemble::surroundings(scene)?;
-        let spawns = assemble::spawns(scene, &surroundings, executor, govern)?;
+        let spawns = match executor {
+            ExecutorKind::Lockstep => assemble::spawns(scene, &surroundings, executor, &mut logged(govern, &log))?,
+            _ => assemble::spawns(scene, &surroundings, executor, govern)?,
+        };
         let clock = Arc::new(SystemClock::new());
         let priority = assemble::priority(scene);
         let mut run: Box<dyn Run> = match executor {
@@ -166,7 +185,7 @@ impl World {
         }
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock };
+        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock, log };
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -220,6 +239,10 @@ impl World {
         if self.executor() != ExecutorKind::Lockstep {
             return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a world in real time".to_owned() }));
         }
+        if self.shared.log.is_replayed() {
+            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
+        }
+        self.shared.log.note(|| Entry::Restore(checkpoint.to_bytes()));
         let Err(reason) = read_state(run.as_mut(), &checkpoint.state) else { return Ok(()) };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
         let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
@@ -286,7 +309,15 @@ impl World {
             Command::Spring(Keyed { what: Some(spring), .. }) => self.check_point(object, &state, spring.anchor)?,
             _ => {}
         }
-        agent.send(command).map_err(|error| refused(error.to_string()))
+        // a recording has the order of commands and waits
+        let log = &self.shared.log;
+        if log.is_replayed() {
+            return Err(refused(REPLAYED.to_owned()));
+        }
+        let _order = log.is_recorded().then(|| self.state());
+        agent.send(command).map_err(|error| refused(error.to_string()))?;
+        log.note(|| Entry::Command(object.id(), command));
+        Ok(())
     }
 
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
@@ -299,11 +330,25 @@ impl World {
         if self.object(&name).is_ok() {
             return Err(WorldError::SameName { name });
         }
+        let (part, log) = (part.into(), &self.shared.log);
+        if log.is_replayed() {
+            return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
+        }
+        let entry = added(&name, &part);
+        if log.is_recorded() && entry.is_none() {
+            let reason = "a recording has rigid bodies and tubes that join, and no agent of your own".to_owned();
+            return Err(WorldError::Refused { name, reason });
+        }
         let id = AgentId(self.shared.agents.len() as u32);
-        let member = member(id, name, part.into(), self.shared.gravity)?;
+        let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        Ok(self.shared.tag.object(run.add(spawn)?.id()))
+        let joined = run.add(spawn)?.id();
+        match entry {
+            Some(entry) => log.note(|| entry),
+            None => log.note_begun(),
+        }
+        Ok(self.shared.tag.object(joined))
     }
 
     /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
@@ -314,8 +359,14 @@ impl World {
     pub fn remove(&self, object: Object) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
+        let log = &self.shared.log;
+        if log.is_replayed() {
+            return Err(refused(REPLAYED.to_owned()));
+        }
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        run.remove(object.id()).map_err(|error| refused(error.to_string()))
+        run.remove(object.id()).map_err(|error| refused(error.to_string()))?;
+        log.note(|| Entry::Remove(object.id()));
+        Ok(())
     }
 
     /// Events of its objects from now on.
@@ -395,14 +446,14 @@ impl World {
     /// Waits until the wall time `until`, while the agents run; returns at once if that has passed.
     pub fn wait_until(&self, until: Duration) {
         match self.executor() {
-            ExecutorKind::Lockstep => self.with_run(|run| run.wait_until(until)),
+            ExecutorKind::Lockstep => self.with_run(|| Entry::Wait(until), |run| run.wait_until(until)),
             _ => wait_until(&*self.shared.clock, until),
         }
     }
 
     /// Lets a frame's own `work` pass: it occupies a core of the declared machine in lockstep, and has passed by itself elsewhere.
     pub fn spend(&self, work: Duration) {
-        self.with_run(|run| run.spend(work));
+        self.with_run(|| Entry::Spend(work), |run| run.spend(work));
     }
 
     /// The timeline in force.
@@ -416,12 +467,14 @@ impl World {
 
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&self, drive: TimelineCommand) {
-        self.with_run(|run| run.drive(drive));
+        self.with_run(|| Entry::Drive(drive), |run| run.drive(drive));
     }
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
     /// Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
+        // who wants to know whether it is complete has ended it before
+        drop(self.end_recording());
         let mut state = self.state();
         let ended = match &*state {
             State::Running(run) => State::Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline() },
@@ -473,19 +526,20 @@ impl World {
     }
 
     /// Does something with a world that runs; nothing with one that was stopped.
-    fn with_run(&self, act: impl FnOnce(&mut dyn Run)) {
+    fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
+            self.shared.log.note(entry);
             act(run.as_mut());
         }
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Reads the state of a run; a broken one may break any promise of those that read it.
-fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
+pub(super) fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
     let read = catch_unwind(AssertUnwindSafe(|| {
         let mut archive = Archive::reader(state);
         run.archive(&mut archive)?;

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
 /// A rigid body before it is built.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct RigidSpec {
     /// Its shape; not a plane. An open mesh counts as its convex hull.
     pub solid: Solid,

@@ -28,7 +28,7 @@ pub struct Timeline {
 }
 
 /// A user's command to the timeline.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum TimelineCommand {
     /// Simulated time stops.
     Pause,
