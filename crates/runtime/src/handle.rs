@@ -107,6 +107,12 @@ impl AgentHandle {
         Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
     }
 
+    /// Whether it was woken, and has not made a turn since.
+    #[must_use]
+    pub fn is_woken(&self) -> bool {
+        self.shared.sleep.is_woken(self.shared.id)
+    }
+
     /// Its contact shape, which never changes; `None` where nothing can touch it.
     #[must_use]
     pub fn form(&self) -> Option<&CollisionShape> {

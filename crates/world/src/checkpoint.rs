@@ -1,6 +1,6 @@
 //! A world's state at one moment, kept in memory or in a file, to go on from it: in the same world or in another process.
 //!
-//! In: a world in lockstep between two events. Out: bytes by which it, or a world started from the same scene, goes on as this one would
+//! In: a world between turns. Out: bytes by which it, or a world started from the same scene, goes on as this one would
 //! have, to the bit. Never here: what the state of an object is (`archive` of each says it), the scene.
 //!
 //! A file: [`MAGIC`], the version of the format, the length and the checksum of what follows, then the program's version, the scene's
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACHRN";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Bytes before those that the checksum is of.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
 /// The program that can read what it has written: states are saved field by field as this version has them.
@@ -25,6 +25,7 @@ const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 pub struct Checkpoint {
     pub(super) of: SceneIdentity,
     pub(super) time: SimTime,
+    pub(super) times: Vec<SimTime>,
     pub(super) state: Vec<u8>,
 }
 
@@ -143,6 +144,12 @@ impl Checkpoint {
         self.time
     }
 
+    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of its own.
+    #[must_use]
+    pub fn times(&self) -> &[SimTime] {
+        &self.times
+    }
+
     /// The name of its scene.
     #[must_use]
     pub fn scene(&self) -> &str {
@@ -222,12 +229,12 @@ impl Checkpoint {
     }
 
     fn archive(program: &mut String, of: &mut Self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        metachron_core::archive_values!(archive, *program, of.of, of.time, of.state)
+        metachron_core::archive_values!(archive, *program, of.of, of.time, of.times, of.state)
     }
 
     fn empty() -> Self {
         let of = SceneIdentity::default();
-        Self { of, time: SimTime::ZERO, state: vec![] }
+        Self { of, time: SimTime::ZERO, times: vec![], state: vec![] }
     }
 }
 

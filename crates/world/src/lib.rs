@@ -37,6 +37,7 @@ pub mod kinds;
 mod log;
 mod object;
 mod overlap;
+mod pace;
 mod queries;
 mod recorded;
 mod recording;
@@ -55,6 +56,7 @@ pub use initial_overlap::Moved;
 pub use metachron_runtime::Command;
 pub use object::{Object, Touched};
 pub use overlap::Overlap;
+pub use pace::Pace;
 pub use queries::{Cast, ContactNow, Hit};
 pub use recording::{BadRecording, RecordError, Recording, SceneText};
 pub use scene::{

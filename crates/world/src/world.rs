@@ -16,12 +16,13 @@ use super::object::{Object, WorldTag};
 use super::recording::{Entry, added};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
     Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -82,6 +83,12 @@ pub enum WorldError {
         /// Why.
         reason: String,
     },
+    /// A pace that no machine keeps, or that is a pause.
+    #[error("the factor of time is {factor}; expected 0.001 to 100")]
+    BadPace {
+        /// The factor.
+        factor: f64,
+    },
     /// A query that asks for nothing that can be found.
     #[error("{0}")]
     BadQuery(String),
@@ -115,7 +122,9 @@ pub(super) struct Shared {
     /// By what checkpoints of its scene are known again.
     pub identity: SceneIdentity,
     /// The clock of executors in real time.
-    clock: Arc<SystemClock>,
+    pub clock: Arc<SystemClock>,
+    /// Whether its time waits for its objects ([`super::Pace::Free`]).
+    pub is_free: AtomicBool,
     /// What is written down of it, or followed.
     pub log: Arc<Log>,
 }
@@ -140,9 +149,6 @@ pub(super) enum State {
 
 /// Why a replay refuses what is asked of it.
 const REPLAYED: &str = "a replay does what its recording says, and nothing else";
-
-/// How often a real-time world looks whether all agents have arrived.
-const POLL_INTERVAL: Duration = Duration::from_micros(500);
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -185,7 +191,18 @@ impl World {
         }
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
-        let shared = Shared { tag, state, agents, gravity, surroundings, executor, identity, clock, log };
+        let shared = Shared {
+            tag,
+            state,
+            agents,
+            gravity,
+            surroundings,
+            executor,
+            identity,
+            clock,
+            is_free: AtomicBool::new(false),
+            log,
+        };
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -212,10 +229,12 @@ impl World {
         Ok(world)
     }
 
-    /// The state of the world now: all that the next bit of it needs. In lockstep only; samples of watched points and CPU times are not in it.
+    /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
+    /// turns in progress end first, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
+    /// either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] on threads and in a pool, and where a model or a governor does not save its state;
+    /// [`CheckpointError::Refused`] where a step does not end, and where a model or a governor does not save its state;
     /// [`CheckpointError::Stopped`]. The world goes on as it was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();
@@ -223,11 +242,12 @@ impl World {
         let mut archive = Archive::writer();
         run.archive(&mut archive).map_err(CheckpointError::Refused)?;
         let of = self.shared.identity.now(&self.shared.agents);
-        Ok(Checkpoint { of, time: run.sim_now(), state: archive.into_bytes() })
+        let times = self.shared.agents.iter().map(|agent| agent.latest().moment()).collect();
+        Ok(Checkpoint { of, time: run.sim_now(), times, state: archive.into_bytes() })
     }
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, to the bit. Objects and agents stay valid.
+    /// again, in lockstep to the bit. Objects and agents stay valid.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where objects have joined or left since, [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
@@ -236,9 +256,6 @@ impl World {
         self.shared.identity.now(&self.shared.agents).check(&checkpoint.of)?;
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
-        if self.executor() != ExecutorKind::Lockstep {
-            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a world in real time".to_owned() }));
-        }
         if self.shared.log.is_replayed() {
             return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
         }
@@ -402,26 +419,6 @@ impl World {
         state_hash(&self.shared.agents)
     }
 
-    /// Lets the world live for `span`, then stops its time.
-    ///
-    /// In lockstep every step that is due by then has been made. On threads and in the pool time passes in real time, and each object that
-    /// neither rests nor has failed has lived to the end at least; one may be a step ahead.
-    /// A world that was stopped stays as it is.
-    pub fn advance(&self, span: SimSpan) {
-        if self.executor() == ExecutorKind::Lockstep {
-            return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
-        }
-        let end = self.time() + span;
-        self.drive(TimelineCommand::Run);
-        while !self.has_stopped() {
-            let now = self.now();
-            self.wait_until(now + POLL_INTERVAL);
-            if self.time() >= end && self.shared.agents.iter().all(|agent| has_reached(agent, end)) {
-                return self.drive(TimelineCommand::Pause);
-            }
-        }
-    }
-
     /// The executor that runs the agents.
     #[must_use]
     pub fn executor(&self) -> ExecutorKind {
@@ -549,10 +546,4 @@ pub(super) fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> 
         Ok(outcome) => outcome.map_err(|error| error.to_string()),
         Err(_) => Err("its numbers do not fit together".to_owned()),
     }
-}
-
-/// Whether nothing more is to be waited for: the agent has reached `end`, rests, or has failed.
-fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
-    let newest = agent.latest();
-    newest.at_rest || !matches!(agent.state(), AgentState::Running) || newest.moment() >= end
 }
