@@ -37,6 +37,14 @@ Examples:
 Flags go before --set, --set before the environment (METACHRON_…), that before the scene, and the scene before defaults.
 Data goes to standard output, messages to standard error.";
 
+const REPLAY_EXAMPLES: &str = "\
+Examples:
+  metachron run tube --headless --executor lockstep --seconds 10 --record tube.rec
+  metachron replay tube.rec                            ends with the same state hash, or says where it differs
+  metachron replay tube.rec --until 2.5 --png then.png
+
+A recording has the scene, what was changed in it, and all that was done; one that was cut short is repeated as far as it goes.";
+
 const CHECK_EXAMPLES: &str = "\
 Examples:
   metachron check my.toml other.toml
@@ -73,6 +81,9 @@ pub enum Command {
     /// Run a scene: in a window where there is a display, otherwise headless
     #[command(after_help = RUN_EXAMPLES, allow_negative_numbers = true)]
     Run(Box<RunArgs>),
+    /// Repeat a recorded run, to the bit: to see what happened, or to stop on the way
+    #[command(after_help = REPLAY_EXAMPLES)]
+    Replay(Box<ReplayArgs>),
     /// Validate scenes; all problems of the first stage that fails, each at its place in the file
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
@@ -218,6 +229,17 @@ pub struct RunArgs {
     /// Run the scene a second time as a reference, all agents on one very fine common clock, and report the differences (headless only)
     #[arg(long)]
     pub oracle: bool,
+    /// Write down what is done to the run, so that `metachron replay` repeats it to the bit (lockstep only)
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub record: Option<PathBuf>,
+    /// What is written and printed.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// What `run` and `replay` write and print.
+#[derive(Debug, Args)]
+pub struct OutputArgs {
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
@@ -242,6 +264,23 @@ pub struct RunArgs {
     /// Print errors only: no progress, no summary, no list of the files written
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// The recording, as `run --record` writes it
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub recording: PathBuf,
+    /// End at this simulated time, seconds, instead of with the recording
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub until: Option<f64>,
+    /// Size of the picture in pixels, each 1 to 8192; 1280x720 where no size is given
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// What is written and printed.
+    #[command(flatten)]
+    pub output: OutputArgs,
 }
 
 /// `check`.

@@ -9,6 +9,7 @@ mod check;
 mod describe;
 mod generate;
 mod play;
+mod replay;
 pub mod run;
 
 use args::{Cli, Command};
@@ -36,6 +37,7 @@ pub fn main() -> ExitCode {
 fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
         Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
+        Command::Replay(args) => replay::command(&args),
         Command::Check(args) => check::command(&args),
         #[cfg(feature = "lab")]
         Command::Chart(args) => metachron_lab::chart(&args),

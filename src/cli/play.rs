@@ -3,6 +3,8 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::run::{Played, Request, RunLength, Step};
+use anyhow::Context;
+use metachron_console::output::BadInput;
 use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch};
 use metachron_lod::Bound;
 use metachron_render::Size;
@@ -23,8 +25,20 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Reading, Scene, Sensor};
-use std::path::PathBuf;
+use metachron_world::{Reading, Scene, SceneText, Sensor};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// Begins to write down what is done to the run.
+fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
+    if !session.is_virtual() {
+        let why = "--record writes down what is done to a run in lockstep; add --executor lockstep";
+        return Err(BadInput(why.to_owned()).into());
+    }
+    let file = File::create(path).with_context(|| format!("the recording {} cannot be written", path.display()))?;
+    let (name, text) = (request.source.name().to_owned(), request.source.text().to_owned());
+    Ok(session.begin_recording(Box::new(file), SceneText { name, text, overrides: request.overrides.clone() })?)
+}
 
 /// Called for every frame; returns whether to go on.
 type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
@@ -43,6 +57,9 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     }
     if request.oracle {
         session.keep_trace();
+    }
+    if let Some(path) = &request.record {
+        record(&session, path, request)?;
     }
     if !request.window {
         return headless(session, request, request.png.clone(), go_on);
@@ -75,7 +92,7 @@ fn window_plan(request: &Request) -> WindowPlan {
     let (frames, seconds) = match request.end {
         Some(RunLength::Frames(frames)) => (Some(frames), None),
         Some(RunLength::Seconds(seconds)) => (None, Some(seconds)),
-        None => (None, None),
+        Some(RunLength::Recording) | None => (None, None),
     };
     WindowPlan {
         source: request.source.clone(),
@@ -96,7 +113,12 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
     Ok(played)
 }
 
-fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+pub(super) fn headless(
+    session: Session,
+    request: &Request,
+    png: Option<PathBuf>,
+    go_on: GoOn<'_>,
+) -> anyhow::Result<Played> {
     let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
     let size = Size { width, height };
     let drawing = drawing(&session, request, png.is_some() || request.video.is_some(), size)?;
@@ -104,18 +126,20 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
     let end = match request.headless_end() {
         RunLength::Frames(frames) => End::Frames(frames),
         RunLength::Seconds(seconds) => End::Seconds(seconds),
+        RunLength::Recording => End::Recording,
     };
     let plan = Headless { end, size, style: request.style, drawing, png, film: request.video.clone() };
     // the second run takes about as long as the first, so each is half of the whole
     let half = if request.oracle { 0.5 } else { 1.0 };
     let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(half * done))))?;
     if !request.oracle || outcome.interrupted {
-        return Ok(played(&request.scene, outcome, picture));
+        return Ok(Played { oracle: request.oracle, ..played(&request.scene, outcome, picture) });
     }
     let last = outcome.frames.last().copied().unwrap_or_default();
     let oracle =
         compare_with_reference(&request.scene, &outcome, &mut |done| go_on(step(&last, Some(half + half * done))))?;
     let mut played = played(&request.scene, outcome, picture);
+    played.oracle = true;
     played.interrupted = oracle.interrupted;
     played.report.oracle = Some(reference_report(&request.scene, &oracle));
     Ok(played)
@@ -125,10 +149,7 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
 #[cfg(not(feature = "render"))]
 fn drawing(_: &Session, _: &Request, picture: bool, _: Size) -> anyhow::Result<Drawing> {
     if picture {
-        return Err(metachron_console::output::BadInput(
-            "this build cannot draw pictures: it lacks the feature `render`".to_owned(),
-        )
-        .into());
+        return Err(BadInput("this build cannot draw pictures: it lacks the feature `render`".to_owned()).into());
     }
     Ok(Drawing::Nothing)
 }
@@ -211,7 +232,16 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         probes: outcome.probes.iter().map(probe).collect(),
     };
     let (unpriced, interrupted) = (outcome.unpriced, outcome.interrupted);
-    Played { report, frames: outcome.frames, no_window: None, window_gone: None, picture, unpriced, interrupted }
+    Played {
+        report,
+        frames: outcome.frames,
+        no_window: None,
+        window_gone: None,
+        picture,
+        unpriced,
+        oracle: false,
+        interrupted,
+    }
 }
 
 fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {

@@ -3,7 +3,7 @@
 //! In: arguments. Out: a picture, a report, rows of frames, verdicts on goals.
 //! Never here: the loop itself.
 
-use super::args::{RunArgs, StyleWord};
+use super::args::{OutputArgs, RunArgs, StyleWord};
 use super::play::play;
 use anyhow::Context;
 use clap::ArgMatches;
@@ -51,6 +51,8 @@ pub struct Request {
     pub png: Option<PathBuf>,
     /// Where to write the film of all frames (YUV4MPEG2); only without a window.
     pub video: Option<PathBuf>,
+    /// Where to write down what is done to the run.
+    pub record: Option<PathBuf>,
     /// Where to write it when the requested window could not be opened, and `png` is `None`.
     pub png_without_window: PathBuf,
 }
@@ -62,6 +64,8 @@ pub enum RunLength {
     Frames(u64),
     /// After so many simulated seconds, above 0.
     Seconds(f64),
+    /// With the recording that is repeated.
+    Recording,
 }
 
 /// The result of a run.
@@ -79,6 +83,8 @@ pub struct Played {
     pub picture: Option<PathBuf>,
     /// Whether levels were chosen by default prices of drawing, because there was no time to measure the adapter's.
     pub unpriced: bool,
+    /// Whether a reference run was asked for.
+    pub oracle: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -104,27 +110,36 @@ impl Request {
 
 /// Runs a scene.
 pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Exit> {
-    check_outputs(args)?;
+    check_inputs(args)?;
     let request = request(args, matches)?;
-    if !args.quiet {
+    if !args.output.quiet {
         print_overlaps(&request.scene);
         warn_priority(&request.scene);
     }
-    let bar = Bar::new(&request.scene.name, args.quiet);
+    finish(&args.output, &|go_on| play(&request, go_on), &request.scene.name)
+}
+
+/// Plays with a bar that shows how far it is, writes what was asked for, and judges.
+pub(super) fn finish(
+    output: &OutputArgs,
+    play: &dyn Fn(&mut dyn FnMut(Step) -> bool) -> anyhow::Result<Played>,
+    name: &str,
+) -> anyhow::Result<Exit> {
+    let bar = Bar::new(name, output.quiet);
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
-    let played = play(&request, &mut |step| {
+    let played = play(&mut |step| {
         if let Some(done) = step.done {
             bar.show(done, step.sim_s, step.frame_ms);
         }
         !stopped.load(Ordering::Relaxed)
     })?;
     drop(bar);
-    write_all(args, &played)?;
+    write_all(output, &played)?;
     match &played.window_gone {
         Some(why) => Err(anyhow::anyhow!("{why}")),
-        None => judge(args, &played),
+        None => judge(output, &played),
     }
 }
 
@@ -152,21 +167,22 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     Ok(Request {
         scene,
         source,
-        quiet: args.quiet,
+        quiet: args.output.quiet,
         overrides,
         window: !args.headless,
         end,
         size: args.size,
-        style: style(&args.style),
+        style: style(&args.output.style),
         oracle: args.oracle,
-        png: args.png.clone(),
-        video: args.video.clone(),
+        png: args.output.png.clone(),
+        video: args.output.video.clone(),
+        record: args.record.clone(),
         png_without_window,
     })
 }
 
 /// The style given by words; of two colourings the last counts.
-fn style(words: &[StyleWord]) -> Style {
+pub(super) fn style(words: &[StyleWord]) -> Style {
     words.iter().fold(Style::default(), |style, word| match word {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
         StyleWord::Resolution => Style { colouring: Colouring::Resolution, ..style },
@@ -180,31 +196,50 @@ fn quoted(text: &str) -> String {
 }
 
 /// The scene's name as part of a file name.
-fn stem(name: &str) -> String {
+pub(super) fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// Refuses two outputs on standard output, and files in missing folders: before the run rather than after.
-fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
-    if args.json && args.report.as_deref() == Some(Path::new("-")) {
-        return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
-    }
+/// Refuses what cannot be run as asked, and outputs that cannot be written: before the run rather than after.
+fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.oracle && !args.headless {
         let why = "--oracle runs the scene twice without a window; add --headless";
         return Err(BadInput(why.to_owned()).into());
     }
-    if args.video.is_some() && !args.headless {
+    if args.output.video.is_some() && !args.headless {
         return Err(BadInput("--video films a run without a window; add --headless".to_owned()).into());
     }
-    for (flag, path) in [("--png", &args.png), ("--video", &args.video), ("--frames-csv", &args.frames_csv)] {
-        if path.as_deref() == Some(Path::new("-")) {
+    let scene = Path::new(&args.scene);
+    let inputs = [("the scene", Some(scene).filter(|path| path.is_file())), ("--gains", args.gains.as_deref())];
+    check_outputs(&args.output, &inputs, args.record.as_deref())
+}
+
+/// Refuses two outputs on standard output, files in missing folders, and an output that would overwrite another one or one of `inputs`.
+pub(super) fn check_outputs(
+    args: &OutputArgs,
+    inputs: &[(&str, Option<&Path>)],
+    record: Option<&Path>,
+) -> anyhow::Result<()> {
+    if args.json && args.report.as_deref() == Some(Path::new("-")) {
+        return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
+    }
+    let files = [
+        ("--png", args.png.as_deref()),
+        ("--video", args.video.as_deref()),
+        ("--frames-csv", args.frames_csv.as_deref()),
+        ("--record", record),
+    ];
+    for (flag, path) in files {
+        if path == Some(Path::new("-")) {
             return Err(BadInput(format!(
                 "{flag} - would write to standard output, which only the report may use; name a file"
             ))
             .into());
         }
     }
-    for path in [&args.png, &args.video, &args.report, &args.frames_csv].into_iter().flatten() {
+    let report = ("--report", args.report.as_deref().filter(|path| *path != Path::new("-")));
+    let outputs = [report].into_iter().chain(files);
+    for path in outputs.clone().filter_map(|(_, path)| path) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         if folder.is_some_and(|f| !f.is_dir()) {
             return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -213,12 +248,12 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
             return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
         }
     }
-    check_distinct(args)?;
+    check_distinct(inputs.iter().copied().chain(outputs), inputs.len())?;
     check_extension(args)
 }
 
 /// Refuses a picture or film whose file has the ending of something else.
-fn check_extension(args: &RunArgs) -> anyhow::Result<()> {
+fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
     let outputs = [("--png", &args.png, "PNG picture", "png"), ("--video", &args.video, "YUV4MPEG2 film", "y4m")];
     for (flag, path, what, ending) in outputs {
         let other = |path: &&PathBuf| path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));
@@ -231,23 +266,15 @@ fn check_extension(args: &RunArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses an output that would overwrite another one, or an input.
-fn check_distinct(args: &RunArgs) -> anyhow::Result<()> {
-    let scene = Path::new(&args.scene);
-    let files = [
-        ("the scene", Some(scene).filter(|path| path.is_file())),
-        ("--gains", args.gains.as_deref()),
-        ("--report", args.report.as_deref().filter(|path| *path != Path::new("-"))),
-        ("--png", args.png.as_deref()),
-        ("--video", args.video.as_deref()),
-        ("--frames-csv", args.frames_csv.as_deref()),
-    ];
-    let places: Vec<_> =
-        files.iter().filter_map(|(what, path)| Some((*what, (*path)?, resolved_path(path.as_ref()?)?))).collect();
-    for (k, (what, path, at)) in places.iter().enumerate().skip(1) {
-        // inputs may be the same file
-        let before = places[..k].iter().find(|(_, _, other)| other == at && !["the scene", "--gains"].contains(what));
-        if let Some((other, ..)) = before {
+/// Refuses an output that would overwrite another one, or an input; the first `inputs` of `files` are inputs, which may be the same file.
+fn check_distinct<'a>(files: impl Iterator<Item = (&'a str, Option<&'a Path>)>, inputs: usize) -> anyhow::Result<()> {
+    let places: Vec<_> = files
+        .enumerate()
+        .filter_map(|(number, (what, path))| Some((number, what, path?, resolved_path(path?)?)))
+        .collect();
+    for (k, (number, what, path, at)) in places.iter().enumerate().skip(1) {
+        let before = places[..k].iter().find(|(_, _, _, other)| other == at && *number >= inputs);
+        if let Some((_, other, ..)) = before {
             let why =
                 format!("{what} {} would overwrite {other}, which is the same file; name another", path.display());
             return Err(BadInput(why).into());
@@ -267,7 +294,7 @@ fn resolved_path(path: &Path) -> Option<PathBuf> {
     }
 }
 
-fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
+fn write_all(args: &OutputArgs, played: &Played) -> anyhow::Result<()> {
     let report = serde_json::to_string_pretty(&played.report)? + "\n";
     // a demo without a display still leaves a report
     let fallback = played.no_window.as_ref().map(|_| format!("metachron-{}.json", stem(&played.report.scene)).into());
@@ -287,7 +314,7 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
             .with_context(|| format!("the frames {} cannot be written", path.display()))?;
     }
     if !args.quiet {
-        print_notes(args, played);
+        print_notes(played);
     }
     if args.json {
         data(&report)?;
@@ -298,14 +325,14 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
 }
 
 /// Prints notes in addition to the report.
-fn print_notes(args: &RunArgs, played: &Played) {
+fn print_notes(played: &Played) {
     if let Some(why) = &played.no_window {
         message(&format!("ran without a window: {why}"));
     }
     if played.unpriced {
         message("note: the cost of drawing could not be measured within three seconds: default prices were used");
     }
-    if args.oracle && played.interrupted {
+    if played.oracle && played.interrupted {
         message(&match &played.report.oracle {
             Some(oracle) => {
                 format!("interrupted: only the first {:.2} s, which both runs completed, are compared", oracle.sim_s)
@@ -327,7 +354,7 @@ fn write_frames(path: &Path, frames: &[FrameRecord]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn judge(args: &RunArgs, played: &Played) -> anyhow::Result<Exit> {
+fn judge(args: &OutputArgs, played: &Played) -> anyhow::Result<Exit> {
     let mut missed = false;
     for goal in &args.fail_on {
         match goal.judge(&played.report).map_err(|e| BadInput(e.to_string()))? {

@@ -5,7 +5,7 @@
 //! Theory: docs/theory/contact.md, section 5.
 
 /// What a skin says about its contacts, the same for bodies and static solids.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactTraits {
     /// What it collides with.
     pub groups: CollisionGroups,
@@ -21,7 +21,7 @@ pub struct ContactTraits {
 }
 
 /// The groups that an object is in, and those that it collides with: a bit each.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct CollisionGroups {
     /// The groups that it is in.
     pub member_of: u32,
@@ -30,7 +30,7 @@ pub struct CollisionGroups {
 }
 
 /// How two coefficients become that of a pair. Of two sides with different rules the later one of this list counts, as in Rapier.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum CombineRule {
     /// (a + b)/2.
     Average,

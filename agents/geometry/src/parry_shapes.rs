@@ -64,7 +64,7 @@ pub enum ShapeError {
 }
 
 /// Triangles over points, counter-clockwise seen from outside.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Triangles {
     /// Corners, metres.
     pub points: Vec<DVec3>,

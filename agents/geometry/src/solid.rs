@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// A solid in its own axes, metres, with its primitive's centre at the origin.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Solid {
     /// A ball.
     Ball {
@@ -56,7 +56,7 @@ pub enum Solid {
 pub const COMPOUND_PARTS_MAX: usize = 16;
 
 /// A part of a compound.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CompoundPart {
     /// Its shape.
     pub solid: Solid,

@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::collections::HashMap;
 
 /// A mesh of tetrahedra.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Tetrahedra {
     /// Its points, metres.
     pub points: Vec<DVec3>,

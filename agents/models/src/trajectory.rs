@@ -15,7 +15,7 @@ const RETURN_RATE_PER_S: f64 = 4.0;
 const SAME_TURN: f64 = 1e-14;
 
 /// Pose of what is led at one time of its script.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Keyframe {
     /// Seconds from the start of the script, ≥ 0.
     pub at_s: f64,

@@ -187,6 +187,9 @@ impl AgentClock {
     /// Whether it is more than two steps behind.
     #[must_use]
     pub fn is_late(&self, timeline: &Timeline, wall: Duration) -> bool {
+        if timeline.is_free() {
+            return false;
+        }
         let steps = self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS);
         timeline.sim_at(wall).since(self.scene_time()).as_nanos() > steps
     }
@@ -201,6 +204,9 @@ impl AgentClock {
         let steps = SimSpan::from_nanos(self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS));
         let mut dropped = SimSpan::ZERO;
         self.count_wait(wall);
+        if timeline.is_free() {
+            return Start { late: Duration::ZERO, dropped };
+        }
         if late > cap && late > timeline.wall_span(steps) {
             if near {
                 dropped = timeline.sim_span(late - cap);
@@ -220,6 +226,10 @@ impl AgentClock {
     /// Time that it dropped later would be time that its peers simulate without it; and steps of one length disturb its motion less than
     /// single long ones.
     pub fn stretch(&mut self, wanted: SimSpan, timeline: &Timeline, wall: Duration, near: bool) -> SimSpan {
+        if timeline.is_free() {
+            self.stretched = 0;
+            return wanted;
+        }
         let lag = timeline.sim_at(wall).since(self.scene_time());
         let now = SimSpan::from_nanos(self.stretched.into()).max(wanted);
         let times = |span: SimSpan, by: u64, of: u64| SimSpan::from_nanos(span.as_nanos().saturating_mul(by) / of);
@@ -287,6 +297,11 @@ impl AgentClock {
         let (moment, before) = (self.scene_time(), self.time);
         (self.time, self.clock_offset) = (moment - clock_offset, clock_offset);
         self.time.secs_after(before)
+    }
+
+    /// Goes on by a clock that reads `wall` now: no wait for peers goes on.
+    pub fn rebase(&mut self, wall: Duration) {
+        (self.held_until_ms, self.begun) = (0, ticks(wall));
     }
 
     /// The agent wakes at wall time `wall`: its time skips the sleep.

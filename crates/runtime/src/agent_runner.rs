@@ -186,7 +186,7 @@ impl AgentRunner {
         let now = timeline.sim_at(wall);
         let work_s = self.share_work(work_s);
         self.metrics.time_turn(&self.shared.gauges, turn_s);
-        let mut published = self.record_step(&open, now, work_s);
+        let mut published = self.record_step(&open, timeline, wall, work_s);
         published &= self.conclude_led(timeline, wall);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
@@ -208,6 +208,26 @@ impl AgentRunner {
         }
         self.resume(timeline, wall);
         true
+    }
+
+    /// How it goes on where a run takes it up: a turn that began in virtual time ends.
+    pub fn next(&mut self, timeline: &Timeline, wall: Duration) -> Next {
+        if self.is_parked() {
+            Next::Parked
+        } else if self.open.is_some() {
+            self.finish(timeline, wall, 0.0)
+        } else if self.shared.gauges.is_resting() {
+            Next::Rest
+        } else {
+            Next::Due
+        }
+    }
+
+    /// Goes on in a run whose clock reads `wall` now, with all agents it leads.
+    pub fn rebase(&mut self, wall: Duration) {
+        self.pace.rebase(wall);
+        self.turn_period = TurnPeriod::default();
+        self.led.each(|actor| actor.rebase(wall));
     }
 
     /// Accounts for a turn that took `wall` time of the caller, shared equally with the agents it leads.

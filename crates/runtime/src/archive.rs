@@ -3,12 +3,17 @@
 //! In: an archive, a run between two events. Out: the same run later, or another of the same agents. Never here: files, what models
 //! save of themselves ([`metachron_contact::Agent::archive`]). Not saved: CPU times, percentiles, samples of watched points, storage.
 
+use super::agent_clock::Timeline;
 use super::agent_runner::AgentRunner;
-use super::cluster::Placed;
+use super::cluster::{Place, Placed, check_places};
 use super::handle::Shared;
+use super::lockstep::Phase;
 use super::sleep::SleepRegistry;
 use metachron_core::{Archive, ArchiveError, archive_values};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::sync::Arc;
+use std::time::Duration;
 
 impl AgentRunner {
     /// Writes or reads it, without the agents that it leads.
@@ -39,8 +44,66 @@ impl AgentRunner {
     }
 }
 
+/// All agents of a run, taken from their places, and the time.
+pub(super) struct Cut {
+    pub all: Vec<Placed>,
+    /// How many agents there have to be.
+    pub agents: usize,
+    pub timeline: Timeline,
+    pub now: Duration,
+}
+
+impl Cut {
+    /// Writes or reads agents, places and time: what every executor has. What lockstep has besides follows.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let Self { all, agents, timeline, now } = self;
+        if all.len() != *agents {
+            let what = "an agent whose step does not end, or whose thread panicked,";
+            return Err(ArchiveError::Refused { what: what.to_owned() });
+        }
+        archive_agents(all, archive)?;
+        let mut places: Vec<Place> = all.iter().map(|placed| placed.place).collect();
+        archive.value(&mut places)?;
+        check_places(&places, all)?;
+        all.iter_mut().zip(places).for_each(|(placed, place)| placed.place = place);
+        archive_values!(archive, *timeline, *now)
+    }
+
+    /// The same for an executor in real time, whose clock reads the present `now`.
+    pub fn archive_in_real_time(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let (wall, piece) = (self.now, self.timeline.piece());
+        self.archive(archive)?;
+        let mut events: Option<VirtualEvents> = None;
+        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)?;
+        if !archive.is_reading() {
+            return Ok(());
+        }
+        self.all.iter_mut().for_each(|placed| placed.runner.rebase(wall));
+        (self.timeline, self.now) = (self.timeline.moved(self.now, wall, piece + 1), wall);
+        Ok(())
+    }
+}
+
+/// The events to come of a run in virtual time.
+#[derive(Default)]
+pub(super) struct VirtualEvents {
+    /// Due times of turns.
+    pub due: BinaryHeap<Reverse<(Duration, u32)>>,
+    /// Service of the cores, and the jobs in progress.
+    pub served: u128,
+    pub jobs: BinaryHeap<Reverse<(u128, u32)>>,
+    /// For each agent its phase and how many turns it has made.
+    pub phases: Vec<(Phase, u64)>,
+}
+
+impl VirtualEvents {
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.due, self.served, self.jobs, self.phases)
+    }
+}
+
 /// Writes or reads all agents of a run, by rising numbers, with what they share.
-pub(super) fn archive_agents(all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+fn archive_agents(all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
     archive.fixed("the number of agents", all.len())?;
     for Placed { runner, .. } in &mut *all {
         let shared = Arc::clone(&runner.shared);

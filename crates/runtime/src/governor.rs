@@ -45,7 +45,7 @@ pub struct TurnMeasure {
 }
 
 /// A governor's demand on its agent; `None` leaves the present value.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Demand {
     /// The step length; clamped to the agent's range.
     pub dt: Option<SimSpan>,

@@ -116,6 +116,12 @@ impl AgentHandle {
         Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
     }
 
+    /// Whether it was woken, and has not made a turn since.
+    #[must_use]
+    pub fn is_woken(&self) -> bool {
+        self.shared.sleep.is_woken(self.shared.id)
+    }
+
     /// Its newest contact shape; `None` where nothing can touch it. It is another one, with the same kind, traits and vertices, where matter was
     /// taken out of it ([`Command::Carve`]).
     #[must_use]

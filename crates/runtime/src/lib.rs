@@ -132,15 +132,13 @@ pub trait Run: Send {
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
 
     /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same agents; it then goes on
-    /// as it did then, to the bit. Watched points keep their samples.
+    /// as it did then; in lockstep to the bit. In real time all turns in progress end first, each agent at a time of its own, and the clock
+    /// goes on from where it is. Watched points keep their samples. A state that one executor has written another can read.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] in real time, and by agents and governors that do not save their state: nothing is changed then. Any error
+    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then. Any error
     /// while reading leaves a run that is not usable any more.
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let _ = archive;
-        Err(ArchiveError::Refused { what: "a run in real time".to_owned() })
-    }
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError>;
 
     /// Simulated time now.
     fn sim_now(&self) -> SimTime {

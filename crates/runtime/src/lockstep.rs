@@ -10,8 +10,8 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
-use super::archive::archive_agents;
-use super::cluster::{Handover, Place, Placed, check_places, close_remaining, hand_over, put_back, take_apart};
+use super::archive::{Cut, VirtualEvents};
+use super::cluster::{Handover, Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
@@ -20,7 +20,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use cores::Cores;
-use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -52,7 +52,7 @@ struct AgentEntry {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-enum Phase {
+pub(super) enum Phase {
     Waiting,
     /// In a turn.
     Busy(Turn),
@@ -63,7 +63,7 @@ enum Phase {
 
 /// A turn that goes on.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Turn {
+pub(super) struct Turn {
     /// When it began.
     since: Duration,
     /// Its jobs that have not ended.
@@ -256,23 +256,41 @@ impl Lockstep {
         close_remaining(&self.all.handles, &self.timeline, self.now);
     }
 
-    /// Writes or reads the events to come and all agents, which were taken from their places.
-    fn archive_all(&mut self, all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_agents(all, archive)?;
-        let mut places: Vec<Place> = all.iter().map(|placed| placed.place).collect();
-        archive.value(&mut places)?;
-        check_places(&places, all)?;
-        archive_values!(archive, self.timeline, self.now, self.due)?;
-        self.cores.archive(archive)?;
-        for entry in &mut self.entries {
-            archive_values!(archive, entry.phase, entry.turns)?;
+    /// Writes or reads all agents, which were taken from their places, and the events to come; a cut of a run in real time has none of these.
+    fn archive_all(&mut self, cut: &mut Cut, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        cut.archive(archive)?;
+        let phases = self.entries.iter().map(|entry| (entry.phase, entry.turns)).collect();
+        let (served, jobs) = self.cores.jobs();
+        let mut events = Some(VirtualEvents { due: self.due.clone(), served, jobs, phases });
+        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)?;
+        if !archive.is_reading() {
+            return Ok(());
         }
+        (self.timeline, self.now) = (cut.timeline, cut.now);
+        let Some(VirtualEvents { due, served, jobs, phases }) = events else {
+            self.due.clear();
+            self.cores = Cores::new(self.machine.cores);
+            for (entry, placed) in self.entries.iter_mut().zip(&cut.all) {
+                (entry.phase, entry.turns) = (phase_of(placed), 0);
+            }
+            // some may have been notified just before
+            cut.all.iter().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
+            return Ok(());
+        };
+        if phases.len() != self.entries.len() {
+            let (found, expected) = (phases.len().to_string(), self.entries.len().to_string());
+            return Err(ArchiveError::Mismatch { what: "the number of agents with phases", found, expected });
+        }
+        self.cores.set_jobs(served, jobs);
+        self.due = due;
+        self.entries.iter_mut().zip(phases).for_each(|(entry, (phase, turns))| {
+            (entry.phase, entry.turns) = (phase, turns);
+        });
         let owners = self.due.iter().map(|Reverse((_, agent))| *agent).chain(self.cores.owners());
-        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= all.len()) {
-            let (found, expected) = (agent.to_string(), format!("below {}", all.len()));
+        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= cut.all.len()) {
+            let (found, expected) = (agent.to_string(), format!("below {}", cut.all.len()));
             return Err(ArchiveError::Mismatch { what: "the number of an agent with a turn", found, expected });
         }
-        all.iter_mut().zip(places).for_each(|(placed, place)| placed.place = place);
         Ok(())
     }
 
@@ -307,6 +325,16 @@ fn join(jobs: &mut Vec<Duration>, cores: u32) {
         }
     }
     jobs.truncate(cores);
+}
+
+/// The phase of an agent between two of its turns.
+fn phase_of(Placed { runner, place }: &Placed) -> Phase {
+    match place {
+        Place::Home if runner.is_parked() => Phase::Parked,
+        Place::Home if runner.shared.gauges.is_resting() => Phase::Resting,
+        Place::Home => Phase::Waiting,
+        Place::Led { .. } | Place::Waiting { .. } | Place::Returning => Phase::Led,
+    }
 }
 
 /// An event in virtual time.
@@ -360,10 +388,14 @@ impl Run for Lockstep {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.settle();
-        let mut all = take_apart(self.entries.iter_mut().map(|entry| entry.actor.take()), &self.all.handles);
-        let outcome = self.archive_all(&mut all, archive);
-        let homes = put_back(all, &self.all.handles);
+        let all = take_apart(self.entries.iter_mut().map(|entry| entry.actor.take()), &self.all.handles);
+        let mut cut = Cut { all, agents: self.entries.len(), timeline: self.timeline, now: self.now };
+        let outcome = self.archive_all(&mut cut, archive);
+        let homes = put_back(cut.all, &self.all.handles);
         self.entries.iter_mut().zip(homes).for_each(|(entry, home)| entry.actor = home);
+        if archive.is_reading() && self.due.is_empty() {
+            self.schedule_all();
+        }
         outcome
     }
 

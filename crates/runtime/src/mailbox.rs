@@ -12,7 +12,7 @@ use std::sync::atomic::{
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A command to an agent.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Command {
     /// Simulate at this resolution; clamped to the agent's range.
     Retune(Resolution),

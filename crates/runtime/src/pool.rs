@@ -14,14 +14,16 @@ mod worker;
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agents::Agents;
+use super::archive::Cut;
 use super::clock::Clock;
+use super::cluster::{close_remaining, put_back, take_apart};
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, Archive, ArchiveError};
 use shared::PoolState;
 use std::num::NonZero;
 use std::sync::Arc;
@@ -39,6 +41,9 @@ pub struct Pool {
     all: Everyone,
     messages: Sender<Message>,
     watch: Option<JoinHandle<()>>,
+    workers: usize,
+    patience: Duration,
+    priority: Priority,
 }
 
 impl Pool {
@@ -66,22 +71,49 @@ impl Pool {
         let (sleep, handles) = (Arc::clone(&all.sleep), all.handles.clone());
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
+        let (messages, watch) = Self::watched(&state, workers, patience, priority)?;
+        Ok(Self { state, all, messages, watch: Some(watch), workers, patience, priority })
+    }
+
+    /// Starts workers, and the thread that watches them.
+    fn watched(
+        state: &Arc<PoolState>,
+        workers: usize,
+        patience: Duration,
+        priority: Priority,
+    ) -> Result<(Sender<Message>, JoinHandle<()>), RunError> {
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
-        let supervisor = Supervisor::start(Arc::clone(&state), workers, patience, priority).map_err(no_thread)?;
+        let supervisor = Supervisor::start(Arc::clone(state), workers, patience, priority).map_err(no_thread)?;
         let messages = supervisor.sender();
         let watch =
             thread::Builder::new().name("pool:watch".to_owned()).spawn(|| supervisor.watch()).map_err(|source| {
                 state.sleep.stop();
                 no_thread(source)
             })?;
-        Ok(Self { state, all, messages, watch: Some(watch) })
+        Ok((messages, watch))
     }
 
-    fn end(&mut self) {
+    /// Ends all workers, between turns.
+    fn halt(&mut self) {
         self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
         let _ = self.messages.send(Message::Stop);
         drop(self.watch.take().map(JoinHandle::join));
+    }
+
+    /// Starts workers again.
+    fn go_on(&mut self) -> Result<(), RunError> {
+        self.state.sleep.go_on();
+        let (messages, watch) = Self::watched(&self.state, self.workers, self.patience, self.priority)?;
+        (self.messages, self.watch) = (messages, Some(watch));
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        self.halt();
+        let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
+        self.state.clear(|mut actor| actor.close_account(&timeline, now));
+        close_remaining(&self.state.handles, &timeline, now);
     }
 }
 
@@ -124,6 +156,24 @@ impl Run for Pool {
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
         self.all.leave(id)
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.halt();
+        let mut homes = Vec::new();
+        self.state.clear(|actor| homes.push(Some(actor)));
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let agents = self.all.handles.len();
+        let mut cut = Cut { all, agents, timeline: self.state.timeline.read(), now: self.state.clock.now() };
+        let outcome = cut.archive_in_real_time(archive);
+        if archive.is_reading() {
+            self.state.timeline.set(cut.timeline);
+        }
+        self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
+        // some may have been woken, or have returned from a leader
+        self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(self.go_on().map_err(no_thread))
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -3,16 +3,19 @@
 //! In: a step that has been made. Out: a state, written and later published or withheld ([`super::faults`]); the agents it acts on are
 //! notified once the state is visible. Never here: the step, the agent's own view.
 
+use super::agent_clock::Timeline;
 use super::agent_runner::{AgentRunner, PendingTurn};
 use super::metrics::Entry;
 use super::probe::Trace;
 use metachron_core::SimTime;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 impl AgentRunner {
     /// Records a step in the metrics and publishes its state; whether the state is visible.
-    pub fn record_step(&mut self, open: &PendingTurn, now: SimTime, work_s: f64) -> bool {
-        let missed = now > self.pace.scene_time();
+    pub fn record_step(&mut self, open: &PendingTurn, timeline: &Timeline, wall: Duration, work_s: f64) -> bool {
+        let now = timeline.sim_at(wall);
+        let missed = now > self.pace.scene_time() && !timeline.is_free();
         let entry = Entry { steps: self.own_steps(), now, late: open.start.late, missed, work_s };
         // metrics first: a state that is visible is accounted for
         self.metrics.write(&self.shared.gauges, &self.pace, entry);

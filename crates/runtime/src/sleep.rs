@@ -9,6 +9,7 @@
 //! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 
 use super::dirty_set::DirtySet;
+use super::sync::Mutex;
 use super::sync::atomic::{
     AtomicBool, AtomicU32, AtomicU64,
     Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
@@ -18,7 +19,7 @@ use super::sync::thread::Thread;
 use super::table::Table;
 use super::worker_wakeup::WorkerWakeup;
 use metachron_core::{AgentId, SimSpan, SimTime};
-use std::sync::OnceLock;
+use std::sync::{OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How long after the last touch an agent may not rest, simulated time: longer than the period of any touching agent above 10 Hz, so that
@@ -44,7 +45,8 @@ struct Signal {
     closed: AtomicBool,
     /// Simulated nanoseconds of the last touch, plus one; zero for never.
     touched: AtomicU64,
-    thread: OnceLock<Thread>,
+    /// Changes only where a run goes on after a cut.
+    thread: Mutex<Option<Thread>>,
 }
 
 /// Not the number of any agent.
@@ -58,7 +60,7 @@ impl Default for Signal {
             leader: AtomicU32::new(NO_AGENT),
             closed: AtomicBool::new(false),
             touched: AtomicU64::new(0),
-            thread: OnceLock::new(),
+            thread: Mutex::new(None),
         }
     }
 }
@@ -137,7 +139,7 @@ impl SleepRegistry {
     /// Registers the thread to unpark for `id`.
     pub fn set_thread(&self, id: AgentId, thread: Thread) {
         if let Some(signal) = self.signal(id) {
-            signal.thread.get_or_init(|| thread);
+            *signal.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
         }
     }
 
@@ -205,7 +207,7 @@ impl SleepRegistry {
             return;
         }
         self.notified.store(true, Release);
-        signal.thread.get().inspect(|t| t.unpark());
+        signal.unpark();
     }
 
     /// Reports that another agent acts on `id` at simulated time `now`.
@@ -275,7 +277,7 @@ impl SleepRegistry {
         if let Some(wakeup) = self.wakeup.get() {
             wakeup.wake_all();
         }
-        self.signals.iter().filter_map(|signal| signal.thread.get()).for_each(Thread::unpark);
+        self.signals.iter().for_each(Signal::unpark);
     }
 
     /// Records at `now` that an agent near peers is far behind, or is still postponed relative to the scene's time.
@@ -314,6 +316,11 @@ impl SleepRegistry {
         self.unpark_all();
     }
 
+    /// Takes that back, once all have ended: the run goes on with others.
+    pub fn go_on(&self) {
+        self.stop.store(false, Release);
+    }
+
     /// Whether threads have been asked to end.
     pub fn stopping(&self) -> bool {
         self.stop.load(Acquire)
@@ -321,6 +328,12 @@ impl SleepRegistry {
 }
 
 impl Signal {
+    fn unpark(&self) {
+        if let Some(thread) = &*self.thread.lock().unwrap_or_else(PoisonError::into_inner) {
+            thread.unpark();
+        }
+    }
+
     fn state(&self) -> SignalState {
         SignalState {
             resting: self.resting.load(Acquire),

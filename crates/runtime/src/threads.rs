@@ -8,8 +8,9 @@ use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::agents::Agents;
+use super::archive::Cut;
 use super::clock::{Clock, wait_until};
-use super::cluster::{Handover, close_remaining, hand_over};
+use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
@@ -17,7 +18,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, Archive, ArchiveError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
@@ -30,12 +31,15 @@ pub const THREADS_MAX: usize = 1000;
 /// pool, 100 cost 10 and 6 (`docs/throughput.md`).
 pub const AUTO_THREADS_MAX: usize = 64;
 
+/// A thread that gives back its agent when it ends, if it has it.
+type Ended = JoinHandle<Option<Box<AgentRunner>>>;
+
 /// Agents on threads of their own.
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
     all: Everyone,
-    threads: Vec<Option<JoinHandle<()>>>,
+    threads: Vec<Option<Ended>>,
     /// Where threads report that they have ended.
     farewells: Sender<AgentId>,
     ended: Receiver<AgentId>,
@@ -74,7 +78,7 @@ impl Threads {
         Ok(())
     }
 
-    fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<JoinHandle<()>, RunError> {
+    fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
         let name = format!("agent:{}", shared.name.replace('\0', ""));
         let stage = AgentThread {
             clock: Arc::clone(&self.clock),
@@ -88,29 +92,49 @@ impl Threads {
             let _farewell = farewell;
             // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
-            stage.run(actor, &shared);
+            stage.run(actor, &shared)
         };
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
 
-    /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind.
-    fn end(&mut self) {
+    /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind. Gives back
+    /// the agents that make turns of their own.
+    fn halt(&mut self) -> Vec<Option<Box<AgentRunner>>> {
         self.all.sleep.stop();
-        let mut patience = Duration::ZERO;
+        let (mut patience, mut homes) = (Duration::ZERO, Vec::with_capacity(self.threads.len()));
+        homes.resize_with(self.threads.len(), || None);
         while self.threads.iter().any(Option::is_some) {
             let running = (0..).map(AgentId).zip(&self.threads).filter(|(_, thread)| thread.is_some());
             patience = self.all.sleep.end_patience(running.map(|(id, _)| id));
             let Ok(id) = self.ended.recv_timeout(patience) else { break };
-            if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
+            let at = id.0 as usize;
+            if let Some(thread) = self.threads.get_mut(at).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
-                drop(thread.join());
+                homes[at] = thread.join().ok().flatten();
             }
         }
         for (handle, _) in self.all.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
             handle.shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
-        close_remaining(&self.all.handles, &self.timeline.read(), self.clock.now());
+        homes
+    }
+
+    /// Gives the agents their threads again.
+    fn go_on(&mut self, homes: Vec<Option<Box<AgentRunner>>>) -> Result<(), RunError> {
+        self.all.sleep.go_on();
+        for (actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
+            let shared = Arc::clone(&self.all.handles[id.0 as usize].shared);
+            self.begin(actor, shared)?;
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        let homes = self.halt();
+        let (timeline, now) = (self.timeline.read(), self.clock.now());
+        homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
+        close_remaining(&self.all.handles, &timeline, now);
     }
 }
 
@@ -159,6 +183,20 @@ impl Run for Threads {
         self.all.leave(id)
     }
 
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let homes = self.halt();
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let agents = self.all.handles.len();
+        let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
+        let outcome = cut.archive_in_real_time(archive);
+        if archive.is_reading() {
+            self.timeline.set(cut.timeline);
+        }
+        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(gone_on.map_err(no_thread))
+    }
+
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
         self.all.handles.iter().map(AgentHandle::stats).collect()
@@ -187,26 +225,24 @@ struct AgentThread {
 
 impl AgentThread {
     /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
-    fn run(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) {
+    fn run(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) -> Option<Box<AgentRunner>> {
         while !shared.sleep.stopping() {
             here = match here {
                 Some(actor) => match self.make_own_turns(actor) {
-                    Some(actor) if actor.is_parked() => return,
+                    Some(actor) if actor.is_parked() => return Some(actor),
                     moved => moved,
                 },
                 None => self.wait_for(shared.handover.as_ref()),
             };
         }
-        if let Some(mut actor) = here {
-            self.settle(&mut actor);
-            actor.close_account(&self.timeline.read(), self.clock.now());
-        }
+        here.iter_mut().for_each(|actor| self.settle(actor));
+        here
     }
 
     /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
     fn make_own_turns(&mut self, mut actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let sleep = Arc::clone(&actor.shared.sleep);
-        let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
+        let mut next = actor.next(&self.timeline.read(), self.clock.now());
         while !sleep.stopping() {
             next = match next {
                 Next::Due => self.wait_or_turn(&mut actor),

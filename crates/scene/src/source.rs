@@ -57,6 +57,18 @@ impl Source {
         Self::from_bytes(name, bytes.to_vec(), SiblingFiles::Unavailable)
     }
 
+    /// The scene `name`, built in or a path, with the text that it had when it was recorded; files next to it are read where they were then.
+    ///
+    /// # Errors
+    /// [`SceneError`] when the text is too long.
+    pub fn recorded(name: &str, text: &str) -> Result<Self, SceneError> {
+        let siblings = match builtin::find(name) {
+            Some(_) => SiblingFiles::BuiltIn,
+            None => SiblingFiles::Folder(Path::new(name).parent().map_or_else(PathBuf::new, Path::to_path_buf)),
+        };
+        Ok(Self { siblings, ..Self::memory(name, text.as_bytes())? })
+    }
+
     fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
             Ok(text) => Ok(Self { name: name.to_owned(), text, siblings }),

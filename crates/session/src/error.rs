@@ -2,7 +2,7 @@
 
 #[cfg(feature = "picture")]
 use metachron_render::GpuError;
-use metachron_world::WorldError;
+use metachron_world::{CheckpointError, RecordError, WorldError};
 #[cfg(feature = "picture")]
 use std::path::PathBuf;
 
@@ -13,6 +13,15 @@ pub enum SessionError {
     /// The agents could not be started.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// A recording could not be repeated.
+    #[error("the recording cannot be repeated: {0}")]
+    Replay(#[from] CheckpointError),
+    /// A replay came to something that the recorded run did not.
+    #[error("the replay stopped: {0}")]
+    Diverged(String),
+    /// A recording could not be written to its end.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// The adapter failed.
     #[cfg(feature = "picture")]
     #[error("drawing failed")]

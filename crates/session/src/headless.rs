@@ -22,6 +22,8 @@ pub enum End {
     Frames(u64),
     /// After so many simulated seconds.
     Seconds(f64),
+    /// With the recording that is repeated.
+    Recording,
 }
 
 /// What draws the frames.
@@ -93,7 +95,7 @@ pub fn play_headless(
     let mut interrupted = false;
     loop {
         session.wait_until(due);
-        let done = share_done(&session, plan.end);
+        let done = share_done(&session, plan.end)?;
         if done >= 1.0 || interrupted {
             break;
         }
@@ -114,6 +116,7 @@ pub fn play_headless(
     #[cfg(feature = "picture")]
     write_picture(&mut session, &mut plan)?;
     let adapter = plan.drawing.adapter();
+    session.end_recording()?;
     Ok(session.end(adapter, interrupted))
 }
 
@@ -132,11 +135,12 @@ fn warm_up(session: &mut Session, plan: &mut Headless) -> Result<(), SessionErro
     Ok(())
 }
 
-fn share_done(session: &Session, end: End) -> f64 {
-    match end {
+fn share_done(session: &Session, end: End) -> Result<f64, SessionError> {
+    Ok(match end {
         End::Frames(frames) => session.frames() as f64 / frames as f64,
         End::Seconds(seconds) => session.sim_now().as_secs_f64() / seconds,
-    }
+        End::Recording => session.replayed().unwrap_or(Ok(1.0)).map_err(SessionError::Diverged)?,
+    })
 }
 
 /// Gathers, chooses, draws and updates the controller, unless it must not learn from this frame (`skip`).

@@ -7,6 +7,7 @@ mod ahead;
 mod choose;
 mod limit;
 mod record;
+mod recording;
 
 use super::assemble;
 #[cfg(feature = "picture")]
@@ -29,7 +30,7 @@ use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView, States};
 use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader, TimelineCommand};
 use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
-use metachron_world::{Scene, World, WorldError, machine};
+use metachron_world::{Govern, Scene, World, WorldError, machine};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -134,10 +135,17 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError::World`]; nothing runs then.
-    pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
+    pub fn open(scene: Scene) -> Result<Self, SessionError> {
+        Self::open_as(scene, |scene, govern| Ok(World::start_governed(scene, scene.executor, govern)?))
+    }
+
+    fn open_as(
+        mut scene: Scene,
+        start: impl FnOnce(&Scene, Govern<'_>) -> Result<World, SessionError>,
+    ) -> Result<Self, SessionError> {
         let machine = machine(&scene);
         let mut governors = assemble::Governors::of(&scene);
-        let world = World::start_governed(&scene, scene.executor, &mut |member| governors.governor(member))?;
+        let world = start(&scene, &mut |member| governors.governor(member))?;
         scene.executor = world.executor();
         let controlled = governors.controlled;
         let mut scene_view = assemble::scene_view(&scene);

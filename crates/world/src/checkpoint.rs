@@ -1,6 +1,6 @@
 //! A world's state at one moment, kept in memory or in a file, to go on from it: in the same world or in another process.
 //!
-//! In: a world in lockstep between two events. Out: bytes by which it, or a world started from the same scene, goes on as this one would
+//! In: a world between turns. Out: bytes by which it, or a world started from the same scene, goes on as this one would
 //! have, to the bit. Never here: what the state of an object is (`archive` of each says it), the scene.
 //!
 //! A file: [`MAGIC`], the version of the format, the length and the checksum of what follows, then the program's version, the scene's
@@ -25,6 +25,7 @@ const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 pub struct Checkpoint {
     pub(super) of: SceneIdentity,
     pub(super) time: SimTime,
+    pub(super) times: Vec<SimTime>,
     pub(super) state: Vec<u8>,
 }
 
@@ -143,6 +144,12 @@ impl Checkpoint {
         self.time
     }
 
+    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of its own.
+    #[must_use]
+    pub fn times(&self) -> &[SimTime] {
+        &self.times
+    }
+
     /// The name of its scene.
     #[must_use]
     pub fn scene(&self) -> &str {
@@ -175,7 +182,7 @@ impl Checkpoint {
     }
 
     /// The bytes of a file.
-    fn to_bytes(&self) -> Vec<u8> {
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut archive = Archive::writer();
         let mut copy = self.clone();
         // plain values of this program can all be written
@@ -192,7 +199,7 @@ impl Checkpoint {
     }
 
     /// The checkpoint in the bytes of a file.
-    fn from_bytes(bytes: &[u8]) -> Result<Self, BadCheckpoint> {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, BadCheckpoint> {
         let Some((head, body)) = bytes.split_first_chunk::<HEAD>().filter(|(head, _)| head.starts_with(&MAGIC)) else {
             return Err(BadCheckpoint::NoCheckpoint);
         };
@@ -222,12 +229,12 @@ impl Checkpoint {
     }
 
     fn archive(program: &mut String, of: &mut Self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        metachron_core::archive_values!(archive, *program, of.of, of.time, of.state)
+        metachron_core::archive_values!(archive, *program, of.of, of.time, of.times, of.state)
     }
 
     fn empty() -> Self {
         let of = SceneIdentity::default();
-        Self { of, time: SimTime::ZERO, state: vec![] }
+        Self { of, time: SimTime::ZERO, times: vec![], state: vec![] }
     }
 }
 
@@ -290,7 +297,7 @@ impl SceneIdentity {
 }
 
 /// FNV-1a, 64 bits: no change of one byte leaves it as it was.
-fn checksum(bytes: &[u8]) -> u64 {
+pub(super) fn checksum(bytes: &[u8]) -> u64 {
     const FNV_PRIME: u64 = 0x0100_0000_01b3;
     bytes.iter().fold(HASH_START, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(FNV_PRIME))
 }

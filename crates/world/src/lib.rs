@@ -1,7 +1,7 @@
 //! A scene as a world that runs: the resolved scene, its start, its agents and their latest states.
 //!
 //! In: a [`Scene`] built in code, or read by another crate. Out: a [`World`].
-//! Never here: TOML, a file but those of checkpoints, the GPU, a law of control.
+//! Never here: TOML, a file but those of checkpoints and recordings, the GPU, a law of control.
 //!
 //! ```
 //! use metachron_core::SimSpan;
@@ -34,9 +34,14 @@ mod frames;
 mod initial_overlap;
 mod initial_shape;
 pub mod kinds;
+mod log;
 mod object;
 mod overlap;
+mod pace;
 mod queries;
+mod recorded;
+mod recording;
+mod replay;
 mod scene;
 mod sensors;
 mod spec;
@@ -52,7 +57,9 @@ pub use initial_overlap::Moved;
 pub use metachron_runtime::Command;
 pub use object::{Object, Touched};
 pub use overlap::Overlap;
+pub use pace::Pace;
 pub use queries::{Cast, ContactNow, Hit};
+pub use recording::{BadRecording, RecordError, Recording, SceneText};
 pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe,
     RENDER_SCALE, Scene, Scenery, Spec, Target, View,

@@ -11,17 +11,19 @@ use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::kinds::ExecutorKind;
+use super::log::{Log, logged};
 use super::object::{Object, WorldTag};
+use super::recording::{Entry, added};
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
     Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
@@ -98,6 +100,12 @@ pub enum WorldError {
         /// The names that there are.
         known: String,
     },
+    /// A pace that no machine keeps, or that is a pause.
+    #[error("the factor of time is {factor}; expected 0.001 to 100")]
+    BadPace {
+        /// The factor.
+        factor: f64,
+    },
     /// A query that asks for nothing that can be found.
     #[error("{0}")]
     BadQuery(String),
@@ -116,25 +124,29 @@ pub enum WorldError {
 /// Its time stands until [`World::advance`] or [`World::drive`] lets it pass.
 #[derive(Clone)]
 pub struct World {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
-struct Shared {
+pub(super) struct Shared {
     tag: WorldTag,
     state: Mutex<State>,
     agents: Agents,
     /// Gravity, m/s²: that of objects that join it.
-    gravity: DVec3,
+    pub gravity: DVec3,
     /// The static solids and joints.
-    surroundings: Arc<ClusterScene>,
+    pub surroundings: Arc<ClusterScene>,
     instruments: Instruments,
     /// The time when it was last let pass or had passed, nanoseconds.
     seen_ns: AtomicU64,
     executor: ExecutorKind,
     /// By what checkpoints of its scene are known again.
-    identity: SceneIdentity,
+    pub identity: SceneIdentity,
     /// The clock of executors in real time.
-    clock: Arc<SystemClock>,
+    pub clock: Arc<SystemClock>,
+    /// Whether its time waits for its objects ([`super::Pace::Free`]).
+    pub is_free: AtomicBool,
+    /// What is written down of it, or followed.
+    pub log: Arc<Log>,
 }
 
 impl std::fmt::Debug for World {
@@ -150,13 +162,13 @@ impl WorldError {
 }
 
 /// What makes agents step, or where its time stood when it ended.
-enum State {
+pub(super) enum State {
     Running(Box<dyn Run>),
     Stopped { now: Duration, time: SimTime, timeline: Timeline },
 }
 
-/// How often a real-time world looks whether all agents have arrived.
-const POLL_INTERVAL: Duration = Duration::from_micros(500);
+/// Why a replay refuses what is asked of it.
+const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -172,9 +184,21 @@ impl World {
     /// # Errors
     /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
     pub fn start_governed(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Self, WorldError> {
-        let executor = assemble::executor(executor, scene.agents.len());
+        Self::start_logged(scene, executor, govern, Log::default())
+    }
+
+    pub(super) fn start_logged(
+        scene: &Scene,
+        executor: ExecutorKind,
+        govern: Govern<'_>,
+        log: Log,
+    ) -> Result<Self, WorldError> {
+        let (executor, log) = (assemble::executor(executor, scene.agents.len()), Arc::new(log));
         let surroundings = assemble::surroundings(scene)?;
-        let spawns = assemble::spawns(scene, &surroundings, executor, govern)?;
+        let spawns = match executor {
+            ExecutorKind::Lockstep => assemble::spawns(scene, &surroundings, executor, &mut logged(govern, &log))?,
+            _ => assemble::spawns(scene, &surroundings, executor, govern)?,
+        };
         let clock = Arc::new(SystemClock::new());
         let priority = assemble::priority(scene);
         let mut run: Box<dyn Run> = match executor {
@@ -190,8 +214,20 @@ impl World {
         let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
         let instruments = Instruments { joint_names, joints, sensors: scene.sensors.clone() };
         let seen_ns = AtomicU64::new(0);
-        let shared =
-            Shared { tag, state, agents, gravity, surroundings, instruments, seen_ns, executor, identity, clock };
+        let shared = Shared {
+            tag,
+            state,
+            agents,
+            gravity,
+            surroundings,
+            instruments,
+            seen_ns,
+            executor,
+            identity,
+            clock,
+            is_free: AtomicBool::new(false),
+            log,
+        };
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -218,10 +254,12 @@ impl World {
         Ok(world)
     }
 
-    /// The state of the world now: all that the next bit of it needs. In lockstep only; samples of watched points and CPU times are not in it.
+    /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
+    /// turns in progress end first, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
+    /// either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] on threads and in a pool, and where a model or a governor does not save its state;
+    /// [`CheckpointError::Refused`] where a step does not end, and where a model or a governor does not save its state;
     /// [`CheckpointError::Stopped`]. The world goes on as it was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();
@@ -229,11 +267,12 @@ impl World {
         let mut archive = Archive::writer();
         run.archive(&mut archive).map_err(CheckpointError::Refused)?;
         let of = self.shared.identity.now(&self.shared.agents);
-        Ok(Checkpoint { of, time: run.sim_now(), state: archive.into_bytes() })
+        let times = self.shared.agents.iter().map(|agent| agent.latest().moment()).collect();
+        Ok(Checkpoint { of, time: run.sim_now(), times, state: archive.into_bytes() })
     }
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, to the bit. Objects and agents stay valid.
+    /// again, in lockstep to the bit. Objects and agents stay valid.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where objects have joined or left since, [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
@@ -242,9 +281,10 @@ impl World {
         self.shared.identity.now(&self.shared.agents).check(&checkpoint.of)?;
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
-        if self.executor() != ExecutorKind::Lockstep {
-            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a world in real time".to_owned() }));
+        if self.shared.log.is_replayed() {
+            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
         }
+        self.shared.log.note(|| Entry::Restore(checkpoint.to_bytes()));
         let outcome = read_state(run.as_mut(), &checkpoint.state);
         self.see(run.as_ref());
         let Err(reason) = outcome else { return Ok(()) };
@@ -319,7 +359,15 @@ impl World {
             }
             _ => {}
         }
-        agent.send(command).map_err(|error| refused(error.to_string()))
+        // a recording has the order of commands and waits
+        let log = &self.shared.log;
+        if log.is_replayed() {
+            return Err(refused(REPLAYED.to_owned()));
+        }
+        let _order = log.is_recorded().then(|| self.state());
+        agent.send(command).map_err(|error| refused(error.to_string()))?;
+        log.note(|| Entry::Command(object.id(), command));
+        Ok(())
     }
 
     /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
@@ -352,7 +400,13 @@ impl World {
         if !state.is_finite() {
             return refused("every number of a state must be finite".to_owned());
         }
+        let log = &self.shared.log;
+        if log.is_replayed() {
+            return refused(REPLAYED.to_owned());
+        }
+        let _order = log.is_recorded().then(|| self.state());
         agent.set_state(state.clone());
+        log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
         Ok(())
     }
 
@@ -366,11 +420,25 @@ impl World {
         if self.object(&name).is_ok() {
             return Err(WorldError::SameName { name });
         }
+        let (part, log) = (part.into(), &self.shared.log);
+        if log.is_replayed() {
+            return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
+        }
+        let entry = added(&name, &part);
+        if log.is_recorded() && entry.is_none() {
+            let reason = "a recording has rigid bodies and tubes that join, and no agent of your own".to_owned();
+            return Err(WorldError::Refused { name, reason });
+        }
         let id = AgentId(self.shared.agents.len() as u32);
-        let member = member(id, name, part.into(), self.shared.gravity)?;
+        let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        Ok(self.shared.tag.object(run.add(spawn)?.id()))
+        let joined = run.add(spawn)?.id();
+        match entry {
+            Some(entry) => log.note(|| entry),
+            None => log.note_begun(),
+        }
+        Ok(self.shared.tag.object(joined))
     }
 
     /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
@@ -381,8 +449,14 @@ impl World {
     pub fn remove(&self, object: Object) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
+        let log = &self.shared.log;
+        if log.is_replayed() {
+            return Err(refused(REPLAYED.to_owned()));
+        }
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        run.remove(object.id()).map_err(|error| refused(error.to_string()))
+        run.remove(object.id()).map_err(|error| refused(error.to_string()))?;
+        log.note(|| Entry::Remove(object.id()));
+        Ok(())
     }
 
     /// Events of its objects from now on.
@@ -427,26 +501,6 @@ impl World {
         state_hash(&self.shared.agents)
     }
 
-    /// Lets the world live for `span`, then stops its time.
-    ///
-    /// In lockstep every step that is due by then has been made. On threads and in the pool time passes in real time, and each object that
-    /// neither rests nor has failed has lived to the end at least; one may be a step ahead.
-    /// A world that was stopped stays as it is.
-    pub fn advance(&self, span: SimSpan) {
-        if self.executor() == ExecutorKind::Lockstep {
-            return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
-        }
-        let end = self.time() + span;
-        self.drive(TimelineCommand::Run);
-        while !self.has_stopped() {
-            let now = self.now();
-            self.wait_until(now + POLL_INTERVAL);
-            if self.time() >= end && self.shared.agents.iter().all(|agent| has_reached(agent, end)) {
-                return self.drive(TimelineCommand::Pause);
-            }
-        }
-    }
-
     /// The executor that runs the agents.
     #[must_use]
     pub fn executor(&self) -> ExecutorKind {
@@ -471,14 +525,14 @@ impl World {
     /// Waits until the wall time `until`, while the agents run; returns at once if that has passed.
     pub fn wait_until(&self, until: Duration) {
         match self.executor() {
-            ExecutorKind::Lockstep => self.with_run(|run| run.wait_until(until)),
+            ExecutorKind::Lockstep => self.with_run(|| Entry::Wait(until), |run| run.wait_until(until)),
             _ => wait_until(&*self.shared.clock, until),
         }
     }
 
     /// Lets a frame's own `work` pass: it occupies a core of the declared machine in lockstep, and has passed by itself elsewhere.
     pub fn spend(&self, work: Duration) {
-        self.with_run(|run| run.spend(work));
+        self.with_run(|| Entry::Spend(work), |run| run.spend(work));
     }
 
     /// The timeline in force.
@@ -492,12 +546,14 @@ impl World {
 
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&self, drive: TimelineCommand) {
-        self.with_run(|run| run.drive(drive));
+        self.with_run(|| Entry::Drive(drive), |run| run.drive(drive));
     }
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
     /// Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
+        // who wants to know whether it is complete has ended it before
+        drop(self.end_recording());
         let mut state = self.state();
         let ended = match &*state {
             State::Running(run) => State::Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline() },
@@ -553,8 +609,9 @@ impl World {
     }
 
     /// Does something with a world that runs; nothing with one that was stopped.
-    fn with_run(&self, act: impl FnOnce(&mut dyn Run)) {
+    fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
+            self.shared.log.note(entry);
             self.see(run.as_ref());
             act(run.as_mut());
             self.see(run.as_ref());
@@ -566,13 +623,13 @@ impl World {
         self.shared.seen_ns.store(run.sim_now().as_nanos(), Relaxed);
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Reads the state of a run; a broken one may break any promise of those that read it.
-fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
+pub(super) fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
     let read = catch_unwind(AssertUnwindSafe(|| {
         let mut archive = Archive::reader(state);
         run.archive(&mut archive)?;
@@ -582,10 +639,4 @@ fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
         Ok(outcome) => outcome.map_err(|error| error.to_string()),
         Err(_) => Err("its numbers do not fit together".to_owned()),
     }
-}
-
-/// Whether nothing more is to be waited for: the agent has reached `end`, rests, or has failed.
-fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
-    let newest = agent.latest();
-    newest.at_rest || !matches!(agent.state(), AgentState::Running) || newest.moment() >= end
 }

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
 /// A rigid body before it is built.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct RigidSpec {
     /// Its shape; not a plane. An open mesh counts as its convex hull.
     pub solid: Solid,
@@ -38,7 +38,7 @@ pub struct RigidSpec {
 }
 
 /// What slows a rigid body down wherever it is, and the axes of the world along and about which it does not move.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Restraint {
     /// Its velocity decays by this rate, 1/s, 0 … 1e6.
     pub linear_damping_per_s: f64,
@@ -79,7 +79,7 @@ fn left(locked: [bool; 3], v: DVec3) -> DVec3 {
 }
 
 /// How a kinematic body moves where no command leads it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Led {
     /// Poses of the origin of its axes, times rising; jaws have no meaning. None for one that stays where it is.
     pub keyframes: Vec<Keyframe>,

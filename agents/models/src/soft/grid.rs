@@ -6,7 +6,7 @@
 use super::spec::SoftShape;
 
 /// A side of a soft body, in its own axes: a rope has two ends, a sheet four edges, a box six faces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Side {
     /// Where x is least; the start of a rope.
     Left,

@@ -10,7 +10,7 @@ use metachron_geometry::{
 use std::sync::Arc;
 
 /// A soft body before it is built.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct SoftSpec {
     /// Its shape at rest, and how finely it is divided.
     pub shape: SoftShape,
@@ -40,7 +40,7 @@ pub struct SoftSpec {
 }
 
 /// The material of a soft body.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SoftMatter {
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
@@ -57,7 +57,7 @@ pub struct SoftMatter {
 }
 
 /// How the stress of a solid follows from its strain. Near rest all are the law of Hooke with the same E and ν.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub enum MaterialLaw {
     /// Linear in strains that turn with the body: cheapest, for strains of some 20 %.
     #[default]
@@ -72,7 +72,7 @@ pub enum MaterialLaw {
 }
 
 /// The material of a region of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RegionMatter {
     /// The number of the region in the mesh.
     pub region: i64,
@@ -81,7 +81,7 @@ pub struct RegionMatter {
 }
 
 /// How far apart the nodes are that carry a skin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NodeSpacing {
     /// Largest length of a cell at the start, metres, 1e-6 … 1e4.
     pub eps_m: f64,
@@ -90,7 +90,7 @@ pub struct NodeSpacing {
 }
 
 /// The shapes of soft bodies in their own axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum SoftShape {
     /// A flat rectangle in the plane z = 0, from its first corner on.
     Sheet {

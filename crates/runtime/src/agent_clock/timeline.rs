@@ -24,11 +24,13 @@ pub struct Timeline {
     sim: SimTime,
     speed: f64,
     until: Option<SimTime>,
+    /// Simulated time waits for agents, and no step is late.
+    is_free: bool,
     piece: u64,
 }
 
 /// A user's command to the timeline.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum TimelineCommand {
     /// Simulated time stops.
     Pause,
@@ -39,13 +41,15 @@ pub enum TimelineCommand {
     /// Simulated time runs on for exactly this span, then stops: a frame span for a single step. Steps requested while one is in progress
     /// add up.
     Step(SimSpan),
+    /// Simulated time is so much later at once, and stops there: the steps up to then are made as fast as they can, and none is late.
+    Leap(SimSpan),
 }
 
 impl Timeline {
     /// A timeline at wall speed, both times from zero.
     #[must_use]
     pub const fn new() -> Self {
-        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, piece: 0 }
+        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, is_free: false, piece: 0 }
     }
 
     /// The simulated time at wall time `wall`.
@@ -101,6 +105,24 @@ impl Timeline {
         self.until.is_none_or(|end| self.sim_at(wall) < end)
     }
 
+    /// When simulated time stops; `None` if it goes on.
+    #[must_use]
+    pub const fn until(&self) -> Option<SimTime> {
+        self.until
+    }
+
+    /// Whether simulated time waits for agents ([`TimelineCommand::Leap`]): no step is late then.
+    #[must_use]
+    pub const fn is_free(&self) -> bool {
+        self.is_free
+    }
+
+    /// The piece that goes on at wall time `to` as this one did at wall time `from`, as number `piece`.
+    #[must_use]
+    pub fn moved(&self, from: Duration, to: Duration, piece: u64) -> Self {
+        Self { wall: to, sim: self.sim_at(from), piece, ..*self }
+    }
+
     /// The number of this piece: it changes with every change to the timeline.
     #[must_use]
     pub const fn piece(&self) -> u64 {
@@ -114,10 +136,16 @@ impl Timeline {
         let mut next = Self { wall, sim, piece: self.piece + 1, ..*self };
         match drive {
             TimelineCommand::Pause => next.until = Some(sim),
-            TimelineCommand::Run => next.until = None,
+            TimelineCommand::Run => (next.until, next.is_free) = (None, false),
             TimelineCommand::Speed(speed) if speed.is_nan() => return *self,
             TimelineCommand::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
-            TimelineCommand::Step(span) => next.until = Some(self.until.unwrap_or(sim) + span),
+            TimelineCommand::Step(span) => {
+                (next.until, next.is_free) = (Some(self.until.unwrap_or(sim) + span), false);
+            }
+            TimelineCommand::Leap(span) => {
+                next.sim = self.until.unwrap_or(sim) + span;
+                (next.until, next.is_free) = (Some(next.sim), true);
+            }
         }
         next
     }
@@ -164,7 +192,11 @@ impl SharedTimeline {
 
     /// Changes the timeline at wall time `wall`. Threads that sleep until a due time must be woken after it.
     pub fn drive(&self, wall: Duration, drive: TimelineCommand) {
-        let next = self.read().after(wall, drive);
+        self.set(self.read().after(wall, drive));
+    }
+
+    /// Replaces the piece in force by `next`, which has another number.
+    pub(crate) fn set(&self, next: Timeline) {
         self.piece.store(Arc::new(next));
         self.number.store(next.piece, Release);
     }

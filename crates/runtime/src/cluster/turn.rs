@@ -143,12 +143,11 @@ impl AgentRunner {
 
     /// Accounts for the steps of those that stepped with it, lets their governors answer and shows their states; whether all can be seen.
     pub fn conclude_led(&mut self, timeline: &Timeline, wall: Duration) -> bool {
-        let now = timeline.sim_at(wall);
         let mut published = true;
         self.led.each(|actor| {
             let Some(open) = actor.open.take() else { return };
             let work_s = actor.cluster.as_ref().map_or(0.0, |seat| seat.work_s);
-            published &= actor.record_step(&open, now, work_s);
+            published &= actor.record_step(&open, timeline, wall, work_s);
             if let Err(reason) = contained(|| actor.run_governor(timeline, &open, work_s)) {
                 actor.park(reason);
             }

@@ -5,7 +5,6 @@
 //! n) whatever the number of jobs (the virtual time of generalised processor sharing).
 //! Integers throughout: the same events on every computer. Never here: agents, the content of a job.
 
-use metachron_core::{Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::time::Duration;
@@ -29,9 +28,14 @@ impl Cores {
         Self { cores: u128::from(cores.max(1)), served: 0, jobs: BinaryHeap::new() }
     }
 
-    /// Writes or reads the jobs in progress.
-    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.served, self.jobs)
+    /// The service so far and the jobs in progress.
+    pub fn jobs(&self) -> (u128, BinaryHeap<Reverse<(u128, u32)>>) {
+        (self.served, self.jobs.clone())
+    }
+
+    /// Takes over a service and jobs in progress.
+    pub fn set_jobs(&mut self, served: u128, jobs: BinaryHeap<Reverse<(u128, u32)>>) {
+        (self.served, self.jobs) = (served, jobs);
     }
 
     /// The owners of the jobs in progress.

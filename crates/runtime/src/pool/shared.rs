@@ -6,7 +6,7 @@
 //! Agents at rest are stored in one slot each until they are notified. Never here: threads, turns.
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
-use super::super::agent_runner::AgentRunner;
+use super::super::agent_runner::{AgentRunner, Next};
 use super::super::agents::Agents;
 use super::super::clock::Clock;
 use super::super::cluster::Handover;
@@ -37,6 +37,8 @@ pub(super) struct PoolState {
     pub handles: Agents,
     queues: Vec<CachePadded<WorkerQueue>>,
     resting: Table<AtomicCell<Option<Box<AgentRunner>>>>,
+    /// Those that make no more turns.
+    parked: Mutex<Vec<Box<AgentRunner>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
@@ -57,15 +59,33 @@ impl PoolState {
     ) -> Self {
         let resting = Table::of(handles.len());
         let queues = std::iter::repeat_with(CachePadded::default).take(workers).collect();
-        let state = Self { clock, timeline: SharedTimeline::new(), sleep, handles, queues, resting };
+        let (timeline, parked) = (SharedTimeline::new(), Mutex::default());
+        let state = Self { clock, timeline, sleep, handles, queues, resting, parked };
+        state.distribute(actors, Duration::ZERO);
+        state
+    }
+
+    /// Gives agents that make turns of their own to workers, by their numbers.
+    pub fn distribute(&self, actors: Vec<Option<Box<AgentRunner>>>, now: Duration) {
+        let (timeline, workers) = (self.timeline.read(), self.queues.len());
         // neighbours in the scene share a worker, and still every worker gets agents of each kind
         let block = (actors.len() / (8 * workers)).clamp(1, 64);
-        for (at, actor) in actors.into_iter().enumerate() {
-            if let Some(actor) = actor.filter(|actor| !actor.is_parked()) {
-                state.queues[at / block % workers].with(|queue| queue.put(actor, Duration::ZERO));
+        for (at, mut actor) in actors.into_iter().enumerate().filter_map(|(at, actor)| Some((at, actor?))) {
+            match actor.next(&timeline, now) {
+                Next::Parked => self.store_parked(actor),
+                Next::Rest => {
+                    if let Some(slot) = self.resting.get(actor.id().0 as usize) {
+                        slot.store(Some(actor));
+                    }
+                }
+                Next::Due | Next::Join(_) => self.queues[at / block % workers].with(|queue| queue.put(actor, now)),
             }
         }
-        state
+    }
+
+    /// Stores one that makes no more turns.
+    pub fn store_parked(&self, actor: Box<AgentRunner>) {
+        self.parked.lock().unwrap_or_else(PoisonError::into_inner).push(actor);
     }
 
     /// The next turn of worker `at`, which returns the agent of the last one as `back`; `None` if none is due.
@@ -88,8 +108,10 @@ impl PoolState {
     pub fn take_up(&self, actor: Box<AgentRunner>) {
         self.resting.grow();
         let (at, now) = (actor.id().0 as usize % self.queues.len(), self.clock.now());
-        if !actor.is_parked() {
-            self.put(at, actor, now);
+        if actor.is_parked() {
+            self.store_parked(actor)
+        } else {
+            self.put(at, actor, now)
         }
         self.sleep.unpark_all();
     }
@@ -145,9 +167,12 @@ impl PoolState {
         self.queues[at].with(|queue| while stolen.give_ready(queue, now) {});
     }
 
-    /// Visits and removes all resting and queued agents, at the end of a run.
+    /// Visits and removes all agents that make turns of their own, or would: between turns.
     pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
         self.resting.iter().filter_map(AtomicCell::take).for_each(&mut visit);
+        std::mem::take(&mut *self.parked.lock().unwrap_or_else(PoisonError::into_inner))
+            .into_iter()
+            .for_each(&mut visit);
         self.queues.iter().for_each(|worker| worker.with(|queue| queue.drain().for_each(&mut visit)));
     }
 

@@ -3,7 +3,7 @@
 //! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that does not return costs one agent and one
 //! thread: the agent is parked with the reason, and another worker takes the place. Never here: turns.
 
-use super::super::cluster::{close_remaining, return_arrivals};
+use super::super::cluster::return_arrivals;
 use super::super::priority::Priority;
 use super::shared::PoolState;
 use super::watchdog::{WatchdogWord, WatchedTurn};
@@ -164,7 +164,7 @@ impl Supervisor {
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers until a timeout, and ends all agents: a step that takes longer counts as hung, and its thread is left behind.
+    /// Waits for the workers until a timeout: a step that takes longer counts as hung, and its thread is left behind.
     fn join_all(&mut self) {
         let mut patience = Duration::ZERO;
         while self.workers.iter().any(|worker| worker.thread.is_some()) {
@@ -181,8 +181,5 @@ impl Supervisor {
                 self.park_stuck(turn.agent(), patience);
             }
         }
-        let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
-        self.state.clear(|mut actor| actor.close_account(&timeline, now));
-        close_remaining(&self.state.handles, &timeline, now);
     }
 }

@@ -111,7 +111,10 @@ impl Worker {
             Next::Due => Some(actor),
             Next::Rest => self.store_resting(actor, timeline),
             Next::Join(leader) => hand_over(actor, leader).err(),
-            Next::Parked => None,
+            Next::Parked => {
+                self.state.store_parked(actor);
+                None
+            }
         }
     }
 
@@ -127,7 +130,13 @@ impl Worker {
 
     fn serve(&self, id: AgentId, timeline: &Timeline) {
         let woken = self.state.take_resting(id).and_then(|actor| self.wake(actor, timeline));
-        let returned = self.state.take_returned(id).filter(|actor| !actor.is_parked());
+        let returned = self.state.take_returned(id).and_then(|actor| {
+            if actor.is_parked() {
+                self.state.store_parked(actor);
+                return None;
+            }
+            Some(actor)
+        });
         woken.into_iter().chain(returned).for_each(|actor| self.state.put(self.at, actor, self.now));
     }
 

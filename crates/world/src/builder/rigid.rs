@@ -8,7 +8,7 @@ use metachron_geometry::{CompoundPart, ContactTraits, Solid};
 use metachron_models::rigid::{Keyframe, RigidSpec};
 
 /// A rigid body before it is added.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Rigid {
     pub(super) spec: RigidSpec,
     pub(super) gravity_scale: f64,

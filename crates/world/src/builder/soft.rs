@@ -16,7 +16,7 @@ const DENSITY_KG_M3: f64 = 1050.0;
 const YOUNG_PA: f64 = 1e5;
 
 /// A sheet, solid or rope before it is added.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Soft {
     spec: SoftSpec,
     /// From the first corner of its shape to its middle, in its own axes, metres.

@@ -16,7 +16,7 @@ const SEGMENTS_DEFAULT: usize = 40;
 const TUBE_FRICTION: f64 = 0.2;
 
 /// A tube before it is added.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Tube {
     path_m: Vec<DVec3>,
     radius_m: f64,

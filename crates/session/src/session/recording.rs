@@ -1,0 +1,43 @@
+//! A session whose run is recorded, and one that repeats a recording.
+//!
+//! In: a session before its first frame, a place to write to; a recording. Out: a recording; a session whose frames show it.
+//! Never here: what a recording is made of ([`metachron_world::Recording`]), arguments.
+
+use super::super::error::SessionError;
+use super::Session;
+use metachron_core::SimTime;
+use metachron_world::{RecordError, Recording, Scene, SceneText, World};
+use std::io::Write;
+
+impl Session {
+    /// Plays `scene` again as `recording` has it, at most to the simulated time `until`: frames see what happened, and change nothing.
+    ///
+    /// # Errors
+    /// [`SessionError::Replay`] where the recording is of another scene; [`SessionError::World`].
+    pub fn replay(scene: Scene, recording: Recording, until: Option<SimTime>) -> Result<Self, SessionError> {
+        Self::open_as(scene, |scene, govern| Ok(World::replay_governed(scene, govern, recording, until)?))
+    }
+
+    /// Writes down from now on what is done to its agents, with the text of the scene, so that [`Session::replay`] can do it again. In
+    /// lockstep only.
+    ///
+    /// # Errors
+    /// [`RecordError`]; nothing is recorded then.
+    pub fn begin_recording(&self, out: Box<dyn Write + Send>, scene: SceneText) -> Result<(), RecordError> {
+        self.world.record_to(out, Some(scene))
+    }
+
+    /// Ends the recording, if there is one.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if not all of it could be written.
+    pub fn end_recording(&self) -> Result<(), RecordError> {
+        self.world.end_recording()
+    }
+
+    /// The share of its recording that a replay has played, 0 … 1, or why it plays no more of it; `None` of other sessions.
+    #[must_use]
+    pub fn replayed(&self) -> Option<Result<f64, String>> {
+        self.world.replayed()
+    }
+}

@@ -1,0 +1,105 @@
+//! How fast a world's time passes: beside the clock on the wall, faster or slower, or as fast as its objects can step.
+//!
+//! In: a pace, spans. Out: objects that have lived so much more, and a world that stands still then. Never here: when a turn is due.
+
+use super::kinds::ExecutorKind;
+use super::world::{World, WorldError};
+use metachron_core::{SimSpan, SimTime};
+use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+
+/// How fast a world's time passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// A second a second.
+    RealTime,
+    /// So many seconds a second, within [`SPEED_RANGE`].
+    Factor(f64),
+    /// As fast as objects can step, and no faster: none is late, none gives up time, however slow the machine is. Time passes in
+    /// [`World::advance`] alone.
+    Free,
+}
+
+/// How often a world in real time looks whether all objects have arrived.
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
+/// The same where nothing else is waited for.
+const POLL_FREE: Duration = Duration::from_micros(50);
+
+/// By how much objects may be apart in time at [`Pace::Free`]: half as much as those that come near each other would wait for.
+const FREE_SLICE: SimSpan = SimSpan::from_millis(10);
+
+impl World {
+    /// Sets how fast time passes from now on. In lockstep, where time is virtual, a factor changes how fast the declared machine has to be.
+    ///
+    /// # Errors
+    /// [`WorldError::BadPace`] for a factor outside its range; the pace is then as it was.
+    pub fn set_pace(&self, pace: Pace) -> Result<(), WorldError> {
+        let factor = match pace {
+            Pace::Factor(factor) => factor,
+            Pace::RealTime | Pace::Free => 1.0,
+        };
+        if !(SPEED_RANGE.0..=SPEED_RANGE.1).contains(&factor) {
+            return Err(WorldError::BadPace { factor });
+        }
+        self.shared.is_free.store(pace == Pace::Free, Relaxed);
+        self.drive(TimelineCommand::Speed(factor));
+        Ok(())
+    }
+
+    /// Lets the world live for `span`, then stops its time: it stands still.
+    ///
+    /// In lockstep every step that is due by then has been made. On threads and in the pool each object that neither rests nor has failed
+    /// has lived to the end at least; one whose step is longer than what was left is ahead by less than that step.
+    /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again.
+    pub fn advance(&self, span: SimSpan) {
+        if self.executor() == ExecutorKind::Lockstep {
+            return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
+        }
+        if !self.shared.is_free.load(Relaxed) {
+            self.drive(TimelineCommand::Step(span));
+            return self.wait_for_all(TimelineCommand::Step, POLL_INTERVAL);
+        }
+        let mut left = span;
+        while left > SimSpan::ZERO && !self.has_stopped() {
+            let slice = left.min(FREE_SLICE);
+            self.drive(TimelineCommand::Leap(slice));
+            self.wait_for_all(TimelineCommand::Leap, POLL_FREE);
+            left = SimSpan::from_nanos(left.as_nanos() - slice.as_nanos());
+        }
+    }
+
+    /// Waits until all objects have lived to where time stops. One that is led by another that has already arrived makes its last steps in a
+    /// turn of that one: time goes on by `further` for it.
+    fn wait_for_all(&self, further: impl Fn(SimSpan) -> TimelineCommand, poll: Duration) {
+        let Some(end) = self.timeline().until() else { return };
+        while !self.has_stopped() {
+            let agents = self.agents();
+            let behind = |agent: &&AgentHandle| !has_reached(agent, end);
+            // a state covers the step that leads to it: it may be there before its time
+            if self.time() >= end && !agents.iter().any(|agent| behind(&agent)) {
+                return;
+            }
+            let last = self.timeline().until();
+            let leaders = agents.iter().filter(behind).filter_map(|agent| agents.of(agent.led_by()?));
+            let idle = leaders.into_iter().find(|leader| last.is_some_and(|last| leader.latest().moment() >= last));
+            if let Some(leader) = idle {
+                self.drive(further(leader.stats().dt));
+            }
+            self.wait_until(self.now() + poll);
+        }
+    }
+}
+
+/// Whether nothing more is to be waited for: the agent has reached `end`, rests on, or has failed. One that wakes at the end is to step only
+/// after it.
+fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
+    match agent.state() {
+        AgentState::Running => {
+            let newest = agent.latest();
+            newest.at_rest || newest.moment() >= end
+        }
+        AgentState::Resting => !agent.is_woken(),
+        AgentState::Parked(_) | AgentState::Gone => true,
+    }
+}

@@ -1,0 +1,340 @@
+//! A recording: everything that was done to a world from outside, in the order in which it was done, so that the same can be done again.
+//!
+//! In: the calls that change a world in lockstep, the answers of its governors. Out: a file, and the calls read from one.
+//! Never here: how they are made again ([`super::replay`]), the state of an object.
+//!
+//! A file: [`MAGIC`], the version of the format, then chunks, each with its length and checksum, so that a file that was cut short is read to its
+//! last whole chunk. The first chunk says whose calls follow. All numbers outside of chunks are little-endian.
+
+use super::builder::{Part, Rigid, Soft, Tube};
+use super::checkpoint::{CheckpointError, SceneIdentity, checksum};
+use metachron_core::{AgentId, Archive, ArchiveError, Body, archive_values};
+use metachron_runtime::{Command, Demand, TimelineCommand};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The first bytes of every file.
+const MAGIC: [u8; 8] = *b"METACREC";
+/// The version of the format: it changes with what the bytes mean.
+const FORMAT: u32 = 1;
+/// Bytes of a chunk before its contents: length and checksum.
+const CHUNK_HEAD: usize = 4 + 8;
+/// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
+const CHUNK_ENTRIES: usize = 128;
+/// The program that can repeat what it has recorded, to the bit.
+const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+
+/// The scene that a recording is of, as it was given.
+#[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct SceneText {
+    /// The name of a built-in scene, or the path of a file.
+    pub name: String,
+    /// The text of the scene.
+    pub text: String,
+    /// Keys that were changed, and their values, in rising precedence.
+    pub overrides: Vec<(String, String)>,
+}
+
+/// What a file begins with.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+struct Head {
+    of: SceneIdentity,
+    scene: Option<SceneText>,
+}
+
+/// Something that was done to a world from outside.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub(super) enum Entry {
+    /// Time passed up to this wall time.
+    Wait(Duration),
+    /// Work of this length occupied a core.
+    Spend(Duration),
+    Drive(TimelineCommand),
+    Command(AgentId, Command),
+    SetState(AgentId, Box<Body>),
+    AddRigid(String, Box<Rigid>),
+    AddTube(String, Box<Tube>),
+    AddSoft(String, Box<Soft>),
+    Remove(AgentId),
+    /// It was put into the state of this checkpoint, as the bytes of its file.
+    Restore(Vec<u8>),
+    /// The governor of an agent answered a turn; before that it was content with so many.
+    Demand(AgentId, u32, Demand),
+    /// The recording ended, with this hash of all states.
+    End(u64),
+}
+
+/// Why a world is not recorded, or a recording could not be kept.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// A world in real time: when its objects step is not known from what is done to it.
+    #[error("only a world in lockstep can be recorded; this one runs in real time")]
+    RealTime,
+    /// The world was stopped, or is a replay.
+    #[error("a world that was stopped, or is a replay, cannot be recorded")]
+    Stopped,
+    /// The recording begins with the state of a world that has already run, which cannot be saved.
+    #[error("a recording that does not begin at the start begins with a checkpoint: {0}")]
+    Begun(CheckpointError),
+    /// A file could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Its path.
+        path: PathBuf,
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// What it was written to took no more: it is complete up to there.
+    #[error("the recording could not be written on: {0}")]
+    Write(#[from] std::io::Error),
+    /// A file is no recording that this program repeats.
+    #[error("{}: {reason}", path.display())]
+    BadFile {
+        /// Its path.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: BadRecording,
+    },
+}
+
+/// What is wrong with the bytes of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BadRecording {
+    /// Not the first bytes of one.
+    #[error("this is no recording of metachron")]
+    NoRecording,
+    /// Of another version of the format.
+    #[error("its format is {found}; this program reads format {FORMAT}")]
+    OtherFormat {
+        /// The version of the format.
+        found: u32,
+    },
+    /// Written by another version of the program, whose steps have other bits.
+    #[error("it was recorded by metachron {found}; this is {PROGRAM}")]
+    OtherProgram {
+        /// The version that has written it.
+        found: String,
+    },
+    /// It ends within its first chunk.
+    #[error("it ends before it says which scene it is of")]
+    NoHead,
+    /// Bytes that are whole but mean nothing.
+    #[error("chunk {chunk}: {reason}")]
+    Malformed {
+        /// The chunk, counted from zero.
+        chunk: usize,
+        /// What is wrong with it.
+        reason: ArchiveError,
+    },
+}
+
+/// What was done to a world, read from a file ([`super::World::replay`] does it again).
+#[derive(Debug, Clone)]
+pub struct Recording {
+    head: Head,
+    pub(super) entries: Vec<Entry>,
+    lost_bytes: usize,
+}
+
+impl Recording {
+    /// Reads the recording that a file holds, up to its last whole chunk.
+    ///
+    /// # Errors
+    /// [`RecordError::File`]; [`RecordError::BadFile`] for any file that a recording of this version has not begun.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| RecordError::File { path: path.to_owned(), source })?;
+        Self::from_bytes(&bytes).map_err(|reason| RecordError::BadFile { path: path.to_owned(), reason })
+    }
+
+    /// The recording in these bytes, up to its last whole chunk.
+    ///
+    /// # Errors
+    /// [`BadRecording`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, BadRecording> {
+        let Some(rest) = bytes.strip_prefix(&MAGIC) else { return Err(BadRecording::NoRecording) };
+        let Some((format, mut rest)) = rest.split_first_chunk::<4>() else { return Err(BadRecording::NoHead) };
+        let found = u32::from_le_bytes(*format);
+        if found != FORMAT {
+            return Err(BadRecording::OtherFormat { found });
+        }
+        let malformed = |chunk: usize| move |reason: ArchiveError| BadRecording::Malformed { chunk, reason };
+        let first = take_chunk(&mut rest).ok_or(BadRecording::NoHead)?;
+        let (mut found, mut head) = (String::new(), Head::default());
+        let mut archive = Archive::reader(first);
+        archive.value(&mut found).map_err(malformed(0))?;
+        if found != PROGRAM {
+            return Err(BadRecording::OtherProgram { found });
+        }
+        archive.value(&mut head).and_then(|()| archive.finish()).map_err(malformed(0))?;
+        let mut entries = Vec::new();
+        let mut chunk = 1;
+        while let Some(bytes) = take_chunk(&mut rest) {
+            let mut some: Vec<Entry> = Vec::new();
+            let mut archive = Archive::reader(bytes);
+            archive.value(&mut some).and_then(|()| archive.finish()).map_err(malformed(chunk))?;
+            entries.append(&mut some);
+            chunk += 1;
+        }
+        Ok(Self { head, entries, lost_bytes: rest.len() })
+    }
+
+    /// The scene as it was given; `None` of a scene that a program has built.
+    #[must_use]
+    pub const fn scene(&self) -> Option<&SceneText> {
+        self.head.scene.as_ref()
+    }
+
+    /// Whether it was ended: the process that wrote it was not killed.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.lost_bytes == 0 && matches!(self.entries.last(), Some(Entry::End(_)))
+    }
+
+    /// Bytes behind its last whole chunk, which mean nothing.
+    #[must_use]
+    pub const fn lost_bytes(&self) -> usize {
+        self.lost_bytes
+    }
+
+    /// The state hash at its end; `None` of one that was cut short.
+    #[must_use]
+    pub fn hash(&self) -> Option<u64> {
+        match self.entries.last() {
+            Some(Entry::End(hash)) => Some(*hash),
+            _ => None,
+        }
+    }
+
+    pub(super) const fn identity(&self) -> &SceneIdentity {
+        &self.head.of
+    }
+}
+
+/// The contents of the next chunk if that is whole.
+fn take_chunk<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let (head, bytes) = rest.split_first_chunk::<CHUNK_HEAD>()?;
+    let length = u32::from_le_bytes(std::array::from_fn(|at| head[at])) as usize;
+    let sum = u64::from_le_bytes(std::array::from_fn(|at| head[4 + at]));
+    let (contents, after) = bytes.split_at_checked(length)?;
+    if checksum(contents) != sum {
+        return None;
+    }
+    *rest = after;
+    Some(contents)
+}
+
+/// Writes a recording.
+pub(super) struct Recorder {
+    out: Box<dyn Write + Send>,
+    /// Those that are not written yet.
+    entries: Vec<Entry>,
+    /// For each agent, how often its governor was content since it last asked for something.
+    content: BTreeMap<AgentId, u32>,
+    /// Why no more is written.
+    failed: Option<std::io::Error>,
+}
+
+impl Recorder {
+    /// Begins a recording of the world that is known by `of`.
+    ///
+    /// # Errors
+    /// Those of `out`.
+    pub fn begin(
+        mut out: Box<dyn Write + Send>,
+        of: SceneIdentity,
+        scene: Option<SceneText>,
+    ) -> Result<Self, RecordError> {
+        out.write_all(&MAGIC)?;
+        out.write_all(&FORMAT.to_le_bytes())?;
+        let (mut program, mut head) = (PROGRAM.to_owned(), Head { of, scene });
+        write_chunk(&mut *out, |archive| archive_values!(archive, program, head))?;
+        Ok(Self { out, entries: Vec::new(), content: BTreeMap::new(), failed: None })
+    }
+
+    /// The file at `path`, anew.
+    ///
+    /// # Errors
+    /// [`RecordError::File`].
+    pub fn file(path: &Path) -> Result<Box<dyn Write + Send>, RecordError> {
+        let file = std::fs::File::create(path);
+        let file = file.map_err(|source| RecordError::File { path: path.to_owned(), source })?;
+        Ok(Box::new(file))
+    }
+
+    /// Writes down what is about to be done. What came before it is complete, and leaves the process if it is much.
+    pub fn note(&mut self, entry: Entry) {
+        if self.entries.len() >= CHUNK_ENTRIES {
+            self.flush();
+        }
+        self.entries.push(entry);
+    }
+
+    /// Writes down how the governor of `agent` has answered.
+    pub fn note_demand(&mut self, agent: AgentId, demand: Demand) {
+        let content = self.content.entry(agent).or_default();
+        if demand == Demand::default() {
+            *content += 1;
+        } else {
+            let before = std::mem::take(content);
+            self.entries.push(Entry::Demand(agent, before, demand));
+        }
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    /// [`RecordError::Write`] if not all of it could be written.
+    pub fn end(mut self, hash: u64) -> Result<(), RecordError> {
+        self.entries.push(Entry::End(hash));
+        self.flush();
+        self.failed.take().map_or(Ok(()), |error| Err(RecordError::Write(error)))
+    }
+
+    fn flush(&mut self) {
+        if self.failed.is_none() {
+            let mut entries = std::mem::take(&mut self.entries);
+            let written = write_chunk(&mut *self.out, |archive| archive.value(&mut entries));
+            self.failed = written.and_then(|()| self.out.flush()).err();
+        }
+        self.entries.clear();
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        if !self.entries.is_empty() {
+            self.flush();
+        }
+    }
+}
+
+fn write_chunk(
+    out: &mut dyn Write,
+    contents: impl FnOnce(&mut Archive<'_>) -> Result<(), ArchiveError>,
+) -> std::io::Result<()> {
+    let mut archive = Archive::writer();
+    contents(&mut archive).map_err(std::io::Error::other)?;
+    let bytes = archive.into_bytes();
+    let length = u32::try_from(bytes.len()).map_err(std::io::Error::other)?;
+    // in one piece, so that a process that is killed leaves whole chunks
+    let mut chunk = Vec::with_capacity(CHUNK_HEAD + bytes.len());
+    chunk.extend_from_slice(&length.to_le_bytes());
+    chunk.extend_from_slice(&checksum(&bytes).to_le_bytes());
+    chunk.extend_from_slice(&bytes);
+    out.write_all(&chunk)
+}
+
+/// The entry of a part that joins; `None` of one that cannot be written down.
+pub(super) fn added(name: &str, part: &Part) -> Option<Entry> {
+    match part {
+        Part::Rigid(rigid) => Some(Entry::AddRigid(name.to_owned(), Box::new(rigid.clone()))),
+        Part::Tube(tube) => Some(Entry::AddTube(name.to_owned(), Box::new(tube.clone()))),
+        Part::Soft(soft) => Some(Entry::AddSoft(name.to_owned(), Box::new(soft.clone()))),
+        Part::Custom(_) => None,
+    }
+}

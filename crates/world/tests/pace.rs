@@ -1,0 +1,137 @@
+//! Worlds in real time: how much their objects live, at which pace, and cuts of them that go on anywhere.
+
+use glam::DVec3;
+use metachron_core::{Anchor, SimSpan, SimTime};
+use metachron_geometry::Solid;
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Checkpoint, Command, Pace, Rigid, Scene, Tube, World, WorldError};
+
+const REAL: [ExecutorKind; 2] = [ExecutorKind::Threads, ExecutorKind::Pool];
+
+const fn ms(count: u64) -> SimSpan {
+    SimSpan::from_millis(count)
+}
+
+/// Balls that meet nothing, of different rates.
+fn apart() -> Scene {
+    let ball =
+        |x: f64, rate_hz: f64| Rigid::ball(0.05).at([x, 0.0, 0.0]).velocity_m_s([0.0, 1.0, 0.0]).rate_hz(rate_hz);
+    let scene = Scene::builder().gravity([0.0; 3]).add("slow", ball(0.0, 50.0)).add("fast", ball(5.0, 1000.0));
+    scene.add("odd", ball(9.0, 300.0)).build().unwrap()
+}
+
+/// Balls that fall on a tray of a tube and on each other.
+fn touching() -> Scene {
+    let ball = |x: f64, z: f64| Rigid::ball(0.03).mass_kg(0.1).at([x, 0.0, z]);
+    let tube = Tube::along(&[[-0.2, 0.0, 0.06], [0.2, 0.0, 0.06]]).radius_m(0.01).segments(6).rate_hz(120.0);
+    let scene = Scene::builder().fixed("floor", Solid::Plane).add("left", ball(-0.02, 0.15)).add("tube", tube);
+    scene.add("right", ball(0.03, 0.22).rate_hz(400.0)).build().unwrap()
+}
+
+fn free(scene: &Scene, executor: ExecutorKind) -> World {
+    let world = World::start(scene, executor).unwrap();
+    world.set_pace(Pace::Free).unwrap();
+    world
+}
+
+#[test]
+fn as_fast_as_it_can_each_object_makes_its_own_number_of_steps_and_drops_none() {
+    for executor in REAL {
+        let world = free(&apart(), executor);
+        world.advance(ms(3000));
+        world.advance(ms(1000));
+        let stats: Vec<_> = world.agents().iter().map(|agent| agent.stats()).collect();
+        let expected = [200, 4000, 1200];
+        for (stats, expected) in stats.iter().zip(expected) {
+            // its step is a whole number of nanoseconds
+            assert!(stats.steps.abs_diff(expected) <= 1, "{}: {} steps", stats.name, stats.steps);
+            assert_eq!((stats.dropped, stats.misses), (SimSpan::ZERO, 0), "{}", stats.name);
+        }
+        assert_eq!(world.time(), SimTime::ZERO + ms(4000));
+    }
+}
+
+#[test]
+fn after_an_advance_a_world_stands_still_where_it_was_to_come_to() {
+    for executor in REAL {
+        let world = World::start(&apart(), executor).unwrap();
+        world.set_pace(Pace::Factor(4.0)).unwrap();
+        world.advance(ms(200));
+        let (time, hash) = (world.time(), world.hash());
+        assert_eq!(time, SimTime::ZERO + ms(200));
+        world.wait_until(world.now() + std::time::Duration::from_millis(30));
+        assert_eq!((world.time(), world.hash()), (time, hash), "it stands still");
+        for agent in world.agents().iter() {
+            let ahead_s = agent.latest().moment().secs_after(time);
+            assert!((0.0..0.02).contains(&ahead_s), "{}: {ahead_s} s", agent.name());
+        }
+        let refused = world.set_pace(Pace::Factor(0.0));
+        assert!(matches!(refused, Err(WorldError::BadPace { factor: 0.0 })));
+    }
+}
+
+#[test]
+fn what_touches_comes_to_the_end_too() {
+    for executor in REAL {
+        let world = free(&touching(), executor);
+        for step in 1..=8 {
+            world.advance(ms(50));
+            assert!(world.time() >= SimTime::ZERO + ms(50 * step));
+        }
+        let left = world.latest(world.object("left").unwrap()).unwrap();
+        assert!(left.body.probe(0.0).unwrap().0.z > 0.0, "it has not fallen through");
+        world.agents().iter().for_each(|agent| assert_eq!(agent.stats().dropped, SimSpan::ZERO, "{}", agent.name()));
+    }
+}
+
+/// A cut in the middle of things, and how the world goes on from it in lockstep, twice.
+fn goes_on(scene: &Scene, mark: &Checkpoint) -> [u64; 2] {
+    [0, 1].map(|_| {
+        let world = World::open(scene, ExecutorKind::Lockstep, mark).unwrap();
+        assert_eq!(world.time(), mark.time());
+        world.advance(ms(300));
+        world.hash()
+    })
+}
+
+#[test]
+fn a_cut_of_a_world_in_real_time_goes_on_in_lockstep_to_the_same_bits() {
+    let scene = touching();
+    for executor in REAL {
+        let world = free(&scene, executor);
+        let left = world.object("left").unwrap();
+        world.advance(ms(150));
+        world.command(left, Command::force(Anchor::Local(DVec3::ZERO), DVec3::X).for_ms(100)).unwrap();
+        let (hash, mark) = (world.hash(), world.checkpoint().unwrap());
+        assert_eq!(world.hash(), hash, "a cut changes nothing");
+        assert_eq!(mark.times().len(), 3);
+        let [first, second] = goes_on(&scene, &mark);
+        assert_eq!(first, second, "{executor:?}");
+        world.advance(ms(100));
+        assert_ne!(world.hash(), hash, "it goes on");
+        world.restore(&mark).unwrap();
+        assert_eq!((world.hash(), world.time()), (hash, mark.time()));
+        world.advance(ms(100));
+        assert_eq!(world.time(), mark.time() + ms(100));
+        // and the other way round
+        let lockstep = World::open(&scene, ExecutorKind::Lockstep, &mark).unwrap();
+        lockstep.advance(ms(77));
+        let world = World::open(&scene, executor, &lockstep.checkpoint().unwrap()).unwrap();
+        world.set_pace(Pace::Free).unwrap();
+        let from = world.time();
+        world.advance(ms(200));
+        assert_eq!(world.time(), from + ms(200));
+        assert!(world.agents().iter().all(|agent| agent.latest().moment() >= world.time() || agent.latest().at_rest));
+    }
+}
+
+#[test]
+fn a_cut_is_as_large_after_a_minute_as_after_a_second() {
+    let world = free(&apart(), ExecutorKind::Threads);
+    world.advance(ms(1000));
+    let early = world.checkpoint().unwrap().size_bytes();
+    world.advance(ms(9000));
+    let late = world.checkpoint().unwrap().size_bytes();
+    // counters of more digits take a byte more each
+    assert!(late.abs_diff(early) < 100, "{early} and {late} bytes");
+}

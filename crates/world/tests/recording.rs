@@ -1,0 +1,200 @@
+//! A recording repeats a world in lockstep to the bit, whatever was done to it, and says why it cannot.
+
+use glam::{DQuat, DVec3};
+use metachron_core::{Anchor, Resolution, SimSpan, SimTime};
+use metachron_geometry::Solid;
+use metachron_runtime::{Demand, Governor, TurnMeasure};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{BadRecording, Command, Custom, RecordError, Recording, Rigid, Scene, Tube, World, WorldError};
+use std::io::Write;
+use std::sync::{Arc, Mutex};
+
+/// Bytes that are written while they are kept.
+#[derive(Clone, Default)]
+struct Kept(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Kept {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Kept {
+    fn read(&self) -> Result<Recording, BadRecording> {
+        Recording::from_bytes(&self.0.lock().unwrap())
+    }
+}
+
+const fn ms(count: u64) -> SimSpan {
+    SimSpan::from_millis(count)
+}
+
+fn scene() -> Scene {
+    let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.2]);
+    let tube = Tube::along(&[[-0.2, 0.0, 0.12], [0.2, 0.0, 0.12]]).radius_m(0.01).segments(6);
+    Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap()
+}
+
+fn start() -> World {
+    World::start(&scene(), ExecutorKind::Lockstep).unwrap()
+}
+
+fn recorded(world: &World) -> Kept {
+    let kept = Kept::default();
+    world.record_to(Box::new(kept.clone()), None).unwrap();
+    kept
+}
+
+/// Plays all of a recording.
+fn replayed(recording: Recording) -> World {
+    let world = World::replay(&scene(), recording, None).unwrap();
+    while world.replayed().unwrap().unwrap() < 1.0 {
+        world.advance(ms(10));
+    }
+    world
+}
+
+/// Lets everything happen that a recording has.
+fn play(world: &World) {
+    let [ball, tube] = world.objects(["ball", "tube"]).unwrap();
+    world.advance(ms(50));
+    world.command(ball, Command::force(Anchor::Local(DVec3::ZERO), DVec3::X).key(3).for_ms(40)).unwrap();
+    world.command(tube, Command::velocity(DVec3::Y * 0.1, DVec3::ZERO)).unwrap();
+    world.spend(std::time::Duration::from_millis(3));
+    world.advance(ms(20));
+    let crate_ = world.add("crate", Rigid::cuboid([0.02; 3]).at([0.05, 0.0, 0.4])).unwrap();
+    let hose = Tube::along(&[[0.0, -0.2, 0.3], [0.0, 0.2, 0.3]]).segments(4);
+    world.add("hose", hose).unwrap();
+    let mark = world.checkpoint().unwrap();
+    world.advance(ms(70));
+    world.restore(&mark).unwrap();
+    world.command(crate_, Command::teleport(DVec3::Z * 0.6, DQuat::IDENTITY)).unwrap();
+    world.advance(ms(40));
+    world.remove(ball).unwrap();
+    world.advance(ms(30));
+}
+
+#[test]
+fn a_replay_ends_with_the_same_bits_and_takes_no_commands() {
+    let world = start();
+    let kept = recorded(&world);
+    play(&world);
+    world.end_recording().unwrap();
+    let recording = kept.read().unwrap();
+    assert!(recording.is_complete() && recording.hash() == Some(world.hash()));
+    let again = replayed(recording);
+    assert_eq!((again.hash(), again.now(), again.time()), (world.hash(), world.now(), world.time()));
+    let hose = again.object("hose").unwrap();
+    let refused = again.command(hose, Command::SetPressure(1.0));
+    assert!(matches!(&refused, Err(WorldError::Refused { reason, .. }) if reason.contains("recording")), "{refused:?}");
+    assert!(matches!(again.record("x"), Err(RecordError::Stopped)));
+}
+
+#[test]
+fn a_replay_stops_where_it_is_told_to() {
+    let world = start();
+    let kept = recorded(&world);
+    world.advance(ms(500));
+    world.end_recording().unwrap();
+    let plain = start();
+    plain.advance(ms(120));
+    let again = World::replay(&scene(), kept.read().unwrap(), Some(SimTime::ZERO + ms(120))).unwrap();
+    again.advance(ms(10));
+    assert_eq!((again.time(), again.hash(), again.replayed()), (plain.time(), plain.hash(), Some(Ok(1.0))));
+}
+
+#[test]
+fn a_recording_that_begins_later_begins_with_the_state_of_then() {
+    let world = start();
+    world.advance(ms(130));
+    let kept = recorded(&world);
+    world.advance(ms(90));
+    world.stop();
+    assert_eq!(replayed(kept.read().unwrap()).hash(), world.hash());
+}
+
+#[test]
+fn a_recording_that_was_cut_anywhere_is_read_to_its_last_whole_chunk() {
+    let world = start();
+    let kept = recorded(&world);
+    for _ in 0..300 {
+        world.advance(ms(1));
+    }
+    world.end_recording().unwrap();
+    let whole = kept.0.lock().unwrap().clone();
+    let mut counts = std::collections::BTreeSet::new();
+    for length in (0..whole.len()).step_by(7) {
+        match Recording::from_bytes(&whole[..length]) {
+            Ok(recording) => {
+                assert!(!recording.is_complete());
+                counts.insert(length - recording.lost_bytes());
+            }
+            Err(BadRecording::NoRecording | BadRecording::NoHead) => assert!(length < 400, "{length}"),
+            Err(other) => panic!("{length} bytes: {other}"),
+        }
+    }
+    assert!(counts.len() >= 3, "head and two chunks: {counts:?}");
+    let mut changed = whole.clone();
+    let last = changed.len() - 1;
+    changed[last] ^= 1;
+    let recording = Recording::from_bytes(&changed).unwrap();
+    assert!(recording.lost_bytes() > 0 && recording.hash().is_none());
+    let cut = replayed(recording);
+    let plain = start();
+    plain.advance(cut.time().since(SimTime::ZERO));
+    assert_eq!(cut.hash(), plain.hash());
+}
+
+#[test]
+fn another_format_another_scene_and_other_worlds_are_named() {
+    let world = start();
+    let kept = recorded(&world);
+    world.end_recording().unwrap();
+    kept.0.lock().unwrap()[8] = 9;
+    assert!(matches!(kept.read(), Err(BadRecording::OtherFormat { found: 9 })));
+    kept.0.lock().unwrap()[8] = 1;
+    let other = Scene::builder().add("ball", Rigid::ball(0.05)).build().unwrap();
+    let error = World::replay(&other, kept.read().unwrap(), None).unwrap_err().to_string();
+    assert!(error.contains("moving objects") && error.contains("expected 1"), "{error}");
+    let threads = World::start(&scene(), ExecutorKind::Threads).unwrap();
+    assert!(matches!(threads.record_to(Box::new(Kept::default()), None), Err(RecordError::RealTime)));
+}
+
+#[test]
+fn an_agent_of_ones_own_joins_no_recording() {
+    let world = start();
+    let _kept = recorded(&world);
+    let refused = world.add("own", Custom::new(|_| unreachable!("it is refused before")));
+    assert!(matches!(&refused, Err(WorldError::Refused { reason, .. }) if reason.contains("agent of your own")));
+}
+
+/// Asks for another step whenever it is called an even number of times, of numbers that no replay has.
+struct Moody(u64);
+
+impl Governor for Moody {
+    fn after_step(&mut self, _: &TurnMeasure) -> Demand {
+        self.0 += 1;
+        let dt = self.0.is_multiple_of(3).then(|| SimSpan::from_nanos(3_000_000 + self.0 * 1000));
+        Demand { dt, resolution: None::<Resolution> }
+    }
+}
+
+#[test]
+fn a_replay_takes_what_governors_answered_from_the_recording() {
+    let mut scene = scene();
+    scene.agents[0].pace.dt_range = (ms(1), ms(9));
+    let world =
+        World::start_governed(&scene, ExecutorKind::Lockstep, &mut |_| Some(Box::new(Moody(0)) as Box<_>)).unwrap();
+    let kept = recorded(&world);
+    (0..20).for_each(|_| world.advance(ms(13)));
+    world.end_recording().unwrap();
+    let others = &mut |_: &metachron_world::Member| Some(Box::new(Moody(7)) as Box<dyn Governor>);
+    let again = World::replay_governed(&scene, others, kept.read().unwrap(), None).unwrap();
+    again.advance(ms(300));
+    assert_eq!((again.replayed(), again.hash()), (Some(Ok(1.0)), world.hash()));
+}

@@ -1,0 +1,60 @@
+//! `replay`: repeats a recorded run and reports on it.
+//!
+//! In: arguments. Out: what `run` gives, of the run that was recorded, or where the two differ.
+//! Never here: how a recording is repeated ([`metachron_world::World::replay`]).
+
+use super::args::ReplayArgs;
+use super::play::headless;
+use super::run::{Request, RunLength, check_outputs, finish, stem, style};
+use metachron_console::exit::Exit;
+use metachron_console::output::{BadInput, message};
+use metachron_core::{SimSpan, SimTime};
+use metachron_scene::{Source, load};
+use metachron_session::Session;
+use metachron_world::{RecordError, Recording};
+
+/// Repeats a recording.
+pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
+    check_outputs(&args.output, &[("the recording", Some(&args.recording))], None)?;
+    let recording = Recording::read(&args.recording).map_err(bad_file)?;
+    let path = args.recording.display();
+    let scene = recording.scene().ok_or_else(|| {
+        let why = "it was recorded by a program that has built its scene, which only that program can start";
+        BadInput(format!("{path}: {why} (World::replay)"))
+    })?;
+    let source = Source::recorded(&scene.name, &scene.text)?;
+    let overrides = scene.overrides.clone();
+    if !args.output.quiet && !recording.is_complete() {
+        let lost = recording.lost_bytes();
+        message(&format!("{path} was cut short: it is repeated to its last whole chunk; {lost} bytes are left out"));
+    }
+    let request = Request {
+        scene: load(&source, &overrides)?,
+        quiet: args.output.quiet,
+        overrides,
+        window: false,
+        end: Some(RunLength::Recording),
+        size: args.size,
+        style: style(&args.output.style),
+        oracle: false,
+        png: args.output.png.clone(),
+        video: args.output.video.clone(),
+        record: None,
+        png_without_window: format!("metachron-{}.png", stem(source.name())).into(),
+        source,
+    };
+    let until = args.until.and_then(SimSpan::from_secs_f64).map(|span| SimTime::ZERO + span);
+    let play = |go_on: &mut dyn FnMut(super::run::Step) -> bool| {
+        let session = Session::replay(request.scene.clone(), recording.clone(), until)?;
+        headless(session, &request, request.png.clone(), go_on)
+    };
+    finish(&args.output, &play, &request.scene.name)
+}
+
+/// A file that is no recording is bad input; one that cannot be read is a failure.
+fn bad_file(error: RecordError) -> anyhow::Error {
+    match error {
+        RecordError::BadFile { .. } => BadInput(error.to_string()).into(),
+        other => other.into(),
+    }
+}
