@@ -124,7 +124,7 @@ fn retain_from<T>(from: usize, list: &mut Vec<T>, is_kept: &[bool]) {
 fn keep_loaded(group: &[usize], loads_n: &[f64], loaded: &mut Vec<usize>, is_kept: &mut [bool]) {
     loaded.clear();
     loaded.extend(group.iter().copied().filter(|at| loads_n[*at] > 0.0));
-    loaded.sort_by(|a, b| loads_n[*b].total_cmp(&loads_n[*a]));
+    loaded.sort_unstable_by(|a, b| loads_n[*b].total_cmp(&loads_n[*a]).then(a.cmp(b)));
     loaded.iter().take(NODES).for_each(|at| is_kept[*at] = true);
 }
 
