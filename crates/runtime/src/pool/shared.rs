@@ -38,6 +38,7 @@ pub(super) struct PoolState {
     queues: Vec<CachePadded<WorkerQueue>>,
     resting: Table<AtomicCell<Option<Box<AgentRunner>>>>,
     /// Those that make no more turns.
+    #[expect(clippy::vec_box, reason = "agents move as the boxes that all else holds them in")]
     parked: Mutex<Vec<Box<AgentRunner>>>,
 }
 
