@@ -1,5 +1,6 @@
 //! The command-line arguments and their help texts.
 
+use super::exports::ExportPaths;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, assignment, seconds, size, target_fps};
@@ -173,6 +174,13 @@ pub struct GenerateArgs {
     pub force: bool,
 }
 
+impl OutputArgs {
+    /// Where the moments of the run are written.
+    pub(super) fn exports(&self) -> ExportPaths {
+        ExportPaths { mcap: self.mcap.clone(), vtk: self.vtk.clone() }
+    }
+}
+
 /// A value of `--style`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum StyleWord {
@@ -246,6 +254,12 @@ pub struct OutputArgs {
     /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Needs --headless
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
+    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub mcap: Option<PathBuf>,
+    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd)
+    #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
+    pub vtk: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or colours by resolution, age or detail; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,

@@ -7,6 +7,7 @@ mod args;
 mod calibrate;
 mod check;
 mod describe;
+mod exports;
 mod generate;
 mod play;
 mod replay;

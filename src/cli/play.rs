@@ -2,6 +2,7 @@
 //!
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
+use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
 use metachron_console::output::BadInput;
@@ -61,10 +62,23 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     if let Some(path) = &request.record {
         record(&session, path, request)?;
     }
-    if !request.window {
-        return headless(session, request, request.png.clone(), go_on);
-    }
-    in_window(session, request, go_on)
+    exported(session, request, go_on, |session, go_on| match request.window {
+        false => headless(session, request, request.png.clone(), go_on),
+        true => in_window(session, request, go_on),
+    })
+}
+
+/// Plays a session, and writes every frame's moment into the files that were asked for.
+pub(super) fn exported(
+    session: Session,
+    request: &Request,
+    go_on: GoOn<'_>,
+    play: impl FnOnce(Session, GoOn<'_>) -> anyhow::Result<Played>,
+) -> anyhow::Result<Played> {
+    let mut exports = Exports::create(&request.exports, &request.scene, session.world())?;
+    let played = play(session, &mut |step| exports.take() && go_on(step))?;
+    exports.finish()?;
+    Ok(played)
 }
 
 #[cfg(not(feature = "viewer"))]

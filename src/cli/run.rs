@@ -4,6 +4,7 @@
 //! Never here: the loop itself.
 
 use super::args::{OutputArgs, RunArgs, StyleWord};
+use super::exports::ExportPaths;
 use super::play::play;
 use anyhow::Context;
 use clap::ArgMatches;
@@ -51,6 +52,8 @@ pub struct Request {
     pub png: Option<PathBuf>,
     /// Where to write the film of all frames (YUV4MPEG2); only without a window.
     pub video: Option<PathBuf>,
+    /// Where to write its moments for other programs.
+    pub exports: ExportPaths,
     /// Where to write down what is done to the run.
     pub record: Option<PathBuf>,
     /// Where to write it when the requested window could not be opened, and `png` is `None`.
@@ -176,6 +179,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         oracle: args.oracle,
         png: args.output.png.clone(),
         video: args.output.video.clone(),
+        exports: args.output.exports(),
         record: args.record.clone(),
         png_without_window,
     })
@@ -226,6 +230,7 @@ pub(super) fn check_outputs(
     let files = [
         ("--png", args.png.as_deref()),
         ("--video", args.video.as_deref()),
+        ("--mcap", args.mcap.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
         ("--record", record),
     ];

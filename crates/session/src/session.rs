@@ -203,6 +203,12 @@ impl Session {
         self.world.time()
     }
 
+    /// The world that is played.
+    #[must_use]
+    pub const fn world(&self) -> &World {
+        &self.world
+    }
+
     /// Whether time is virtual and costs are declared.
     #[must_use]
     pub fn is_virtual(&self) -> bool {
