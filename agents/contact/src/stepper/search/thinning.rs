@@ -106,7 +106,7 @@ impl Thinning {
             group.iter().for_each(|at| is_kept[*at] = false);
             let Some(patch) = patches[group[0]] else { continue };
             keep_loaded(group, loads_n, loaded, is_kept);
-            keep_deepest(group, &contacts[from..], patch, (deepest, is_kept));
+            keep_deepest(group, &contacts[from..], patch, deepest, is_kept);
             full.push(patch);
         }
         retain_from(from, owners, is_kept);
@@ -129,12 +129,7 @@ fn keep_loaded(group: &[usize], loads_n: &[f64], loaded: &mut Vec<usize>, is_kep
 }
 
 /// Marks the deepest of a patch's contacts for each node among those that move most with it.
-fn keep_deepest(
-    group: &[usize],
-    contacts: &[Contact],
-    patch: Patch,
-    (deepest, is_kept): (&mut Vec<Deepest>, &mut [bool]),
-) {
+fn keep_deepest(group: &[usize], contacts: &[Contact], patch: Patch, deepest: &mut Vec<Deepest>, is_kept: &mut [bool]) {
     deepest.clear();
     for at in group {
         let Contact { sides, gap_m, .. } = &contacts[*at];
