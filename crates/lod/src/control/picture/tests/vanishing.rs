@@ -50,7 +50,7 @@ fn members_of_a_group_vanish_where_the_policy_knows_no_groups_and_else_become_on
     views[..1000].iter_mut().for_each(|it| it.group = Some(1001));
     let impostor = Kind::Group { radius_m: 3.0, impostors: [20, 0, 0, 0, 0, 0, 0, 0] };
     views.push(object(1001, impostor, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
-    for (policy, together) in [(Policy::Greedy, false), (Policy::Hierarchical, true), (Policy::Adaptive, true)] {
+    for (policy, together) in [(Policy::Greedy, false), (Policy::Hierarchical, true)] {
         let mut control = control(policy, 100.0);
         let plan = control.plan(&views);
         assert_eq!((plan.promise.holes == 0, plan.levels[1001].polygons > 0.0), (together, together), "{policy:?}");
