@@ -3,10 +3,12 @@
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
-use metachron_core::{AgentId, Anchor, Body, PairKind, Snapshot};
+use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot};
 use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_runtime::{AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Run, StepPrice};
+use metachron_runtime::{
+    AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads, TimelineCommand,
+};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -158,4 +160,54 @@ fn an_asynchronous_link_joins_no_clusters_and_keeps_its_length_in_a_fall() {
 /// How much later the first state is than the second, seconds: it has fallen so much longer.
 fn time_apart_s(all: &[Arc<Snapshot>]) -> f64 {
     all[1].time.secs_after(all[0].time)
+}
+
+/// Two balls in free space that meet head on, at rates of their own.
+fn two_balls() -> Vec<AgentSpawn> {
+    let ball = |height_m: f64, mass_kg: f64, speed_m_s: f64| {
+        let free = RigidSpec::free(Solid::Ball { radius_m: 0.05 }, DVec3::Z * height_m, mass_kg);
+        let spec = RigidSpec { velocity: DVec3::Z * speed_m_s, restitution: 0.5, ..free };
+        Box::new(RigidBody::new(spec).unwrap())
+    };
+    let mut below = AgentSpawn::alone("below", ball(5.0, 1.0, 0.5), 90.0);
+    below.laws = vec![(AgentId(1), Law::Ledger)];
+    vec![below, AgentSpawn::alone("above", ball(5.13, 0.2, -1.0), 700.0)]
+}
+
+fn momentum_n_s(run: &dyn Run) -> f64 {
+    let of = |at: usize, mass_kg: f64| match &run.agents()[at].latest().body {
+        Body::Rigid(rigid) => mass_kg * rigid.velocity.z,
+        _ => panic!("no rigid body"),
+    };
+    of(0, 1.0) + of(1, 0.2)
+}
+
+#[test]
+fn a_cut_on_threads_loses_no_momentum_that_is_in_flight_between_two_clocks() {
+    let start = || Threads::start(two_balls(), Arc::new(SystemClock::new()), Priority::Normal).unwrap();
+    let mut in_flight = 0;
+    // they meet after 20 ms
+    for cut_ms in (16..40).step_by(2) {
+        let mut run = start();
+        run.drive(TimelineCommand::Leap(SimSpan::from_millis(cut_ms)));
+        let end = run.timeline().until().unwrap();
+        while run.agents().iter().any(|agent| agent.latest().moment() < end) {
+            run.wait_until(run.now() + Duration::from_micros(100));
+        }
+        in_flight += u32::from((momentum_n_s(&run) - 0.3).abs() > 1e-3);
+        let mut archive = Archive::writer();
+        run.archive(&mut archive).unwrap();
+        let bytes = archive.into_bytes();
+        let hashes = [0, 1].map(|_| {
+            let mut lockstep = Lockstep::start(two_balls(), machine()).unwrap();
+            lockstep.archive(&mut Archive::reader(&bytes)).unwrap();
+            lockstep.drive(TimelineCommand::Run);
+            lockstep.wait_until(lockstep.now() + Duration::from_secs(1));
+            let end_n_s = momentum_n_s(&lockstep);
+            assert!((end_n_s - 0.3).abs() < 1e-9, "cut after {cut_ms} ms: {end_n_s} N·s");
+            states(&lockstep).iter().fold(1, |hash, state| state.fold_hash(hash))
+        });
+        assert_eq!(hashes[0], hashes[1]);
+    }
+    assert!(in_flight > 0, "no cut fell between the two sides of an impulse");
 }
