@@ -6,6 +6,7 @@
 mod checkpoint;
 mod command;
 mod events;
+mod export;
 mod numbers;
 mod object;
 mod queries;
@@ -22,6 +23,8 @@ mod _metachron {
     use crate::checkpoint::Checkpoint;
     #[pymodule_export]
     use crate::events::{Event, Events};
+    #[pymodule_export]
+    use crate::export::Export;
     #[pymodule_export]
     use crate::object::Object;
     #[pymodule_export]

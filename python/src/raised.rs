@@ -3,6 +3,7 @@
 //! In: errors of scenes and worlds. Out: `KeyError` for a name that there is not, `ValueError` for what is wrong with what was given,
 //! `RuntimeError` for a world or an object that cannot do it any more. Never here: a sentence about physics.
 
+use metachron::export::ExportError;
 use metachron::scene::{SceneError, SceneProblem};
 use metachron::world::{CheckpointError, SceneBuildError, WorldError};
 use pyo3::exceptions::{PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
@@ -28,6 +29,14 @@ fn exception(error: &WorldError, message: String) -> PyErr {
             PyRuntimeError::new_err(message)
         }
         _ => PyValueError::new_err(message),
+    }
+}
+
+/// Why a file of moments cannot be written.
+pub fn export(error: ExportError) -> PyErr {
+    match error {
+        ExportError::File { .. } => PyOSError::new_err(error.to_string()),
+        ExportError::Taken { .. } => PyValueError::new_err(error.to_string()),
     }
 }
 

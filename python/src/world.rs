@@ -6,6 +6,7 @@
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
 use crate::events::Events;
+use crate::export::Export;
 use crate::numbers::{Rotation, Vector, span};
 use crate::object::{Named, Object};
 use crate::queries::{Contact, Hit};
@@ -15,6 +16,7 @@ use crate::state::State;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
 use metachron::core::SimSpan;
+use metachron::export::Surface;
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, EventFilter};
@@ -22,6 +24,7 @@ use numpy::PyArray1;
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
@@ -30,6 +33,8 @@ pub struct World {
     inner: world::World,
     /// The names of its static solids, by their numbers.
     fixed: Arc<[String]>,
+    /// Their surface.
+    fixed_surface: Surface,
     joints: Vec<Joint>,
 }
 
@@ -83,7 +88,7 @@ impl World {
         });
         let joints = joints.collect::<PyResult<_>>()?;
         let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
-        Ok(Self { inner, fixed, joints })
+        Ok(Self { inner, fixed, fixed_surface: Surface::fixed(scene), joints })
     }
 
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
@@ -330,6 +335,12 @@ impl World {
     /// Takes an object out; its handle is an error from its next step on.
     fn remove(&self, object: Named<'_>) -> PyResult<()> {
         self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
+    }
+
+    /// Begins files of moments for other programs: MCAP for Foxglove, Lichtblick and Rerun, a folder with a VTK series for ParaView.
+    #[pyo3(signature = (*, mcap = None, vtk = None))]
+    fn export(&self, mcap: Option<PathBuf>, vtk: Option<PathBuf>) -> PyResult<Export> {
+        Export::create(&self.inner, &self.fixed_surface, mcap, vtk)
     }
 
     /// Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one.

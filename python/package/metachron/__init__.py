@@ -4,7 +4,7 @@ A scene is built of parts, or read from TOML; started, it is a world whose objec
 Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are unit quaternions (x, y, z, w).
 """
 
-from ._metachron import Checkpoint, Contact, Event, Events, Hit, Object, Rollout, Scene, State, World, rollout
+from ._metachron import Checkpoint, Contact, Event, Events, Export, Hit, Object, Rollout, Scene, State, World, rollout
 from .parts import Ball, Box, Capsule, Cylinder, Plane, Prismatic, Revolute, Spherical, Tube, Weld
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Cylinder",
     "Event",
     "Events",
+    "Export",
     "Hit",
     "Object",
     "Plane",

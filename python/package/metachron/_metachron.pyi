@@ -11,7 +11,7 @@ from typing_extensions import Self, Unpack
 from .parts import JointKind, Part, Solid
 from .typing import Array, Numbers
 
-__all__ = ["Checkpoint", "Contact", "Event", "Events", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
+__all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
 
 _Executor = Literal["lockstep", "threads", "pool", "auto"]
 
@@ -210,6 +210,11 @@ class World:
     ) -> Events:
         """Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one."""
 
+    def export(
+        self, *, mcap: str | PathLike[str] | None = None, vtk: str | PathLike[str] | None = None
+    ) -> Export:
+        """Begins files of moments for other programs: MCAP for Foxglove, Lichtblick and Rerun, a folder with a VTK series for ParaView."""
+
     def contacts(self, object: str | Object) -> list[Contact]:
         """What an object touches now."""
 
@@ -284,6 +289,19 @@ class Events:
     @property
     def lost(self) -> int:
         """How many were overwritten before they were drained."""
+
+@final
+class Export:
+    """Writes moments of a world; in a `with` block the files are complete at the end."""
+
+    def write(self) -> None:
+        """Writes the world as it is now. `OSError` where a file cannot be written, `RuntimeError` after `close`."""
+
+    def close(self) -> None:
+        """Completes the files."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_raised: Any) -> None: ...
 
 @final
 class Event:

@@ -1,0 +1,68 @@
+"""Files of moments, opened by readers that are not ours."""
+
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import scenes
+from mcap.reader import make_reader
+
+MOMENTS = 12
+
+
+def write(folder: Path) -> list[float]:
+    """Heights of the falling ball at the moments written."""
+    heights = []
+    with scenes.falling().start() as world, world.export(mcap=folder / "run.mcap", vtk=folder / "vtk") as export:
+        for _ in range(MOMENTS):
+            world.advance(0.05)
+            export.write()
+            heights.append(float(world.state("ball").positions[0, 2]))
+    return heights
+
+
+def test_mcap_reads_what_was_written(tmp_path: Path) -> None:
+    heights = write(tmp_path)
+    with (tmp_path / "run.mcap").open("rb") as file:
+        reader = make_reader(file)
+        messages = [(channel.topic, message.log_time, json.loads(message.data)) for _, channel, message in reader.iter_messages()]
+    transforms = [(time, body) for topic, time, body in messages if topic == "/tf"]
+    assert [body["translation"]["z"] for _, body in transforms] == heights
+    assert [time for time, _ in transforms] == [50_000_000 * (k + 1) for k in range(MOMENTS)]
+    states = [body for topic, _, body in messages if topic == "/state"]
+    assert {state["name"] for state in states} == {"ball"}
+    assert states[-1]["snapshot"]["steps"] > states[0]["snapshot"]["steps"] > 0
+
+
+def test_meshio_reads_the_surfaces(tmp_path: Path) -> None:
+    heights = write(tmp_path)
+    for k in (0, MOMENTS - 1):
+        mesh = meshio.read(tmp_path / "vtk" / f"{k:06}.vtu")
+        points, triangles = mesh.points, mesh.cells_dict["triangle"]
+        assert triangles.max() < len(points)
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        assert middle[2] == pytest.approx(heights[k], abs=1e-9)
+        corners = points[triangles]
+        volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+        radius = np.ptp(points[:, 2]) / 2
+        assert volume == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.06)
+        assert set(mesh.cell_data) == {"object", "eps_m", "residual_m"}
+        # all points of a body that does not turn move alike
+        assert np.ptp(mesh.point_data["velocity"], axis=0) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_bad_files_are_told(tmp_path: Path) -> None:
+    write(tmp_path)
+    world = scenes.falling().start()
+    with pytest.raises(ValueError, match="nothing would be written"):
+        world.export()
+    with pytest.raises(ValueError, match="already holds a series"):
+        world.export(vtk=tmp_path / "vtk")
+    with pytest.raises(OSError, match="cannot be written"):
+        world.export(mcap=tmp_path / "no" / "run.mcap")
+    export = world.export(mcap=tmp_path / "again.mcap")
+    export.close()
+    with pytest.raises(RuntimeError, match="complete"):
+        export.write()
