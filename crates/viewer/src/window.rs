@@ -228,7 +228,7 @@ impl<'a> WindowSimulation<'a> {
     fn drive(&mut self, drive: TimelineCommand) {
         match drive {
             TimelineCommand::Run => self.running = true,
-            TimelineCommand::Pause | TimelineCommand::Step(_) => self.running = false,
+            TimelineCommand::Pause | TimelineCommand::Step(_) | TimelineCommand::Leap(_) => self.running = false,
             TimelineCommand::Speed(speed) => self.speed = speed,
         }
         self.session.drive(drive);
