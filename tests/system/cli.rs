@@ -242,3 +242,30 @@ fn an_interrupted_benchmark_keeps_the_rows_that_are_finished() {
     let words = if kept == 0 { "nothing was written" } else { "the finished rows are written" };
     assert!(kept < 12 && err(&done).contains(words), "{kept} rows: {}", err(&done));
 }
+
+#[test]
+fn a_recorded_run_is_repeated_to_the_same_state_and_a_cut_file_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (record, cut) = (file("run.rec"), file("cut.rec"));
+    let hash = |output: &Output| {
+        assert_eq!(code(output), 0, "{output:?}");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        (report["state_hash"].clone(), report["sim_s"].as_f64().unwrap())
+    };
+    let run =
+        ["run", "pendulum", "--headless", "--executor", "lockstep", "--seconds", "3", "--set", "target.frame_hz=50"];
+    let recorded = metachron(&[&run[..], &["--record", &record, "--report", "-", "--quiet"]].concat());
+    let repeated = metachron(&["replay", &record, "--report", "-", "--quiet"]);
+    assert_eq!(hash(&repeated).0, hash(&recorded).0);
+    let (_, until_s) = hash(&metachron(&["replay", &record, "--until", "1.5", "--report", "-", "--quiet"]));
+    assert!((until_s - 1.5).abs() < 1e-6, "{until_s} s");
+    let bytes = std::fs::read(&record).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() - 5]).unwrap();
+    let (_, cut_s) = hash(&metachron(&["replay", &cut, "--report", "-", "--quiet"]));
+    assert!(cut_s > 0.0 && cut_s < 3.0, "{cut_s} s");
+    std::fs::write(&cut, b"something else").unwrap();
+    assert_eq!(code(&metachron(&["replay", &cut])), 2);
+    let threads = metachron(&["run", "pendulum", "--headless", "--executor", "threads", "--record", &cut]);
+    assert_eq!(code(&threads), 2);
+}
