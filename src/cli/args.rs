@@ -254,10 +254,10 @@ pub struct OutputArgs {
     /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Needs --headless
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
-    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open
+    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open. Needs --headless
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub mcap: Option<PathBuf>,
-    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd)
+    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd). Needs --headless
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     pub vtk: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or colours by resolution, age or detail; several are separated by commas

@@ -62,23 +62,10 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     if let Some(path) = &request.record {
         record(&session, path, request)?;
     }
-    exported(session, request, go_on, |session, go_on| match request.window {
-        false => headless(session, request, request.png.clone(), go_on),
-        true => in_window(session, request, go_on),
-    })
-}
-
-/// Plays a session, and writes every frame's moment into the files that were asked for.
-pub(super) fn exported(
-    session: Session,
-    request: &Request,
-    go_on: GoOn<'_>,
-    play: impl FnOnce(Session, GoOn<'_>) -> anyhow::Result<Played>,
-) -> anyhow::Result<Played> {
-    let mut exports = Exports::create(&request.exports, &request.scene, session.world())?;
-    let played = play(session, &mut |step| exports.take() && go_on(step))?;
-    exports.finish()?;
-    Ok(played)
+    if !request.window {
+        return headless(session, request, request.png.clone(), go_on);
+    }
+    in_window(session, request, go_on)
 }
 
 #[cfg(not(feature = "viewer"))]
@@ -145,7 +132,10 @@ pub(super) fn headless(
     let plan = Headless { end, size, style: request.style, drawing, png, film: request.video.clone() };
     // the second run takes about as long as the first, so each is half of the whole
     let half = if request.oracle { 0.5 } else { 1.0 };
-    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(half * done))))?;
+    let mut exports = Exports::create(&request.exports, &request.scene, session.world())?;
+    let outcome =
+        play_headless(session, plan, &mut |record, done| exports.take() && go_on(step(record, Some(half * done))))?;
+    exports.finish()?;
     if !request.oracle || outcome.interrupted {
         return Ok(Played { oracle: request.oracle, ..played(&request.scene, outcome, picture) });
     }

@@ -210,8 +210,9 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         let why = "--oracle runs the scene twice without a window; add --headless";
         return Err(BadInput(why.to_owned()).into());
     }
-    if args.output.video.is_some() && !args.headless {
-        return Err(BadInput("--video films a run without a window; add --headless".to_owned()).into());
+    let files = [("--video", &args.output.video), ("--mcap", &args.output.mcap), ("--vtk", &args.output.vtk)];
+    if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
+        return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
     let scene = Path::new(&args.scene);
     let inputs = [("the scene", Some(scene).filter(|path| path.is_file())), ("--gains", args.gains.as_deref())];

@@ -47,7 +47,7 @@ pub enum WindowFailure {
     NoWindow(Box<Session>, WindowError),
     /// The window was open, and its display is gone: the outcome of the run until then.
     Gone(Box<Outcome>, WindowError),
-    /// A scene could not be restarted.
+    /// A scene could not be restarted, or its recording not be completed.
     Session(SessionError),
 }
 
@@ -63,7 +63,10 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut simulation = WindowSimulation::new(session, plan, go_on);
     match run_window(&mut simulation, &options) {
-        Ok(_) => Ok(simulation.session.end(simulation.adapter, simulation.stopped)),
+        Ok(_) => {
+            simulation.session.end_recording().map_err(|error| WindowFailure::Session(error.into()))?;
+            Ok(simulation.session.end(simulation.adapter, simulation.stopped))
+        }
         Err(error @ WindowError::Gone(_)) => {
             Err(WindowFailure::Gone(Box::new(simulation.session.end(simulation.adapter, true)), error))
         }
@@ -157,10 +160,16 @@ impl<'a> WindowSimulation<'a> {
             session.control().set_prices(prices);
         }
         let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
+        let recorded = self.session.end_recording();
         drop(std::mem::replace(&mut self.session, session));
         self.status = Status { selected, ..view_model::initial_status(&self.session) };
         self.meter = Meter::new(&self.session);
         self.notices.clear();
+        match recorded {
+            Ok(true) => self.show_message(Severity::Note, "the recording ends with the run before this one".to_owned()),
+            Ok(false) => {}
+            Err(error) => self.show_message(Severity::Failure, error.to_string()),
+        }
         (self.hand, self.refreshed) = (None, None);
         self.refresh();
     }

@@ -18,7 +18,8 @@ use std::sync::Arc;
 
 impl World {
     /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit. In
-    /// lockstep only. A world that has run before begins with a checkpoint. Commands wait for the call in progress meanwhile.
+    /// lockstep only. A world that has run before begins with a checkpoint. Commands of other threads wait for the call in progress from now on;
+    /// one that is sent while this call runs may be left out.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.
@@ -52,13 +53,13 @@ impl World {
         if self.has_stopped() || self.shared.log.is_replayed() { Err(RecordError::Stopped) } else { Ok(()) }
     }
 
-    /// Ends the recording, if there is one, as [`World::stop`] does.
+    /// Ends the recording, as [`World::stop`] does; returns whether there was one.
     ///
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
-    pub fn end_recording(&self) -> Result<(), RecordError> {
+    pub fn end_recording(&self) -> Result<bool, RecordError> {
         let recorder = self.shared.log.take_recorder();
-        recorder.map_or(Ok(()), |recorder| recorder.end(self.hash()))
+        recorder.map_or(Ok(false), |recorder| recorder.end(self.hash()).map(|()| true))
     }
 
     /// Starts `scene` in lockstep and does again what `recording` says, as far as time is let pass, but no further than to `until`: the

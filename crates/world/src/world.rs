@@ -426,7 +426,8 @@ impl World {
         }
         let entry = added(&name, &part);
         if log.is_recorded() && entry.is_none() {
-            let reason = "a recording has rigid bodies and tubes that join, and no agent of your own".to_owned();
+            let reason =
+                "a recording has rigid bodies, tubes and soft bodies that join, and no agent of your own".to_owned();
             return Err(WorldError::Refused { name, reason });
         }
         let id = AgentId(self.shared.agents.len() as u32);

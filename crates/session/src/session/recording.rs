@@ -27,11 +27,11 @@ impl Session {
         self.world.record_to(out, Some(scene))
     }
 
-    /// Ends the recording, if there is one.
+    /// Ends the recording; returns whether there was one.
     ///
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
-    pub fn end_recording(&self) -> Result<(), RecordError> {
+    pub fn end_recording(&self) -> Result<bool, RecordError> {
         self.world.end_recording()
     }
 

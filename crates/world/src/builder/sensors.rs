@@ -29,7 +29,7 @@ pub enum SensorOn {
     ContactForce(String),
     /// What one object or fixed solid, the second, gives the first.
     ContactBetween(String, String),
-    /// An accelerometer and a gyroscope in a rigid body: [`SensorKind::Imu`].
+    /// An accelerometer and a gyroscope in a rigid body that is not kinematic: [`SensorKind::Imu`].
     Imu(String),
     /// A point of a rigid body, metres in the axes of its shape: [`SensorKind::Pose`].
     Pose(String, [f64; 3]),
@@ -71,6 +71,9 @@ impl Mounts<'_> {
             }
             SensorOn::Imu(on) => {
                 let (object, spec) = rigid(on)?;
+                if spec.led.is_some() {
+                    return Err(nothing(on, "rigid body that forces move"));
+                }
                 SensorKind::Imu { object, gravity_m_s2: spec.gravity }
             }
             SensorOn::Pose(on, at_m) => SensorKind::Pose { object: rigid(on)?.0, at_m: (*at_m).into() },
