@@ -397,6 +397,14 @@ impl World {
                 "the lists of the state have {found:?} entries; those of the object have {wanted:?}"
             ));
         }
+        if let (Body::Soft(soft), Some(nodes)) = (state, now.nodes)
+            && nodes as usize != soft.positions.len()
+        {
+            return refused(format!(
+                "its {} vertices are carried by {nodes} nodes, which their places do not tell; restore a checkpoint instead",
+                soft.positions.len()
+            ));
+        }
         if !state.is_finite() {
             return refused("every number of a state must be finite".to_owned());
         }
