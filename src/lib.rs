@@ -25,6 +25,8 @@ pub use metachron_core as core;
 #[cfg(feature = "export")]
 pub use metachron_export as export;
 pub use metachron_geometry as geometry;
+#[cfg(feature = "import")]
+pub use metachron_import as import;
 #[cfg(feature = "lab")]
 pub use metachron_lab as lab;
 pub use metachron_models as models;

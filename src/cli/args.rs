@@ -64,6 +64,14 @@ Examples:
   metachron generate grove --trees 2000 --zigzag --out grove-2000.toml
   metachron run grove-2000.toml";
 
+const IMPORT_EXAMPLES: &str = "\
+Examples:
+  metachron import robot.urdf                          the scene on standard output, the list on standard error
+  metachron import arm.xml --out arm.toml
+  metachron run arm.toml
+
+Meshes are named from the folder of --out, or else from that of the model.";
+
 /// A real-time physics engine in which every object keeps its own time and the frame never waits.
 ///
 /// A scene is a TOML file of objects: soft tubes, rigid bodies, tools. Each runs as an agent on its own clock, with its
@@ -111,6 +119,9 @@ pub enum Command {
     /// Write a scene of the papers' experiments as a scene file, with a seed and options
     #[command(after_help = GENERATE_EXAMPLES)]
     Generate(GenerateArgs),
+    /// Write a URDF robot or an MJCF model as a scene file, and list what of it has no place in one
+    #[command(after_help = IMPORT_EXAMPLES)]
+    Import(ImportArgs),
     /// Print the JSON Schema of scene files
     Schema,
     /// List the built-in scenes
@@ -166,6 +177,20 @@ pub struct GenerateArgs {
     /// Trees of the grove without levels of detail: as much of the full mesh is drawn as there is time for
     #[arg(long)]
     pub prefix: bool,
+    /// Write the scene to this file instead of standard output
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
+    /// Overwrite an existing file
+    #[arg(long, requires = "out")]
+    pub force: bool,
+}
+
+/// `import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// A URDF robot or an MJCF model
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub model: PathBuf,
     /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,

@@ -9,6 +9,7 @@ mod check;
 mod describe;
 mod exports;
 mod generate;
+mod import;
 mod play;
 mod replay;
 pub mod run;
@@ -51,6 +52,7 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         #[cfg(feature = "render")]
         Command::Calibrate(args) => calibrate::command(&args),
         Command::Generate(args) => generate::command(&args),
+        Command::Import(args) => import::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),
         Command::Completions { shell } => describe::completions(shell),

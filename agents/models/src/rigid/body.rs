@@ -46,7 +46,7 @@ impl RigidBody {
     /// [`RigidError`] for a shape without volume, a plane and a number outside its range.
     pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
         spec.check()?;
-        let spread = MassDistribution::of(&spec.solid, spec.mass_kg)?;
+        let spread = MassDistribution::of_body(&spec)?;
         let rotation = spec.rotation.normalize();
         let mut motion = Motion {
             position: spec.position + rotation * spread.com,

@@ -1,10 +1,10 @@
 //! Mass distribution of a solid: centre of mass and principal moments of inertia, in double precision.
 //!
-//! In: a [`Solid`] of uniform density. Out: [`MassDistribution`]. Never here: where the body is, how it moves.
+//! In: a [`RigidSpec`]: a [`Solid`] of uniform density, or measured mass properties. Out: [`MassDistribution`]. Never here: where the body is, how it moves.
 //! Primitives use the closed forms; hulls and closed meshes the integrals over the tetrahedra between the origin and every
 //! triangle, which are exact for flat faces. An open mesh has no inside: it has the mass distribution of its convex hull.
 
-use super::RigidError;
+use super::{RigidError, RigidSpec};
 use crate::symmetric::{PrincipalAxes, principal_axes};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::{CompoundPart, Solid, Triangles, hull_triangles, mesh_triangles};
@@ -23,6 +23,14 @@ pub(super) struct MassDistribution {
 }
 
 impl MassDistribution {
+    /// The distribution that `spec` gives, or else that of its solid.
+    pub(super) fn of_body(spec: &RigidSpec) -> Result<Self, RigidError> {
+        let Some(given) = spec.inertia else { return Self::of(&spec.solid, spec.mass_kg) };
+        let PrincipalAxes { values, axes } = principal_axes(given.about_com_kg_m2);
+        let axes = DQuat::from_mat3(&axes).normalize();
+        Ok(Self { mass_kg: spec.mass_kg, com: given.com_m, moments: values, axes })
+    }
+
     /// The distribution of `mass_kg` over `solid`.
     pub(super) fn of(solid: &Solid, mass_kg: f64) -> Result<Self, RigidError> {
         let centred = |moments: DVec3| Self { mass_kg, com: DVec3::ZERO, moments, axes: DQuat::IDENTITY };
@@ -189,6 +197,19 @@ mod tests {
         let expected = DVec3::new(about + own.x, about + across + own.y, about + across + own.z);
         assert!((all.com - DVec3::Z * 0.4).length() < 1e-15, "{:?}", all.com);
         assert!((sorted(all.moments) - sorted(expected)).abs().max_element() < 1e-14, "{} {expected}", all.moments);
+    }
+
+    #[test]
+    fn given_moments_stand_in_for_those_of_the_solid() {
+        let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.0));
+        let about_com_kg_m2 = turn * DMat3::from_diagonal(DVec3::new(0.03, 0.04, 0.05)) * turn.transpose();
+        let given = super::super::GivenInertia { com_m: DVec3::X, about_com_kg_m2 };
+        let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 2.0);
+        let spread = MassDistribution::of_body(&RigidSpec { inertia: Some(given), ..ball }).unwrap();
+        let axes = DMat3::from_quat(spread.axes);
+        let back = axes * DMat3::from_diagonal(spread.moments) * axes.transpose();
+        assert!(back.abs_diff_eq(about_com_kg_m2, 1e-16), "{back}"); // rounding of numbers near 0.05
+        assert_eq!((spread.com, spread.mass_kg), (DVec3::X, 2.0));
     }
 
     #[test]

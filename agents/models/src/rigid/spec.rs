@@ -1,8 +1,9 @@
 //! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
 use super::mass_properties::MassDistribution;
+use crate::symmetric::principal_axes;
 use crate::trajectory::Keyframe;
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
 /// A rigid body before it is built.
@@ -20,6 +21,8 @@ pub struct RigidSpec {
     pub spin: DVec3,
     /// Mass, kilograms, > 0.
     pub mass_kg: f64,
+    /// Where its mass is; `None` for evenly inside its shape.
+    pub inertia: Option<GivenInertia>,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger.
     pub restitution: f64,
     /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
@@ -35,6 +38,16 @@ pub struct RigidSpec {
     /// How it is led, of a kinematic body ([`super::KinematicBody`]), whose mass, velocity, spin and gravity have no meaning; `None` for a
     /// body that moves by what acts on it.
     pub led: Option<Led>,
+}
+
+/// Mass properties that were measured or computed elsewhere, in place of those of the shape.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct GivenInertia {
+    /// Centre of mass in the shape's axes, metres.
+    pub com_m: DVec3,
+    /// Inertia tensor about the centre of mass along the shape's axes, kg·m²: symmetric, its principal moments above zero, none larger than
+    /// the sum of the other two.
+    pub about_com_kg_m2: DMat3,
 }
 
 /// What slows a rigid body down wherever it is, and the axes of the world along and about which it does not move.
@@ -107,6 +120,14 @@ pub enum RigidError {
         /// The range it must be in.
         wanted: &'static str,
     },
+    /// No body has these principal moments of inertia.
+    #[error(
+        "the inertia has the principal moments {moments_kg_m2:?} kg·m²; they must be above zero, and none larger than the sum of the others"
+    )]
+    BadInertia {
+        /// The moments, kg·m²; not numbers where the tensor is not symmetric.
+        moments_kg_m2: [f64; 3],
+    },
     /// A vector or rotation is not finite, too large, or a rotation is zero.
     #[error("{what} must be finite and within the range of single precision")]
     BadVector {
@@ -133,6 +154,7 @@ impl RigidSpec {
             velocity: DVec3::ZERO,
             spin: DVec3::ZERO,
             mass_kg,
+            inertia: None,
             restitution: 0.0,
             friction: 0.5,
             traits: ContactTraits::default(),
@@ -146,7 +168,7 @@ impl RigidSpec {
     /// Its centre of mass in the axes of its shape, metres; their origin where the shape is none.
     #[must_use]
     pub fn com_local(&self) -> DVec3 {
-        MassDistribution::of(&self.solid, self.mass_kg).map_or(DVec3::ZERO, |spread| spread.com)
+        MassDistribution::of_body(self).map_or(DVec3::ZERO, |spread| spread.com)
     }
 
     /// Shifts its start and its keyframes, metres.
@@ -166,12 +188,34 @@ impl RigidSpec {
         let Restraint { linear_damping_per_s, angular_damping_per_s, .. } = self.restraint;
         number("the linear damping", linear_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
         number("the angular damping", angular_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
+        self.inertia.as_ref().map_or(Ok(()), GivenInertia::check)?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
         vector("the spin", self.spin)?;
         vector("the gravity", self.gravity)?;
         rotation("the rotation", self.rotation)?;
         self.led.as_ref().map_or(Ok(()), Led::check)
+    }
+}
+
+/// How much of the largest moment the triangle inequality may be missed by: moments are written with a few digits.
+const TRIANGLE_SLACK: f64 = 1e-3;
+
+impl GivenInertia {
+    /// Whether a body can have it.
+    ///
+    /// # Errors
+    /// [`RigidError::BadVector`] for a centre out of reach, [`RigidError::BadInertia`] for a tensor that no body has.
+    pub fn check(&self) -> Result<(), RigidError> {
+        vector("the centre of mass", self.com_m)?;
+        let tensor = self.about_com_kg_m2;
+        if !(tensor.is_finite() && tensor.abs_diff_eq(tensor.transpose(), 0.0)) {
+            return Err(RigidError::BadInertia { moments_kg_m2: [f64::NAN; 3] });
+        }
+        let moments = principal_axes(tensor).values;
+        let (least, greatest) = (moments.min_element(), moments.max_element());
+        let triangle = 2.0 * greatest <= moments.element_sum() + TRIANGLE_SLACK * greatest;
+        if least > 0.0 && triangle { Ok(()) } else { Err(RigidError::BadInertia { moments_kg_m2: moments.to_array() }) }
     }
 }
 

@@ -12,6 +12,7 @@ mod glb;
 mod grid;
 mod group;
 mod impostors;
+mod inertia;
 mod joint;
 mod joint_keys;
 mod joint_rules;

@@ -1,5 +1,6 @@
 //! A rigid object of the file as a [`RigidSpec`], or as an [`Obstacle`] where it is fixed.
 
+use super::inertia::inertia;
 use super::mesh;
 use super::mesh::Mesh;
 use super::object::ModelContext;
@@ -79,6 +80,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     let solid = solid(c, place, file, context.source)?;
     // a wrong shape gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
+    let inertia = inertia(c, place, file);
     let (position, rotation) = pose(c, place, file);
     let led = led(c, place, file, rotation);
     let start = led.as_ref().and_then(|led| led.keyframes.first());
@@ -94,6 +96,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
         velocity: point_or_zero(c, place, "velocity_m_s", file.velocity_m_s, SPEED_MAX),
         spin: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
         mass_kg,
+        inertia,
         restitution,
         friction,
         traits: context.traits,

@@ -44,6 +44,11 @@ pub struct RigidFile {
     pub mass_kg: Option<f64>,
     /// Density, kg/m³, 1e-3 … 1e6. Default 1000 where no mass is given.
     pub density_kg_m3: Option<f64>,
+    /// Centre of mass in the axes of the object, metres; beside `inertia_kg_m2`. Default: the origin of those axes.
+    pub centre_of_mass_m: Option<Point>,
+    /// Moments and products of inertia about the centre of mass along the axes of the object, kg·m²: `[xx, yy, zz, xy, xz, yz]`, beside
+    /// `mass_kg`. The products are those of the tensor, as in URDF and MJCF. Default: those of the shape, evenly filled.
+    pub inertia_kg_m2: Option<[f64; 6]>,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.2.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub restitution: Option<f64>,

@@ -5,7 +5,7 @@
 use super::{RATE_DEFAULT_HZ, SURFACE};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{CompoundPart, ContactTraits, Solid};
-use metachron_models::rigid::{Keyframe, RigidSpec};
+use metachron_models::rigid::{GivenInertia, Keyframe, RigidSpec};
 
 /// A rigid body before it is added.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -53,6 +53,13 @@ impl Rigid {
     #[must_use]
     pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
         self.spec.mass_kg = mass_kg;
+        self
+    }
+
+    /// Where its mass is, in place of evenly inside its shape.
+    #[must_use]
+    pub const fn inertia(mut self, given: GivenInertia) -> Self {
+        self.spec.inertia = Some(given);
         self
     }
 

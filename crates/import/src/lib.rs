@@ -1,0 +1,114 @@
+//! URDF robots and MJCF models as scene files.
+//!
+//! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
+//! Never here: running a scene, reading the points of meshes, checking the scene that comes out (`metachron-scene` does).
+//!
+//! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
+//! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
+
+mod folders;
+mod mjcf;
+mod model;
+mod pose;
+mod scene_text;
+mod settle;
+mod urdf;
+mod xml;
+
+pub use folders::Folders;
+
+/// The page of the crate: its code runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Page;
+
+/// A model as a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Imported {
+    /// The text of the scene file.
+    pub toml: String,
+    /// What of the model is not in it, in the order of the file.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A part of a model that a scene has no place for, or that is in it otherwise than in the model.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Line of the model's file, from 1.
+    pub line: u32,
+    /// Which element, such as ``joint `elbow`, dynamics``.
+    pub element: String,
+    /// What about it.
+    pub what: String,
+}
+
+impl std::fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "line {}: {}: {}", self.line, self.element, self.what)
+    }
+}
+
+/// Why a model cannot be a scene.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: {element}: {reason}")]
+pub struct ImportError {
+    /// Line of the model's file, from 1.
+    pub line: u32,
+    /// Which element, such as ``link `arm`, inertial``.
+    pub element: String,
+    /// What is wrong with it, and what was expected.
+    pub reason: String,
+}
+
+/// Reads a model of the kind that its root element says: [`urdf`] of `robot`, [`mjcf`] of `mujoco`.
+///
+/// # Errors
+/// As those two, and for another root.
+pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
+    let root = xml::parse(text)?;
+    match root.tag.as_str() {
+        "robot" => of_urdf(&root, folders.into()),
+        "mujoco" => of_mjcf(root, folders.into()),
+        _ => Err(root.wrong("is the root of no model that is known here; expected `robot` (URDF) or `mujoco` (MJCF)")),
+    }
+}
+
+/// Reads a URDF robot. Meshes are looked for in the folder of the model and, for `package://` paths, in the folders around it.
+///
+/// A root link without mass is the world, one with mass moves freely. A joint that may not be at zero starts as near to zero as it may.
+///
+/// # Errors
+/// [`ImportError`] at the first element that no scene can have: text that is no XML, a missing mesh, a mass that is not above zero, links that
+/// are no tree.
+pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
+    of_urdf(&xml::parse(text)?, folders.into())
+}
+
+/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes are looked for in the folder of the model.
+///
+/// # Errors
+/// [`ImportError`] at the first element that no scene can have, as [`urdf`], and for bodies with several joints.
+pub fn mjcf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
+    of_mjcf(xml::parse(text)?, folders.into())
+}
+
+fn of_urdf(root: &xml::Element, folders: Folders<'_>) -> Result<Imported, ImportError> {
+    let mut notes = Vec::new();
+    let model = urdf::read(root, folders, &mut notes)?;
+    imported(root, model, notes)
+}
+
+fn of_mjcf(mut root: xml::Element, folders: Folders<'_>) -> Result<Imported, ImportError> {
+    mjcf::resolve_defaults(&mut root)?;
+    let mut notes = Vec::new();
+    let model = mjcf::read(&root, folders, &mut notes)?;
+    imported(&root, model, notes)
+}
+
+fn imported(root: &xml::Element, model: model::Model, mut notes: Vec<LeftOut>) -> Result<Imported, ImportError> {
+    let settled = settle::settle(model, &mut notes)?;
+    let toml = scene_text::write(&settled, &mut notes);
+    root.list_unread(&mut notes);
+    notes.sort_by_key(|note| note.line);
+    Ok(Imported { toml, left_out: notes })
+}

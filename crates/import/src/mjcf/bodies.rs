@@ -1,0 +1,235 @@
+//! Bodies, and what is in them.
+//!
+//! In: the `worldbody` of a file. Out: links, joints and solids of the world. Never here: the shapes of geoms, motors.
+
+use super::compiler::Compiler;
+use super::geoms::{Geom, Mesh};
+use crate::folders::Folders;
+use crate::model::{Fixed, Joint, Link, Look, Mass, Model, Part, Place};
+use crate::pose::Pose;
+use crate::xml::Element;
+use crate::{ImportError, LeftOut};
+use glam::{DMat3, DQuat, DVec3};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Reads bodies into a model.
+pub(super) struct BodyReader<'a> {
+    pub(super) compiler: &'a Compiler,
+    pub(super) meshes: BTreeMap<String, Mesh<'a>>,
+    pub(super) folders: Folders<'a>,
+    pub(super) notes: &'a mut Vec<LeftOut>,
+    pub(super) model: Model,
+    /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
+    pub(super) zeros: Vec<f64>,
+    names: BTreeSet<String>,
+}
+
+/// The body that elements are read for.
+#[derive(Debug, Clone, Copy)]
+struct Host {
+    /// `None` for the world.
+    link: Option<usize>,
+    /// Its axes in the world.
+    pose: Pose,
+    /// Whether it is the world, or nothing lets it move against the world.
+    is_fixed: bool,
+}
+
+/// What the elements of one body, those in its frames too, amount to.
+#[derive(Default)]
+struct Contents<'e> {
+    inertial: Option<&'e Element>,
+    joints: Vec<Placed<'e>>,
+    geoms: Vec<Placed<'e>>,
+    bodies: Vec<Placed<'e>>,
+}
+
+/// An element, and the frames around it in the axes of its body.
+#[derive(Clone, Copy)]
+pub(super) struct Placed<'e> {
+    pub(super) element: &'e Element,
+    pub(super) frame: Pose,
+}
+
+impl<'e> Contents<'e> {
+    fn of(element: &'e Element, compiler: &Compiler) -> Result<Self, ImportError> {
+        let mut contents = Self::default();
+        contents.take(element, Pose::IDENTITY, compiler)?;
+        Ok(contents)
+    }
+
+    fn take(&mut self, element: &'e Element, frame: Pose, compiler: &Compiler) -> Result<(), ImportError> {
+        for child in element.all() {
+            let placed = Placed { element: child, frame };
+            match child.tag.as_str() {
+                "inertial" => self.inertial = Some(child.read()),
+                "joint" | "freejoint" => self.joints.push(Placed { element: child.read(), frame }),
+                "geom" => self.geoms.push(placed),
+                "body" => self.bodies.push(placed),
+                "frame" => self.take(child.read(), frame.then(compiler.pose(child)?), compiler)?,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<'a> BodyReader<'a> {
+    pub(super) fn new(
+        compiler: &'a Compiler,
+        meshes: BTreeMap<String, Mesh<'a>>,
+        folders: Folders<'a>,
+        notes: &'a mut Vec<LeftOut>,
+    ) -> Self {
+        // no object of a scene can have the name of the world
+        let names = BTreeSet::from(["world".to_owned()]);
+        Self { compiler, meshes, folders, notes, model: Model::default(), zeros: Vec::new(), names }
+    }
+
+    pub(super) fn finish(self) -> Model {
+        self.model
+    }
+
+    /// Reads the world and all bodies in it.
+    pub(super) fn world(&mut self, element: &Element) -> Result<(), ImportError> {
+        let contents = Contents::of(element, self.compiler)?;
+        for placed in &contents.geoms {
+            let Some(geom) = self.geom(*placed)? else { continue };
+            let name = self.unused(placed.element.text("name"), "geom");
+            self.model.fixed.push(Fixed { name, look: look(std::slice::from_ref(&geom)), part: geom.part });
+        }
+        let world = Host { link: None, pose: Pose::IDENTITY, is_fixed: true };
+        contents.bodies.iter().try_for_each(|body| self.body(*body, world))
+    }
+
+    fn body(&mut self, placed: Placed<'_>, host: Host) -> Result<(), ImportError> {
+        let element = placed.element.read();
+        let contents = Contents::of(element, self.compiler)?;
+        let rest = host.pose.then(placed.frame).then(self.compiler.pose(element)?);
+        let index = self.model.links.len();
+        let place = Place { line: element.line, label: element.label.clone() };
+        let joint = match contents.joints.as_slice() {
+            [] => None,
+            [one] => Some(self.joint(*one, host.link, index)?),
+            more => {
+                let expected = "expected at most one: between the objects of a scene a joint leaves one kind of motion";
+                return Err(element.wrong(format!("has {} joints; {expected}", more.len())));
+            }
+        };
+        let is_fixed = host.is_fixed && joint.is_none();
+        let pose = rest.then(joint.as_ref().map_or(Pose::IDENTITY, |joint| joint.motion));
+        let geoms = self.geoms(&contents)?;
+        let mass = if is_fixed {
+            contents.inertial.inspect(|inertial| inertial.read_all());
+            Mass::None
+        } else {
+            self.mass(contents.inertial, &geoms)?
+        };
+        let (name, look) = (self.unused(element.text("name"), "body"), look(&geoms));
+        let parts = geoms.into_iter().map(|geom| density(geom, &mass)).collect();
+        self.model.links.push(Link { name, place: place.clone(), pose, mass, parts, look });
+        match joint {
+            None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
+            Some(joint) => {
+                if let Some(between) = joint.between {
+                    self.push_joint(between, joint.zero);
+                }
+            }
+        }
+        contents.bodies.iter().try_for_each(|body| self.body(*body, Host { link: Some(index), pose, is_fixed }))
+    }
+
+    fn push_joint(&mut self, joint: Joint, zero: f64) {
+        self.model.joints.push(joint);
+        self.zeros.push(zero);
+    }
+
+    fn geoms(&mut self, contents: &Contents<'_>) -> Result<Vec<Geom>, ImportError> {
+        let mut geoms = Vec::new();
+        for placed in &contents.geoms {
+            geoms.extend(self.geom(*placed)?);
+        }
+        Ok(geoms)
+    }
+
+    fn mass(&self, inertial: Option<&Element>, geoms: &[Geom]) -> Result<Mass, ImportError> {
+        if let Some(inertial) = inertial.filter(|_| !self.compiler.mass_from_geoms) {
+            return self.given_mass(inertial);
+        }
+        let mut weighing = geoms.iter().filter(|geom| geom.density_kg_m3 != Some(0.0));
+        match (weighing.next(), weighing.next()) {
+            (None, _) => Ok(Mass::None),
+            // of a hull the scene alone knows the volume
+            (Some(Geom { density_kg_m3: None, mass_kg: Some(mass_kg), .. }), None) => {
+                Ok(Mass::Given { mass_kg: *mass_kg, com_m: DVec3::ZERO, inertia_kg_m2: None })
+            }
+            _ => match geoms.iter().find(|geom| geom.density_kg_m3.is_none()) {
+                Some(Geom { part: Part { place: Place { line, label }, .. }, .. }) => Err(ImportError {
+                    line: *line,
+                    element: label.clone(),
+                    reason: "is a mesh with a `mass` beside other geoms; expected an `inertial` in its body".to_owned(),
+                }),
+                None => Ok(Mass::OfParts),
+            },
+        }
+    }
+
+    fn given_mass(&self, inertial: &Element) -> Result<Mass, ImportError> {
+        let mass_kg = inertial.positive("mass")?;
+        let Pose { position: com_m, rotation } = self.compiler.pose(inertial)?;
+        let own = match (inertial.numbers("fullinertia")?, inertial.numbers("diaginertia")?) {
+            (Some([xx, yy, zz, xy, xz, yz]), _) => {
+                DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz))
+            }
+            (None, Some(moments)) => DMat3::from_diagonal(DVec3::from_array(moments)),
+            (None, None) => return Err(inertial.wrong("has neither `diaginertia` nor `fullinertia`")),
+        };
+        let turn = DMat3::from_quat(rotation);
+        Ok(Mass::Given { mass_kg, com_m, inertia_kg_m2: Some(turn * own * turn.transpose()) })
+    }
+
+    /// A name that nothing has yet: the given one, or one made of `kind`.
+    fn unused(&mut self, given: Option<&str>, kind: &str) -> String {
+        let first = given.unwrap_or(kind).to_owned();
+        let more = (2..).map(|i| format!("{first}-{i}"));
+        let name = std::iter::once(first.clone()).chain(more).find(|name| !self.names.contains(name));
+        let name = name.unwrap_or(first);
+        self.names.insert(name.clone());
+        name
+    }
+}
+
+/// The part of a geom, with its density where the body's mass comes from that.
+fn density(geom: Geom, mass: &Mass) -> Part {
+    let density_kg_m3 = geom.density_kg_m3.filter(|_| matches!(mass, Mass::OfParts));
+    Part { density_kg_m3, ..geom.part }
+}
+
+/// The look of a body: the colour of its first coloured geom, the friction of its roughest.
+fn look(geoms: &[Geom]) -> Look {
+    let touched = geoms.iter().filter(|geom| geom.part.touches);
+    let surface = touched.map(|geom| geom.surface).reduce(|a, b| if b.friction > a.friction { b } else { a });
+    Look { colour: geoms.iter().find_map(|geom| geom.colour), surface }
+}
+
+impl Joint {
+    /// A joint that lets nothing move.
+    fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {
+        Self {
+            name: String::new(),
+            place,
+            parent,
+            child,
+            kind: crate::model::Kind::Fixed,
+            anchor_m: DVec3::ZERO,
+            axis: DVec3::Z,
+            range: None,
+            motor: None,
+        }
+    }
+}
+
+/// A rotation that brings z to a direction.
+pub(super) fn z_to(direction: DVec3) -> DQuat {
+    DQuat::from_rotation_arc(DVec3::Z, direction)
+}

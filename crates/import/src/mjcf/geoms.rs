@@ -1,0 +1,154 @@
+//! Geoms and the meshes that they name.
+//!
+//! In: `geom` and `mesh` elements. Out: [`Geom`]s. Never here: the mass of a body.
+
+use super::bodies::{BodyReader, Placed, z_to};
+use super::compiler::Compiler;
+use crate::ImportError;
+use crate::folders::is_readable;
+use crate::model::{Part, Place, Shape, Surface};
+use crate::pose::Pose;
+use crate::xml::Element;
+use glam::DVec3;
+use metachron_geometry::Solid;
+use std::collections::BTreeMap;
+
+/// Density of a geom that says none, kg/m³.
+const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
+/// Friction of a geom that says none.
+const FRICTION_DEFAULT: f64 = 1.0;
+
+/// A solid of a body, and what it says beside its shape.
+#[derive(Debug)]
+pub(super) struct Geom {
+    pub(super) part: Part,
+    /// `None` of a mesh that says a mass: its volume is not known here.
+    pub(super) density_kg_m3: Option<f64>,
+    pub(super) mass_kg: Option<f64>,
+    pub(super) colour: Option<[u8; 3]>,
+    pub(super) surface: Surface,
+}
+
+/// A mesh of the file.
+#[derive(Debug)]
+pub(super) struct Mesh<'a> {
+    element: &'a Element,
+    file: String,
+    scale: [f64; 3],
+}
+
+/// The meshes of a file by name: that of the file where they have none.
+pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTreeMap<String, Mesh<'a>>, ImportError> {
+    let mut found = BTreeMap::new();
+    for element in root.children("asset").flat_map(|asset| asset.children("mesh")) {
+        let Some(file) = element.text("file") else { continue };
+        let stem = std::path::Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or(file);
+        let name = element.text("name").unwrap_or(stem).to_owned();
+        let folder = compiler.mesh_folder.trim_end_matches('/');
+        let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
+        let scale = element.numbers("scale")?.unwrap_or([1.0; 3]);
+        found.insert(name, Mesh { element, file, scale });
+    }
+    Ok(found)
+}
+
+impl BodyReader<'_> {
+    /// A geom; nothing for one that scenes cannot have, which is noted.
+    pub(super) fn geom(&mut self, placed: Placed<'_>) -> Result<Option<Geom>, ImportError> {
+        let element = placed.element.read();
+        let own = self.compiler.pose(element)?;
+        let Some((shape, pose)) = self.shape(element, own)? else { return Ok(None) };
+        let masks = [element.number("contype")?.unwrap_or(1.0), element.number("conaffinity")?.unwrap_or(1.0)];
+        let touches = masks != [0.0; 2];
+        if touches && masks != [1.0; 2] {
+            self.notes.push(element.note("touches all: `contype` and `conaffinity` other than 0 and 1 are left out"));
+        }
+        let friction = element.list("friction")?.and_then(|all| all.first().copied()).unwrap_or(FRICTION_DEFAULT);
+        if !(0.0..=10.0).contains(&friction) {
+            return Err(element.wrong(format!("`friction` is {friction}; expected 0 to 10")));
+        }
+        let (given, mass_kg) = (element.number("density")?.unwrap_or(DENSITY_DEFAULT_KG_M3), element.number("mass")?);
+        if given < 0.0 || mass_kg.is_some_and(|mass| mass < 0.0) {
+            return Err(element.wrong("has a mass or density below zero"));
+        }
+        let density_kg_m3 = match (mass_kg, &shape) {
+            (_, Shape::Solid(Solid::Plane)) | (Some(0.0), _) => Some(0.0),
+            (None, _) => Some(given),
+            (Some(mass), Shape::Solid(solid)) => {
+                Some(mass / solid.volume_m3().map_err(|why| element.wrong(why.to_string()))?)
+            }
+            (Some(_), Shape::Hull { .. }) => None,
+        };
+        let colour = element.numbers::<4>("rgba")?;
+        let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
+        let place = Place { line: element.line, label: element.label.clone() };
+        let part = Part { place, shape, pose: placed.frame.then(pose), density_kg_m3: None, touches };
+        Ok(Some(Geom { part, density_kg_m3, mass_kg, colour, surface: Surface { friction } }))
+    }
+
+    /// The shape of a geom and where it is, which `fromto` says otherwise than `own`.
+    fn shape(&mut self, element: &Element, own: Pose) -> Result<Option<(Shape, Pose)>, ImportError> {
+        let size = element.list("size")?.unwrap_or_default();
+        let edge = |i: usize| {
+            let value = size.get(i).copied().unwrap_or(0.0);
+            let least = format!("`size` has {value} at place {}; expected more than zero", i + 1);
+            if value > 0.0 { Ok(value) } else { Err(element.wrong(least)) }
+        };
+        let line = Line::of(element)?;
+        let pose = line.map_or(own, |line| line.pose);
+        let half = |at: usize| line.map_or_else(|| edge(at), |line| Ok(line.half_m));
+        let solid = match element.text("type").unwrap_or("sphere") {
+            "sphere" => Solid::Ball { radius_m: edge(0)? },
+            "capsule" => Solid::Capsule { radius_m: edge(0)?, half_height_m: half(1)? },
+            "cylinder" => Solid::Cylinder { radius_m: edge(0)?, half_height_m: half(1)? },
+            "box" => {
+                let across = edge(if line.is_some() { 0 } else { 1 })?;
+                Solid::Box { half_extents_m: DVec3::new(edge(0)?, across, half(2)?) }
+            }
+            "plane" => Solid::Plane,
+            "mesh" => return Ok(self.mesh(element)?.map(|shape| (shape, pose))),
+            other => {
+                self.notes.push(element.note(format!("is left out: scenes have no {other}")));
+                return Ok(None);
+            }
+        };
+        Ok(Some((Shape::Solid(solid), pose)))
+    }
+
+    fn mesh(&mut self, element: &Element) -> Result<Option<Shape>, ImportError> {
+        let name = element.needed("mesh")?;
+        let Some(mesh) = self.meshes.get(name) else {
+            return Err(element.wrong(format!("names the mesh `{name}`, and there is none of that name with a file")));
+        };
+        let [x, y, z] = mesh.scale;
+        let why = if !is_readable(&mesh.file) {
+            "scenes read .glb, .stl and .obj"
+        } else if !(x > 0.0 && x == y && y == z) {
+            "scenes have one scale above zero for all three axes"
+        } else {
+            let file = self.folders.mesh(mesh.element, &mesh.file)?;
+            return Ok(Some(Shape::Hull { file, scale: x }));
+        };
+        self.notes.push(element.note(format!("`{}` is left out: {why}", mesh.file)));
+        Ok(None)
+    }
+}
+
+/// The line from end to end that `fromto` gives.
+#[derive(Clone, Copy)]
+struct Line {
+    pose: Pose,
+    half_m: f64,
+}
+
+impl Line {
+    fn of(element: &Element) -> Result<Option<Self>, ImportError> {
+        let Some([a, b, c, d, e, f]) = element.numbers("fromto")? else { return Ok(None) };
+        let (from, to) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
+        let Some(along) = (to - from).try_normalize() else {
+            return Err(element.wrong("`fromto` has both ends at one point"));
+        };
+        let pose = Pose { position: (from + to) / 2.0, rotation: z_to(along) };
+        Ok(Some(Self { pose, half_m: from.distance(to) / 2.0 }))
+    }
+}

@@ -1,0 +1,55 @@
+//! MJCF, as of MuJoCo's XML reference: bodies in bodies, joints and geoms in them.
+//!
+//! In: the tree of a file. Out: a [`Model`]. Never here: TOML, bodies without mass (`settle` has them).
+//! As in MuJoCo, a body on which nothing moves is part of the world, and a body's mass is that of its geoms where it has no `inertial`.
+
+mod actuators;
+mod bodies;
+mod compiler;
+mod defaults;
+mod geoms;
+mod joints;
+
+pub(crate) use defaults::resolve_defaults;
+
+use crate::folders::Folders;
+use crate::model::Model;
+use crate::xml::Element;
+use crate::{ImportError, LeftOut};
+use bodies::BodyReader;
+use compiler::Compiler;
+use glam::DVec3;
+use std::collections::BTreeMap;
+
+/// Reads a model.
+///
+/// # Errors
+/// [`ImportError`] at the first element that no scene can have.
+pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+    if root.tag != "mujoco" {
+        return Err(root.wrong("is not the root of a model; expected `mujoco`"));
+    }
+    let compiler = Compiler::read(root)?;
+    let meshes = geoms::meshes(root, &compiler)?;
+    let mut reader = BodyReader::new(&compiler, meshes, folders, notes);
+    for body in root.children("worldbody") {
+        reader.world(body)?;
+    }
+    actuators::read(root, &mut reader)?;
+    let mut model = reader.finish();
+    model.name = root.text("model").unwrap_or("model").to_owned();
+    for option in root.children("option") {
+        if let Some(gravity) = option.numbers("gravity")? {
+            model.gravity_m_s2 = Some(DVec3::from_array(gravity));
+        }
+    }
+    let names: BTreeMap<String, usize> = model.links.iter().enumerate().map(|(i, l)| (l.name.clone(), i)).collect();
+    for exclude in root.children("contact").flat_map(|contact| contact.children("exclude")) {
+        let find = |key: &'static str| {
+            let name = exclude.needed(key)?;
+            names.get(name).copied().ok_or_else(|| exclude.wrong(format!("names `{name}`, and there is no such body")))
+        };
+        model.apart.push([find("body1")?, find("body2")?]);
+    }
+    Ok(model)
+}

@@ -1,0 +1,156 @@
+//! A robot as both kinds of files describe it: links, joints, and who does not collide with whom.
+//!
+//! In: what the readers found. Out: plain data. Never here: XML, TOML.
+
+use crate::pose::Pose;
+use glam::{DMat3, DVec3};
+use metachron_geometry::Solid;
+
+/// What a file describes.
+#[derive(Debug, Default)]
+pub(crate) struct Model {
+    pub(crate) name: String,
+    /// Gravity, m/s²; `None` for that of scenes.
+    pub(crate) gravity_m_s2: Option<DVec3>,
+    /// Each after the one that it hangs on.
+    pub(crate) links: Vec<Link>,
+    pub(crate) joints: Vec<Joint>,
+    /// Pairs of links that pass through each other.
+    pub(crate) apart: Vec<[usize; 2]>,
+    /// Solids of the world itself, in its axes.
+    pub(crate) fixed: Vec<Fixed>,
+}
+
+/// An element of the file, for messages.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    pub(crate) line: u32,
+    pub(crate) label: String,
+}
+
+/// A body.
+#[derive(Debug)]
+pub(crate) struct Link {
+    pub(crate) name: String,
+    pub(crate) place: Place,
+    /// Its axes in the world at the start.
+    pub(crate) pose: Pose,
+    pub(crate) mass: Mass,
+    pub(crate) parts: Vec<Part>,
+    pub(crate) look: Look,
+}
+
+/// How a body looks, and what its surface is like.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Look {
+    pub(crate) colour: Option<[u8; 3]>,
+    pub(crate) surface: Option<Surface>,
+}
+
+/// What a file that has contacts of its own says about them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surface {
+    pub(crate) friction: f64,
+}
+
+/// Where the mass of a link comes from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Mass {
+    /// It has none: it is a name for axes on another link.
+    None,
+    /// From the densities of its parts.
+    OfParts,
+    /// As the file says.
+    Given {
+        mass_kg: f64,
+        /// In the axes of the link.
+        com_m: DVec3,
+        /// About the centre of mass along the axes of the link; none where the file gives a mass alone.
+        inertia_kg_m2: Option<DMat3>,
+    },
+}
+
+/// A solid on a link.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    pub(crate) place: Place,
+    pub(crate) shape: Shape,
+    /// In the axes of its link.
+    pub(crate) pose: Pose,
+    pub(crate) density_kg_m3: Option<f64>,
+    /// Whether anything touches it; otherwise it is only seen.
+    pub(crate) touches: bool,
+}
+
+/// The shape of a part.
+#[derive(Debug, Clone)]
+pub(crate) enum Shape {
+    Solid(Solid),
+    /// The convex hull of a file's points, the path relative to the scene.
+    Hull {
+        file: String,
+        scale: f64,
+    },
+}
+
+/// A solid of the world.
+#[derive(Debug)]
+pub(crate) struct Fixed {
+    pub(crate) name: String,
+    pub(crate) part: Part,
+    pub(crate) look: Look,
+}
+
+/// A joint: the motion that it leaves to `child`.
+#[derive(Debug, Clone)]
+pub(crate) struct Joint {
+    /// Empty for one that the file does not name.
+    pub(crate) name: String,
+    pub(crate) place: Place,
+    /// `None` for the world.
+    pub(crate) parent: Option<usize>,
+    pub(crate) child: usize,
+    pub(crate) kind: Kind,
+    /// Where it is, in the axes of the child.
+    pub(crate) anchor_m: DVec3,
+    /// Axis in the axes of the child; no meaning for a joint without one.
+    pub(crate) axis: DVec3,
+    /// From the position at the start, radians or metres.
+    pub(crate) range: Option<[f64; 2]>,
+    pub(crate) motor: Option<Motor>,
+}
+
+/// The motion that a joint leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Fixed,
+    Revolute,
+    Spherical,
+    Prismatic,
+}
+
+/// What drives or brakes a joint, in radians or metres from its position at the start, newtons and newton metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Motor {
+    /// A spring to a position, with a damper.
+    Spring { position: f64, stiffness: f64, damping: f64, max_effort: Option<f64> },
+    /// A damper against a velocity.
+    Damper { damping: f64, max_effort: Option<f64> },
+    /// Dry friction.
+    Brake { max_effort: f64 },
+}
+
+impl Kind {
+    /// The motion from the position at zero, of a joint with this axis at this place.
+    pub(crate) fn motion(self, anchor_m: DVec3, axis: DVec3, position: f64) -> Pose {
+        let axis = axis.normalize_or_zero();
+        match self {
+            Self::Revolute => {
+                let rotation = glam::DQuat::from_scaled_axis(axis * position);
+                Pose { position: anchor_m - rotation * anchor_m, rotation }
+            }
+            Self::Prismatic => Pose { position: axis * position, ..Pose::IDENTITY },
+            Self::Fixed | Self::Spherical => Pose::IDENTITY,
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! A settled model as the text of a scene.
+//!
+//! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
+
+use crate::LeftOut;
+use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
+use crate::pose::{Pose, fixed_angles_deg};
+use glam::{DMat3, DQuat, DVec3};
+use metachron_geometry::Solid;
+use std::fmt::Write;
+
+/// Largest angle of a range of a scene, radians, and a little for rounding.
+const ANGLE_MAX_RAD: f64 = std::f64::consts::PI * (1.0 + 1e-12);
+/// A number this much smaller than those beside it is rounding.
+const NOTHING: f64 = 1e-12;
+/// Where something is within this of the origin, metres, it is there.
+const SAME_M: f64 = 1e-12;
+
+/// The text of a scene; what does not fit in it goes to `notes`.
+pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
+    let mut out = String::from("format = 1\n");
+    put(&mut out, "description", &quoted(&format!("{}, imported", model.name)));
+    if let Some(gravity) = model.gravity_m_s2 {
+        out.push_str("\n[world]\n");
+        put(&mut out, "gravity_m_s2", &vector(gravity));
+    }
+    for fixed in &model.fixed {
+        write_fixed(&mut out, fixed);
+    }
+    for link in &model.links {
+        write_link(&mut out, link);
+    }
+    for joint in &model.joints {
+        write_joint(&mut out, model, joint, notes);
+    }
+    for [a, b] in &model.apart {
+        out.push_str("\n[[coupling]]\n");
+        put(&mut out, "a", &quoted(&model.links[*a].name));
+        put(&mut out, "b", &quoted(&model.links[*b].name));
+        put(&mut out, "law", "\"off\"");
+    }
+    out
+}
+
+fn put(out: &mut String, key: &str, value: &str) {
+    writeln!(out, "{key} = {value}").expect("a string takes all");
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// A length or an angle: what is beyond the twelfth digit after the point is rounding.
+fn number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.12}").parse().unwrap_or(value);
+    // + 0.0 turns -0 into 0
+    exact(rounded + 0.0)
+}
+
+/// A number with all of its digits, as TOML writes one that is no integer.
+fn exact(value: f64) -> String {
+    format!("{value:?}")
+}
+
+/// Whether a rotation is one only by rounding.
+fn is_none(rotation: DQuat) -> bool {
+    rotation.xyz().length() < NOTHING
+}
+
+fn vector(v: DVec3) -> String {
+    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
+fn write_fixed(out: &mut String, fixed: &Fixed) {
+    out.push_str("\n[[object]]\n");
+    put(out, "name", &quoted(&fixed.name));
+    put(out, "model", "\"rigid\"");
+    put(out, "fixed", "true");
+    write_shape(out, &fixed.part.shape);
+    write_pose(out, fixed.part.pose);
+    write_look(out, &fixed.look, fixed.part.touches);
+}
+
+/// A link: its object has the axes of the link, so that one solid elsewhere in them is a part, too.
+fn write_link(out: &mut String, link: &Link) {
+    out.push_str("\n[[object]]\n");
+    put(out, "name", &quoted(&link.name));
+    put(out, "model", "\"rigid\"");
+    let simple = |part: &Part| {
+        part.pose.position.length() < SAME_M && is_none(part.pose.rotation) && part.density_kg_m3.is_none()
+    };
+    let whole = match link.parts.as_slice() {
+        [part] if simple(part) => Some(part),
+        _ => None,
+    };
+    match whole {
+        Some(part) => write_shape(out, &part.shape),
+        None => put(out, "shape", "\"compound\""),
+    }
+    write_pose(out, link.pose);
+    write_mass(out, &link.mass);
+    write_look(out, &link.look, link.parts.iter().any(|part| part.touches));
+    for part in link.parts.iter().filter(|_| whole.is_none()) {
+        out.push_str("\n[[object.part]]\n");
+        write_shape(out, &part.shape);
+        write_pose(out, part.pose);
+        if let Some(density) = part.density_kg_m3 {
+            put(out, "density_kg_m3", &exact(density.max(1e-3)));
+        }
+    }
+}
+
+fn write_shape(out: &mut String, shape: &Shape) {
+    let (name, keys) = match shape {
+        Shape::Solid(Solid::Ball { radius_m }) => ("ball", vec![("radius_m", number(*radius_m))]),
+        Shape::Solid(Solid::Box { half_extents_m }) => ("box", vec![("half_extents_m", vector(*half_extents_m))]),
+        Shape::Solid(Solid::Capsule { radius_m, half_height_m }) => {
+            ("capsule", vec![("radius_m", number(*radius_m)), ("half_height_m", number(*half_height_m))])
+        }
+        Shape::Solid(Solid::Cylinder { radius_m, half_height_m }) => {
+            ("cylinder", vec![("radius_m", number(*radius_m)), ("half_height_m", number(*half_height_m))])
+        }
+        Shape::Solid(_) => ("plane", Vec::new()),
+        Shape::Hull { file, scale } => {
+            let scale = (*scale != 1.0).then(|| ("scale", exact(*scale)));
+            ("hull", std::iter::once(("file", quoted(file))).chain(scale).collect())
+        }
+    };
+    put(out, "shape", &quoted(name));
+    for (key, value) in keys {
+        put(out, key, &value);
+    }
+}
+
+fn write_pose(out: &mut String, pose: Pose) {
+    if pose.position.length() >= SAME_M {
+        put(out, "position_m", &vector(pose.position));
+    }
+    if !is_none(pose.rotation) {
+        put(out, "rotation_deg", &vector(fixed_angles_deg(pose.rotation)));
+    }
+}
+
+fn write_mass(out: &mut String, mass: &Mass) {
+    let Mass::Given { mass_kg, com_m, inertia_kg_m2 } = mass else { return };
+    put(out, "mass_kg", &exact(*mass_kg));
+    let Some(DMat3 { x_axis, y_axis, z_axis }) = inertia_kg_m2 else { return };
+    let least = NOTHING * x_axis.x.max(y_axis.y).max(z_axis.z);
+    let all = [x_axis.x, y_axis.y, z_axis.z, y_axis.x, z_axis.x, z_axis.y];
+    let all = all.map(|value| if value.abs() < least { exact(0.0) } else { exact(value) });
+    put(out, "centre_of_mass_m", &vector(*com_m));
+    put(out, "inertia_kg_m2", &format!("[{}]", all.join(", ")));
+}
+
+fn write_look(out: &mut String, look: &Look, touches: bool) {
+    if let Some([r, g, b]) = look.colour {
+        put(out, "colour", &quoted(&format!("#{r:02x}{g:02x}{b:02x}")));
+    }
+    match look.surface {
+        _ if !touches => put(out, "contact", "{ collides_with = [] }"),
+        Some(surface) => {
+            put(out, "friction", &exact(surface.friction));
+            put(out, "restitution", "0.0");
+            put(out, "contact", "{ friction_rule = \"max\" }");
+        }
+        None => {}
+    }
+}
+
+/// A joint. Its first object is the parent, or the child where the parent is the world, which scenes write second: what moves against
+/// what is the other way around then, and so is the axis.
+fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<LeftOut>) {
+    let child = &model.links[joint.child];
+    let (a, b, from, sign) = match joint.parent.map(|parent| &model.links[parent]) {
+        Some(parent) => (&parent.name, child.name.as_str(), parent.pose.inverse().then(child.pose), 1.0),
+        None => (&child.name, "world", Pose::IDENTITY, -1.0),
+    };
+    let kind = match joint.kind {
+        Kind::Fixed => "fixed",
+        Kind::Revolute => "revolute",
+        Kind::Spherical => "spherical",
+        Kind::Prismatic => "prismatic",
+    };
+    out.push_str("\n[[joint]]\n");
+    if !joint.name.is_empty() {
+        put(out, "name", &quoted(&joint.name));
+    }
+    put(out, "kind", &quoted(kind));
+    put(out, "a", &quoted(a));
+    put(out, "b", &quoted(b));
+    let at = from.point(joint.anchor_m);
+    if at.length() >= SAME_M {
+        put(out, "at_a_m", &vector(at));
+    }
+    let Some(unit) = Unit::of(joint.kind) else { return };
+    put(out, "axis", &vector(from.rotation * joint.axis.normalize() * sign));
+    match joint.range {
+        Some(range) if unit.is_angle && range.iter().any(|end| end.abs() > ANGLE_MAX_RAD) => {
+            let what = "its limits are left out: they are more than half a turn from the start";
+            notes.push(LeftOut { line: joint.place.line, element: joint.place.label.clone(), what: what.to_owned() });
+        }
+        Some(range) => put(out, unit.range, &format!("[{}, {}]", unit.position(range[0]), unit.position(range[1]))),
+        None => {}
+    }
+    if let Some(motor) = joint.motor {
+        put(out, "motor", &unit.motor(motor));
+    }
+}
+
+/// How scenes call what belongs to a joint that turns, or slides.
+struct Unit {
+    is_angle: bool,
+    range: &'static str,
+    position: &'static str,
+    velocity: &'static str,
+    effort: &'static str,
+    stiffness: &'static str,
+    damping: &'static str,
+}
+
+impl Unit {
+    const fn of(kind: Kind) -> Option<Self> {
+        match kind {
+            Kind::Revolute => Some(Self {
+                is_angle: true,
+                range: "range_deg",
+                position: "position_deg",
+                velocity: "velocity_rad_s",
+                effort: "max_torque_n_m",
+                stiffness: "stiffness_n_m_rad",
+                damping: "damping_n_m_s_rad",
+            }),
+            Kind::Prismatic => Some(Self {
+                is_angle: false,
+                range: "range_m",
+                position: "position_m",
+                velocity: "velocity_m_s",
+                effort: "max_force_n",
+                stiffness: "stiffness_n_m",
+                damping: "damping_n_s_m",
+            }),
+            Kind::Fixed | Kind::Spherical => None,
+        }
+    }
+
+    fn position(&self, value: f64) -> String {
+        number(if self.is_angle { value.to_degrees().clamp(-180.0, 180.0) } else { value })
+    }
+
+    fn motor(&self, motor: Motor) -> String {
+        let (goal, max_effort) = match motor {
+            Motor::Spring { position, stiffness, damping, max_effort } => {
+                let goal =
+                    format!("{} = {}, {} = {stiffness:?}", self.position, self.position(position), self.stiffness);
+                let damper = if damping > 0.0 { format!(", {} = {damping:?}", self.damping) } else { String::new() };
+                (goal + &damper, max_effort)
+            }
+            Motor::Damper { damping, max_effort } => {
+                (format!("{} = 0, {} = {damping:?}", self.velocity, self.damping), max_effort)
+            }
+            Motor::Brake { max_effort } => (format!("{} = 0", self.velocity), Some(max_effort)),
+        };
+        let most = max_effort.map_or(String::new(), |most| format!(", {} = {most:?}", self.effort));
+        format!("{{ {goal}{most} }}")
+    }
+}

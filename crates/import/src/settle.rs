@@ -1,0 +1,186 @@
+//! Brings a model to what a scene can have: links without mass become part of what they are on, and nothing is without a shape.
+//!
+//! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
+
+use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Part, Place, Shape};
+use crate::pose::Pose;
+use crate::{ImportError, LeftOut};
+use glam::{DMat3, DVec3};
+use metachron_geometry::{COMPOUND_PARTS_MAX, Solid};
+
+/// Radius of what stands in for a link whose file says a mass and nothing else, metres.
+const STAND_IN_M: f64 = 0.01;
+
+/// What a link becomes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Fate {
+    /// Itself.
+    Itself,
+    /// Part of the world.
+    World,
+    /// Part of another link, at a place in its axes.
+    PartOf(usize, Pose),
+}
+
+/// Settles a model.
+///
+/// # Errors
+/// For a link without mass on a joint that moves.
+pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+    let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
+    for (at, link) in model.links.iter().enumerate() {
+        fates.push(fate(link, model.joints.iter().find(|joint| joint.child == at), &fates, &model)?);
+    }
+    for (at, fate) in fates.iter().enumerate() {
+        let parts = if *fate == Fate::Itself { continue } else { std::mem::take(&mut model.links[at].parts) };
+        match *fate {
+            Fate::PartOf(host, pose) => {
+                let moved = parts.into_iter().map(|part| Part { pose: pose.then(part.pose), ..part });
+                model.links[host].parts.extend(moved);
+            }
+            _ => {
+                let (name, pose, look) =
+                    (model.links[at].name.clone(), model.links[at].pose, model.links[at].look.clone());
+                model.fixed.extend(parts.into_iter().enumerate().map(|(i, part)| fixed(&name, i, pose, part, &look)));
+            }
+        }
+    }
+    keep(&mut model, &fates);
+    let neighbours = neighbours(&model);
+    model.apart.extend(neighbours);
+    for link in &mut model.links {
+        choose_parts(link, notes)?;
+    }
+    Ok(model)
+}
+
+fn fixed(link: &str, index: usize, pose: Pose, part: Part, look: &Look) -> Fixed {
+    let name = if index == 0 { link.to_owned() } else { format!("{link}-{}", index + 1) };
+    Fixed { name, part: Part { pose: pose.then(part.pose), ..part }, look: look.clone() }
+}
+
+/// What a link becomes, where those before it have their fates.
+fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> Result<Fate, ImportError> {
+    if !matches!(link.mass, Mass::None) {
+        return Ok(Fate::Itself);
+    }
+    let Some(joint) = joint else { return Ok(Fate::World) };
+    if joint.kind != Kind::Fixed {
+        let Place { line, label: element } = link.place.clone();
+        let reason = format!("has no mass, and {} lets it move; expected a mass above zero", joint.place.label);
+        return Err(ImportError { line, element, reason });
+    }
+    Ok(match joint.parent.map(|parent| (parent, before[parent])) {
+        None | Some((_, Fate::World)) => Fate::World,
+        Some((parent, Fate::Itself)) => Fate::PartOf(parent, model.links[parent].pose.inverse().then(link.pose)),
+        Some((_, Fate::PartOf(host, _))) => Fate::PartOf(host, model.links[host].pose.inverse().then(link.pose)),
+    })
+}
+
+/// Leaves the links that remain themselves, and the joints and pairs between them.
+fn keep(model: &mut Model, fates: &[Fate]) {
+    let mut numbers = Vec::with_capacity(fates.len());
+    let mut count = 0;
+    for fate in fates {
+        numbers.push(count);
+        count += usize::from(*fate == Fate::Itself);
+    }
+    let standing = |link: usize| match fates[link] {
+        Fate::Itself => Some(numbers[link]),
+        Fate::PartOf(host, _) => Some(numbers[host]),
+        Fate::World => None,
+    };
+    model.joints.retain(|joint| fates[joint.child] == Fate::Itself);
+    for joint in &mut model.joints {
+        (joint.parent, joint.child) = (joint.parent.and_then(standing), numbers[joint.child]);
+    }
+    let pairs = std::mem::take(&mut model.apart).into_iter();
+    model.apart = pairs.filter_map(|[a, b]| Some([standing(a)?, standing(b)?])).filter(|[a, b]| a != b).collect();
+    let mut at = 0;
+    model.links.retain(|_| {
+        at += 1;
+        fates[at - 1] == Fate::Itself
+    });
+}
+
+/// Links that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of links.
+/// Shapes overlap there, as those of connected links do.
+fn neighbours(model: &Model) -> Vec<[usize; 2]> {
+    let above = |link: usize| model.joints.iter().find(|joint| joint.child == link);
+    // the first link of each body; none is the world
+    let mut bodies: Vec<Option<usize>> = Vec::with_capacity(model.links.len());
+    for link in 0..model.links.len() {
+        let welded = above(link).filter(|joint| joint.kind == Kind::Fixed);
+        bodies.push(welded.map_or(Some(link), |joint| joint.parent.and_then(|parent| bodies[parent])));
+    }
+    // the body that a body hangs on
+    let host = |body: Option<usize>| Some(above(body?)?.parent.and_then(|parent| bodies[parent]));
+    let meets = |a: usize, b: usize| {
+        let [one, other] = [bodies[a], bodies[b]];
+        one == other || host(one) == Some(other) || host(other) == Some(one)
+    };
+    let jointed = |a: usize, b: usize| {
+        let between = |child: usize, parent: usize| above(child).is_some_and(|joint| joint.parent == Some(parent));
+        between(a, b) || between(b, a)
+    };
+    let pairs = (0..model.links.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+    pairs.filter(|[a, b]| meets(*a, *b) && !jointed(*a, *b) && !model.apart.contains(&[*a, *b])).collect()
+}
+
+/// Leaves a link the parts that are touched, or else those that are seen, or else a ball with its moments of inertia.
+fn choose_parts(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
+    let touched = link.parts.iter().any(|part| part.touches);
+    let mut left_out = |part: &Part, what: String| {
+        notes.push(LeftOut { line: part.place.line, element: part.place.label.clone(), what });
+    };
+    let weighs = |part: &Part| matches!(link.mass, Mass::OfParts) && part.density_kg_m3 != Some(0.0);
+    if touched {
+        if let Some(part) = link.parts.iter().find(|part| !part.touches && weighs(part)) {
+            let reason = "weighs something, and nothing touches it, where something touches other parts of its body; \
+                          expected an inertial element in the body";
+            return Err(ImportError {
+                line: part.place.line,
+                element: part.place.label.clone(),
+                reason: reason.to_owned(),
+            });
+        }
+        link.parts
+            .iter()
+            .filter(|part| !part.touches)
+            .for_each(|part| left_out(part, "is only seen: is left out".into()));
+        link.parts.retain(|part| part.touches);
+    }
+    if link.parts.len() > COMPOUND_PARTS_MAX {
+        let beyond = &link.parts[COMPOUND_PARTS_MAX..];
+        if beyond.iter().any(weighs) {
+            let Place { line, label: element } = link.place.clone();
+            let reason = format!("has {} solids that weigh; expected at most {COMPOUND_PARTS_MAX}", link.parts.len());
+            return Err(ImportError { line, element, reason });
+        }
+        beyond.iter().for_each(|part| left_out(part, format!("is left out: it is beyond {COMPOUND_PARTS_MAX} solids")));
+        link.parts.truncate(COMPOUND_PARTS_MAX);
+    }
+    if link.parts.is_empty() {
+        link.parts.push(stand_in(link));
+    }
+    Ok(())
+}
+
+/// A ball at the centre of mass, as large as one of its mass and its mean moment of inertia, that nothing touches.
+fn stand_in(link: &Link) -> Part {
+    let (mass_kg, com_m, tensor) = match link.mass {
+        Mass::Given { mass_kg, com_m, inertia_kg_m2: Some(tensor) } => (mass_kg, com_m, tensor),
+        Mass::Given { com_m, inertia_kg_m2: None, .. } => (1.0, com_m, DMat3::ZERO),
+        Mass::None | Mass::OfParts => (1.0, DVec3::ZERO, DMat3::ZERO),
+    };
+    let mean = (tensor.x_axis.x + tensor.y_axis.y + tensor.z_axis.z) / 3.0;
+    // a ball has 2/5 m r²
+    let radius_m = if mean > 0.0 { (2.5 * mean / mass_kg).sqrt().clamp(1e-6, 1e4) } else { STAND_IN_M };
+    Part {
+        place: link.place.clone(),
+        shape: Shape::Solid(Solid::Ball { radius_m }),
+        pose: Pose { position: com_m, ..Pose::IDENTITY },
+        density_kg_m3: None,
+        touches: false,
+    }
+}

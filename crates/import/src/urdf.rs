@@ -1,0 +1,311 @@
+//! URDF, as of its specification (<http://wiki.ros.org/urdf/XML>): links in their own axes, joints between them.
+//!
+//! In: the tree of a file. Out: a [`Model`]. Never here: TOML, links without mass (`settle` has them).
+//! The axes of a link are those of the joint that it hangs on, so that a joint is at the origin of its child.
+
+use crate::folders::{Folders, is_readable};
+use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Place, Shape};
+use crate::pose::{Pose, fixed_angles};
+use crate::xml::Element;
+use crate::{ImportError, LeftOut};
+use glam::{DMat3, DVec3};
+use metachron_geometry::Solid;
+use std::collections::BTreeMap;
+
+/// A joint as the file has it, between names.
+struct Draft<'a> {
+    element: &'a Element,
+    parent: &'a str,
+    child: &'a str,
+    origin: Pose,
+    kind: Kind,
+    axis: DVec3,
+    limits: Option<[f64; 2]>,
+    motor: Option<Motor>,
+    /// Whether the child moves freely.
+    is_free: bool,
+}
+
+/// Reads a robot.
+///
+/// # Errors
+/// [`ImportError`] at the first element that no scene can have.
+pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+    if root.tag != "robot" {
+        return Err(root.wrong("is not the root of a robot; expected `robot`"));
+    }
+    let colours = colours(root)?;
+    let mut links = BTreeMap::new();
+    for element in root.children("link") {
+        let name = element.needed("name")?;
+        if links.insert(name, element).is_some() {
+            return Err(element.wrong("is there twice; expected names that are one link's each"));
+        }
+    }
+    let drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
+    for draft in &drafts {
+        for (key, name) in [("parent", draft.parent), ("child", draft.child)] {
+            if !links.contains_key(name) {
+                return Err(draft.element.wrong(format!("has the {key} `{name}`, and there is no link of that name")));
+            }
+        }
+    }
+    let mut model = Model { name: root.text("name").unwrap_or("robot").to_owned(), ..Model::default() };
+    let order = order(root, &links, &drafts)?;
+    let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
+    for Placed { element, above } in order {
+        let mut pose = Pose::IDENTITY;
+        if let Some(draft) = above {
+            let parent = numbers[draft.parent];
+            let start = start(draft, notes);
+            pose = model.links[parent].pose.then(draft.origin).then(draft.kind.motion(DVec3::ZERO, draft.axis, start));
+            if !draft.is_free {
+                model.joints.push(joint(draft, parent, model.links.len(), start));
+            }
+        }
+        numbers.insert(element.needed("name")?, model.links.len());
+        model.links.push(link(element, pose, folders, &colours, notes)?);
+    }
+    Ok(model)
+}
+
+/// A link and the joint that it hangs on.
+struct Placed<'a> {
+    element: &'a Element,
+    above: Option<&'a Draft<'a>>,
+}
+
+/// The links, each after the one that it hangs on.
+fn order<'a>(
+    root: &Element,
+    links: &BTreeMap<&str, &'a Element>,
+    drafts: &'a [Draft<'a>],
+) -> Result<Vec<Placed<'a>>, ImportError> {
+    let mut above: BTreeMap<&str, &Draft<'_>> = BTreeMap::new();
+    for draft in drafts {
+        if let Some(other) = above.insert(draft.child, draft) {
+            let reason =
+                format!("has the child `{}`, which {} has, too; expected a tree", draft.child, other.element.label);
+            return Err(draft.element.wrong(reason));
+        }
+    }
+    let in_file = || root.children("link").filter_map(|element| links.get(element.text("name")?).copied());
+    let name = |element: &'a Element| element.text("name").unwrap_or_default();
+    let roots = in_file().filter(|element| !above.contains_key(name(element)));
+    let mut order: Vec<Placed<'a>> = roots.map(|element| Placed { element, above: None }).collect();
+    let mut at = 0;
+    while at < order.len() {
+        let parent = name(order[at].element);
+        let hanging = drafts.iter().filter(|draft| draft.parent == parent);
+        order.extend(hanging.filter_map(|d| Some(Placed { element: links.get(d.child)?, above: Some(d) })));
+        at += 1;
+    }
+    if order.len() < links.len() {
+        let reached: Vec<&str> = order.iter().map(|placed| name(placed.element)).collect();
+        let lost = in_file().find(|element| !reached.contains(&name(element))).unwrap_or(root);
+        return Err(lost.wrong("hangs on itself through its joints; expected a tree"));
+    }
+    Ok(order)
+}
+
+fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
+    let end =
+        |tag: &'static str| element.child(tag).ok_or_else(|| element.wrong(format!("has no `{tag}`")))?.needed("link");
+    let kind_name = element.needed("type")?;
+    let (kind, turns_freely) = match kind_name {
+        "fixed" | "floating" => (Kind::Fixed, false),
+        "revolute" => (Kind::Revolute, false),
+        "continuous" => (Kind::Revolute, true),
+        "prismatic" => (Kind::Prismatic, false),
+        "spherical" => (Kind::Spherical, false),
+        other => {
+            let expected = "expected fixed, revolute, continuous, prismatic, spherical or floating";
+            return Err(element.wrong(format!("is of the type `{other}`; {expected}")));
+        }
+    };
+    let moves = matches!(kind, Kind::Revolute | Kind::Prismatic);
+    let mut axis = DVec3::X;
+    if let (true, Some(given)) = (moves, element.child("axis")) {
+        axis = given.numbers("xyz")?.map_or(axis, DVec3::from_array);
+        if axis.length() < 1e-9 {
+            return Err(given.wrong("has no direction; expected a vector longer than 0"));
+        }
+    }
+    let limits = if moves && !turns_freely { Some(limits(element)?) } else { None };
+    let motor = if moves { damper(element)? } else { None };
+    let origin = origin(element)?;
+    let (parent, child, is_free) = (end("parent")?, end("child")?, kind_name == "floating");
+    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, is_free })
+}
+
+/// The limits of a joint; of one that the file says nothing about both are zero, as in the specification.
+fn limits(element: &Element) -> Result<[f64; 2], ImportError> {
+    let given =
+        element.child("limit").ok_or_else(|| element.wrong("has no `limit`; expected its `lower` and `upper`"))?;
+    let [lower, upper] = [given.number("lower")?.unwrap_or(0.0), given.number("upper")?.unwrap_or(0.0)];
+    if lower > upper {
+        return Err(given.wrong(format!("has the `lower` {lower} above its `upper` {upper}")));
+    }
+    Ok([lower, upper])
+}
+
+/// What brakes a joint: a damper, or dry friction where it has no damper.
+fn damper(element: &Element) -> Result<Option<Motor>, ImportError> {
+    let Some(given) = element.child("dynamics") else { return Ok(None) };
+    let brakes = |name: &str| {
+        let value = given.number(name)?.unwrap_or(0.0);
+        if value < 0.0 { Err(given.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
+    };
+    let damping = brakes("damping")?;
+    if damping > 0.0 {
+        return Ok(Some(Motor::Damper { damping, max_effort: None }));
+    }
+    let friction = brakes("friction")?;
+    Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))
+}
+
+/// The position at which a joint starts: as near to zero as it may be.
+fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
+    let Some([lower, upper]) = draft.limits else { return 0.0 };
+    let start = 0.0_f64.clamp(lower, upper);
+    if start != 0.0 {
+        notes.push(draft.element.note(format!("starts at {start}, the end of its limits that is nearest to zero")));
+    }
+    start
+}
+
+fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
+    Joint {
+        name: draft.element.text("name").unwrap_or_default().to_owned(),
+        place: place(draft.element),
+        parent: Some(parent),
+        child,
+        kind: draft.kind,
+        anchor_m: DVec3::ZERO,
+        axis: draft.axis,
+        range: draft.limits.map(|limits| limits.map(|end| end - start)),
+        motor: draft.motor,
+    }
+}
+
+fn place(element: &Element) -> Place {
+    Place { line: element.line, label: element.label.clone() }
+}
+
+/// The pose of an element's `origin`.
+fn origin(element: &Element) -> Result<Pose, ImportError> {
+    let Some(origin) = element.child("origin") else { return Ok(Pose::IDENTITY) };
+    let position = origin.numbers("xyz")?.map_or(DVec3::ZERO, DVec3::from_array);
+    let [roll, pitch, yaw] = origin.numbers("rpy")?.unwrap_or_default();
+    Ok(Pose { position, rotation: fixed_angles(roll, pitch, yaw) })
+}
+
+fn link(
+    element: &Element,
+    pose: Pose,
+    folders: Folders<'_>,
+    colours: &BTreeMap<&str, [u8; 3]>,
+    notes: &mut Vec<LeftOut>,
+) -> Result<Link, ImportError> {
+    // what is seen stands in where nothing is touched; otherwise it stays unread, and is listed
+    let touches = element.all().iter().any(|child| child.tag == "collision");
+    let mut parts = Vec::new();
+    for geometry in element.children(if touches { "collision" } else { "visual" }) {
+        let Some(shape) = shape(geometry, folders, notes)? else { continue };
+        let pose = origin(geometry)?;
+        parts.push(Part { place: place(geometry), shape, pose, density_kg_m3: None, touches });
+    }
+    let look = Look { colour: colour(element, touches, colours)?, surface: None };
+    let name = element.needed("name")?.to_owned();
+    Ok(Link { name, place: place(element), pose, mass: mass(element)?, parts, look })
+}
+
+fn mass(element: &Element) -> Result<Mass, ImportError> {
+    let Some(inertial) = element.child("inertial") else { return Ok(Mass::None) };
+    let mass = inertial.child("mass").ok_or_else(|| inertial.wrong("has no `mass`"))?;
+    let mass_kg = mass.positive("value")?;
+    let at = origin(inertial)?;
+    let tensor = inertial.child("inertia").ok_or_else(|| inertial.wrong("has no `inertia`"))?;
+    let moment = |name: &str| tensor.needed_number(name);
+    let [xx, yy, zz] = [moment("ixx")?, moment("iyy")?, moment("izz")?];
+    let product = |name: &str| Ok::<_, ImportError>(tensor.number(name)?.unwrap_or(0.0));
+    let [xy, xz, yz] = [product("ixy")?, product("ixz")?, product("iyz")?];
+    let own = DMat3::from_cols(DVec3::new(xx, xy, xz), DVec3::new(xy, yy, yz), DVec3::new(xz, yz, zz));
+    let turn = DMat3::from_quat(at.rotation);
+    Ok(Mass::Given { mass_kg, com_m: at.position, inertia_kg_m2: Some(turn * own * turn.transpose()) })
+}
+
+/// The shape of a `visual` or `collision`; a mesh that scenes cannot have is noted.
+fn shape(element: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
+    let geometry = element.child("geometry").ok_or_else(|| element.wrong("has no `geometry`"))?;
+    let Some(kind) = geometry.all().first() else { return Err(geometry.wrong("is empty; expected a shape")) };
+    Ok(match kind.tag.as_str() {
+        "sphere" => Some(Shape::Solid(Solid::Ball { radius_m: kind.read().positive("radius")? })),
+        "box" => {
+            let size = kind.read().numbers::<3>("size")?.ok_or_else(|| kind.wrong("has no `size`"))?;
+            if size.iter().any(|edge| *edge <= 0.0) {
+                return Err(kind.wrong(format!("`size` is {size:?}; expected three edges above zero")));
+            }
+            Some(Shape::Solid(Solid::Box { half_extents_m: DVec3::from_array(size) / 2.0 }))
+        }
+        "cylinder" | "capsule" => {
+            let (radius_m, half_height_m) = (kind.read().positive("radius")?, kind.positive("length")? / 2.0);
+            Some(Shape::Solid(if kind.tag == "cylinder" {
+                Solid::Cylinder { radius_m, half_height_m }
+            } else {
+                Solid::Capsule { radius_m, half_height_m }
+            }))
+        }
+        "mesh" => mesh(kind, folders, notes)?,
+        _ => {
+            notes.push(kind.read().note("is left out: it is no shape of a scene"));
+            None
+        }
+    })
+}
+
+fn mesh(kind: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
+    let name = kind.read().needed("filename")?;
+    let [x, y, z] = kind.numbers("scale")?.unwrap_or([1.0; 3]);
+    if !is_readable(name) {
+        notes.push(kind.note(format!("`{name}` is left out: scenes read .glb, .stl and .obj")));
+        return Ok(None);
+    }
+    let file = folders.mesh(kind, name)?;
+    if !(x > 0.0 && x == y && y == z) {
+        notes.push(kind.note(format!("`{name}` is left out: scenes have one scale above zero for all three axes")));
+        return Ok(None);
+    }
+    Ok(Some(Shape::Hull { file, scale: x }))
+}
+
+/// The colours of a robot's materials by name.
+fn colours(root: &Element) -> Result<BTreeMap<&str, [u8; 3]>, ImportError> {
+    let mut found = BTreeMap::new();
+    let links = root.all().iter().filter(|element| element.tag == "link");
+    let of_links = links.flat_map(Element::all).flat_map(Element::all).filter(|element| element.tag == "material");
+    for material in root.children("material").chain(of_links) {
+        if let (Some(name), Some(colour)) = (material.text("name"), own_colour(material)?) {
+            found.insert(name, colour);
+        }
+    }
+    Ok(found)
+}
+
+fn own_colour(material: &Element) -> Result<Option<[u8; 3]>, ImportError> {
+    let Some(colour) = material.child("color") else { return Ok(None) };
+    Ok(colour.numbers::<4>("rgba")?.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)))
+}
+
+/// The colour of a link: that of the first thing that is seen of it.
+fn colour(element: &Element, touches: bool, colours: &BTreeMap<&str, [u8; 3]>) -> Result<Option<[u8; 3]>, ImportError> {
+    let visual = element.all().iter().find(|child| child.tag == "visual");
+    let Some(material) = visual.and_then(|v| v.all().iter().find(|child| child.tag == "material")) else {
+        return Ok(None);
+    };
+    if !touches {
+        material.read();
+    }
+    let named = material.text("name").and_then(|name| colours.get(name).copied());
+    Ok(own_colour(material)?.or(named))
+}

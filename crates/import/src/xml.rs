@@ -1,0 +1,187 @@
+//! XML as a tree that knows which of its elements and attributes were read.
+//!
+//! In: text. Out: [`Element`]s, numbers of their attributes, and the list of what nobody asked for. Never here: the meaning of a tag.
+
+use crate::{ImportError, LeftOut};
+use std::cell::Cell;
+
+/// Deepest nesting of elements: readers recurse.
+const DEPTH_MAX: usize = 200;
+
+/// An element with all that is in it.
+#[derive(Debug, Clone)]
+pub(crate) struct Element {
+    pub(crate) tag: String,
+    /// For messages, such as ``joint `elbow` ``, or of an element without a name ``joint `elbow`, limit``.
+    pub(crate) label: String,
+    pub(crate) line: u32,
+    attributes: Vec<Attribute>,
+    children: Vec<Element>,
+    is_read: Cell<bool>,
+}
+
+#[derive(Debug, Clone)]
+struct Attribute {
+    name: String,
+    value: String,
+    is_read: Cell<bool>,
+}
+
+/// The root element of a text.
+///
+/// # Errors
+/// For text that is no XML, or nested too deep.
+pub(crate) fn parse(text: &str) -> Result<Element, ImportError> {
+    let document = roxmltree::Document::parse(text).map_err(|why| ImportError {
+        line: why.pos().row,
+        element: "the file".to_owned(),
+        reason: format!("is not XML: {why}"),
+    })?;
+    let root = Element::of(document.root_element(), &document, None, 0)?;
+    root.is_read.set(true);
+    Ok(root)
+}
+
+impl Element {
+    fn of(
+        node: roxmltree::Node<'_, '_>,
+        document: &roxmltree::Document<'_>,
+        parent: Option<&str>,
+        depth: usize,
+    ) -> Result<Self, ImportError> {
+        let tag = node.tag_name().name().to_owned();
+        let label = match (node.attribute("name"), parent) {
+            (Some(name), _) => format!("{tag} `{name}`"),
+            (None, Some(parent)) => format!("{parent}, {tag}"),
+            (None, None) => tag.clone(),
+        };
+        let line = document.text_pos_at(node.range().start).row;
+        if depth > DEPTH_MAX {
+            return Err(ImportError { line, element: tag, reason: format!("is nested more than {DEPTH_MAX} deep") });
+        }
+        let attribute = |a: roxmltree::Attribute<'_, '_>| Attribute {
+            // the label says the name
+            is_read: Cell::new(a.name() == "name"),
+            name: a.name().to_owned(),
+            value: a.value().to_owned(),
+        };
+        let attributes = node.attributes().map(attribute).collect();
+        // the root's name is that of the model, and of no use in labels
+        let inside = (depth > 0).then_some(label.as_str());
+        let elements = node.children().filter(roxmltree::Node::is_element);
+        let children = elements.map(|child| Self::of(child, document, inside, depth + 1)).collect::<Result<_, _>>()?;
+        Ok(Self { tag, label, line, attributes, children, is_read: Cell::new(false) })
+    }
+
+    /// The text of an attribute; it counts as read.
+    pub(crate) fn text(&self, name: &str) -> Option<&str> {
+        let found = self.attributes.iter().find(|a| a.name == name)?;
+        found.is_read.set(true);
+        Some(&found.value)
+    }
+
+    /// The text of an attribute that has to be there.
+    pub(crate) fn needed(&self, name: &str) -> Result<&str, ImportError> {
+        self.text(name).ok_or_else(|| self.wrong(format!("has no `{name}`")))
+    }
+
+    /// The numbers of an attribute.
+    pub(crate) fn list(&self, name: &str) -> Result<Option<Vec<f64>>, ImportError> {
+        let Some(text) = self.text(name) else { return Ok(None) };
+        let number = |word: &str| word.parse::<f64>().ok().filter(|value| value.is_finite());
+        let all: Option<Vec<f64>> = text.split_whitespace().map(number).collect();
+        all.map(Some).ok_or_else(|| self.wrong(format!("`{name}` is `{text}`; expected finite numbers")))
+    }
+
+    /// The numbers of an attribute that has `N` of them.
+    pub(crate) fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, ImportError> {
+        let Some(all) = self.list(name)? else { return Ok(None) };
+        let found = all.len();
+        let wrong = |_| self.wrong(format!("`{name}` has {found} numbers; expected {N}"));
+        all.try_into().map(Some).map_err(wrong)
+    }
+
+    pub(crate) fn number(&self, name: &str) -> Result<Option<f64>, ImportError> {
+        Ok(self.numbers::<1>(name)?.map(|[value]| value))
+    }
+
+    /// A number that has to be there.
+    pub(crate) fn needed_number(&self, name: &str) -> Result<f64, ImportError> {
+        self.needed(name)?;
+        Ok(self.number(name)?.unwrap_or_default())
+    }
+
+    /// A number that has to be there, and above zero.
+    pub(crate) fn positive(&self, name: &str) -> Result<f64, ImportError> {
+        let value = self.needed_number(name)?;
+        if value > 0.0 { Ok(value) } else { Err(self.wrong(format!("`{name}` is {value}; expected more than zero"))) }
+    }
+
+    /// The elements in this one, whether or not they have been read.
+    pub(crate) fn all(&self) -> &[Element] {
+        &self.children
+    }
+
+    pub(crate) fn all_mut(&mut self) -> &mut Vec<Element> {
+        &mut self.children
+    }
+
+    /// The elements with a tag in this one; they count as read.
+    pub(crate) fn children(&self, tag: &'static str) -> impl Iterator<Item = &Element> {
+        self.children.iter().filter(move |child| child.tag == tag).inspect(|child| child.is_read.set(true))
+    }
+
+    /// The first element with a tag in this one; it counts as read.
+    pub(crate) fn child(&self, tag: &'static str) -> Option<&Element> {
+        self.children(tag).next()
+    }
+
+    /// Counts the element as read, though not what is in it.
+    pub(crate) fn read(&self) -> &Self {
+        self.is_read.set(true);
+        self
+    }
+
+    /// Counts all attributes as read: what the file says has no meaning where the element is.
+    pub(crate) fn read_all(&self) {
+        self.attributes.iter().for_each(|attribute| attribute.is_read.set(true));
+    }
+
+    /// Whether the element has an attribute, which does not count as read.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.attributes.iter().any(|a| a.name == name)
+    }
+
+    /// Gives the element the attributes of `other` for which it has none, but for those that `skip` names.
+    pub(crate) fn inherit(&mut self, other: &Element, skip: impl Fn(&str) -> bool) {
+        for attribute in &other.attributes {
+            if !self.has(&attribute.name) && !skip(&attribute.name) {
+                self.attributes.push(attribute.clone());
+            }
+        }
+    }
+
+    /// An error about this element.
+    pub(crate) fn wrong(&self, reason: impl Into<String>) -> ImportError {
+        ImportError { line: self.line, element: self.label.clone(), reason: reason.into() }
+    }
+
+    /// A note about this element.
+    pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
+        LeftOut { line: self.line, element: self.label.clone(), what: what.into() }
+    }
+
+    /// Lists every element and attribute that nothing has read.
+    pub(crate) fn list_unread(&self, into: &mut Vec<LeftOut>) {
+        if !self.is_read.get() {
+            into.push(self.note("is left out"));
+            return;
+        }
+        for attribute in self.attributes.iter().filter(|a| !a.is_read.get()) {
+            into.push(self.note(format!("`{}` is left out", attribute.name)));
+        }
+        for child in &self.children {
+            child.list_unread(into);
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Imported models against closed forms, and against what MuJoCo makes of the same file.
+
+mod mjcf;
+mod play;
+mod urdf;

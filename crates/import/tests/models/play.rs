@@ -1,0 +1,37 @@
+//! Imported scenes in lockstep.
+
+use metachron_core::SimSpan;
+use metachron_import::Imported;
+use metachron_scene::{Source, load};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Scene, World};
+
+/// The imported scene with a sensor for each joint's position, and a step rate for each object.
+pub fn scene(imported: &Imported, joints: &[&str], rate_hz: f64) -> Scene {
+    let sensor =
+        |joint: &&str| format!("\n[[sensor]]\nname = \"{joint}\"\nkind = \"joint-position\"\njoint = \"{joint}\"\n");
+    let text = imported.toml.clone() + &joints.iter().map(sensor).collect::<String>();
+    let source = Source::memory("imported", text.as_bytes()).unwrap();
+    let mut scene = load(&source, &[]).unwrap_or_else(|error| panic!("{:?}\n{text}", error.problems));
+    for agent in &mut scene.agents {
+        let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap();
+        (agent.pace.rate_hz, agent.pace.dt, agent.pace.dt_range) = (rate_hz, dt, (dt, dt));
+    }
+    scene
+}
+
+pub fn start(imported: &Imported, joints: &[&str], rate_hz: f64) -> World {
+    World::start(&scene(imported, joints, rate_hz), ExecutorKind::Lockstep).unwrap()
+}
+
+pub fn position(world: &World, joint: &str) -> f64 {
+    world.sensor(joint).unwrap().values[0]
+}
+
+pub fn advance(world: &World, seconds: f64) {
+    world.advance(SimSpan::from_secs_f64(seconds).unwrap());
+}
+
+pub fn left_out(imported: &Imported) -> Vec<String> {
+    imported.left_out.iter().map(ToString::to_string).collect()
+}

@@ -1,0 +1,250 @@
+//! URDF robots.
+
+use crate::play::{advance, left_out, position, start};
+use metachron_import::{ImportError, urdf};
+use std::path::Path;
+
+fn import(text: &str) -> Result<metachron_import::Imported, ImportError> {
+    urdf(text, Path::new("."))
+}
+
+/// Two rods on hinges about y, the first turned by `tilt` where its joint is at zero.
+fn double_pendulum(tilt: [f64; 2]) -> String {
+    let rod = |name: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><origin xyz="0 0 -0.2"/><mass value="1.5"/>
+            <inertia ixx="0.03" iyy="0.02" izz="0.015" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        )
+    };
+    let hinge = |name: &str, parent: &str, child: &str, z: f64, tilt: f64| {
+        format!(
+            r#"<joint name="{name}" type="continuous"><origin xyz="0 0 {z}" rpy="0 {tilt} 0"/>
+            <parent link="{parent}"/><child link="{child}"/><axis xyz="0 1 0"/></joint>"#
+        )
+    };
+    let parts = [
+        r#"<robot name="pendulum"><link name="ceiling"/>"#.to_owned(),
+        hinge("shoulder", "ceiling", "upper", 2.0, tilt[0]),
+        hinge("elbow", "upper", "lower", -0.5, tilt[1]),
+        rod("upper"),
+        rod("lower"),
+        "</robot>".to_owned(),
+    ];
+    parts.concat()
+}
+
+/// The squares of the angular frequencies of the double pendulum's small oscillations, and the ratio of its relative angles in each:
+/// M θ̈ + K θ = 0 in the angles against the vertical, with m = 1.5 kg, l = 0.5 m, centres c = 0.2 m below the hinges, moments 0.02 kg·m².
+fn modes() -> [(f64, f64); 2] {
+    let (m, l, c, i, g) = (1.5_f64, 0.5, 0.2, 0.02, 9.81);
+    let [a, b, d] = [i + m * c * c + m * l * l, m * l * c, i + m * c * c];
+    let [p, q] = [g * (m * c + m * l), g * m * c];
+    // (a d − b²) w² − (a q + d p) w + p q = 0
+    let (x, y, z) = (a * d - b * b, a * q + d * p, p * q);
+    [-1.0, 1.0].map(|sign| {
+        let w = (y + sign * (y * y - 4.0 * x * z).sqrt()) / (2.0 * x);
+        (w, (p - w * a) / (w * b) - 1.0)
+    })
+}
+
+#[test]
+fn a_double_pendulum_has_the_frequencies_of_its_closed_form() {
+    for (w2, ratio) in modes() {
+        let amplitude: f64 = 0.01;
+        let robot = double_pendulum([amplitude, ratio * amplitude]);
+        let imported = import(&robot).unwrap();
+        assert_eq!(left_out(&imported), [""; 0]);
+        // after a quarter, a half and a whole period, which are whole steps: x(t) = A cos(ω t), counted from the start
+        let period = std::f64::consts::TAU / w2.sqrt();
+        let world = start(&imported, &["shoulder", "elbow"], 3200.0 / period);
+        let mut at = 0.0;
+        for share in [0.25, 0.5, 1.0] {
+            advance(&world, (share - at) * period);
+            at = share;
+            let expected = amplitude * ((std::f64::consts::TAU * share).cos() - 1.0);
+            for (joint, scale) in [("shoulder", 1.0), ("elbow", ratio)] {
+                let wrong = (position(&world, joint) - scale * expected).abs();
+                // a step of first order errs by ω h/2 = 1e-3 of the amplitude, of the pair of angles the larger one's
+                assert!(wrong < 2e-3 * amplitude * ratio.abs().max(1.0), "{joint}, mode {w2}, {share}: {wrong}");
+            }
+        }
+    }
+}
+
+#[test]
+fn joints_stop_at_their_limits_and_start_within_them() {
+    let robot = double_pendulum([0.0, 0.0]).replace(
+        r#"type="continuous"><origin xyz="0 0 2""#,
+        r#"type="revolute"><limit lower="0.3" upper="0.8" effort="1" velocity="1"/><origin xyz="0 0 2""#,
+    );
+    let imported = import(&robot).unwrap();
+    assert_eq!(
+        left_out(&imported),
+        [
+            "line 1: joint `shoulder`: starts at 0.3, the end of its limits that is nearest to zero",
+            "line 1: joint `shoulder`, limit: `effort` is left out",
+            "line 1: joint `shoulder`, limit: `velocity` is left out",
+        ]
+    );
+    let world = start(&imported, &["shoulder", "elbow"], 500.0);
+    let mut least: f64 = 0.0;
+    for _ in 0..20 {
+        advance(&world, 0.05);
+        least = least.min(position(&world, "shoulder"));
+    }
+    // it would swing to −0.6: it hangs on its lower limit instead
+    assert!(least > -2e-3, "{least}");
+}
+
+#[test]
+fn dampers_brakes_and_slides_are_in_the_scene() {
+    // a carriage of 2 kg on an upright slide: with a damper it falls at m g / d, and dry friction above its weight holds it
+    let robot = |dynamics: &str| {
+        format!(
+            r#"<robot name="lift"><link name="world"/><link name="carriage">
+            <inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>
+            <collision><origin rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.1" length="0.4"/></geometry></collision></link>
+            <joint name="rail" type="prismatic"><parent link="world"/><child link="carriage"/><axis xyz="0 0 2"/>
+            <limit lower="-100" upper="1"/>{dynamics}</joint></robot>"#
+        )
+    };
+    let fallen = |dynamics: &str| {
+        let imported = import(&robot(dynamics)).unwrap();
+        let world = start(&imported, &["rail"], 500.0);
+        advance(&world, 1.0);
+        let before = position(&world, "rail");
+        advance(&world, 1.0);
+        position(&world, "rail") - before
+    };
+    // after a second the rest of the start is e⁻²⁰
+    assert!((fallen(r#"<dynamics damping="40"/>"#) + 2.0 * 9.81 / 40.0).abs() < 1e-4);
+    assert!(fallen(r#"<dynamics friction="25"/>"#).abs() < 1e-6);
+    let both = import(&robot(r#"<dynamics damping="40" friction="25"/>"#)).unwrap();
+    assert_eq!(left_out(&both), ["line 5: joint `rail`, dynamics: `friction` is left out"]);
+}
+
+#[test]
+fn links_without_mass_are_part_of_what_they_are_on() {
+    let robot = r#"<robot name="cart">
+        <link name="base"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
+        <link name="plate"><collision><geometry><box size="2 2 0.2"/></geometry></collision></link>
+        <link name="cup"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+            <visual><geometry><sphere radius="0.5"/></geometry><material name="red"/></visual></link>
+        <joint name="a" type="fixed"><origin xyz="0 0 1"/><parent link="base"/><child link="plate"/></joint>
+        <joint name="b" type="fixed"><origin xyz="0 3 0"/><parent link="plate"/><child link="cup"/></joint>
+        <material name="red"><color rgba="1 0 0 1"/></material>
+        <gazebo/></robot>"#;
+    let imported = import(robot).unwrap();
+    assert_eq!(left_out(&imported), ["line 9: gazebo: is left out"]);
+    let expected = r##"format = 1
+description = "cart, imported"
+
+[[object]]
+name = "base"
+model = "rigid"
+shape = "compound"
+mass_kg = 1.0
+centre_of_mass_m = [0.0, 0.0, 0.0]
+inertia_kg_m2 = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+
+[[object.part]]
+shape = "box"
+half_extents_m = [1.0, 1.0, 0.1]
+position_m = [0.0, 0.0, 1.0]
+
+[[object]]
+name = "cup"
+model = "rigid"
+shape = "ball"
+radius_m = 0.5
+position_m = [0.0, 3.0, 1.0]
+mass_kg = 1.0
+centre_of_mass_m = [0.0, 0.0, 0.0]
+inertia_kg_m2 = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+colour = "#ff0000"
+contact = { collides_with = [] }
+
+[[joint]]
+name = "b"
+kind = "fixed"
+a = "base"
+b = "cup"
+at_a_m = [0.0, 3.0, 1.0]
+"##;
+    assert_eq!(imported.toml, expected);
+}
+
+#[test]
+fn meshes_are_named_from_the_folder_of_the_scene_and_others_are_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let meshes = folder.path().join("robot/meshes");
+    std::fs::create_dir_all(&meshes).unwrap();
+    std::fs::write(meshes.join("a.stl"), "").unwrap();
+    let urdfs = folder.path().join("robot/urdf");
+    std::fs::create_dir_all(&urdfs).unwrap();
+    let robot = |mesh: &str| {
+        format!(
+            r#"<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+            <collision><geometry><mesh {mesh}/></geometry></collision></link></robot>"#
+        )
+    };
+    let imported =
+        urdf(&robot(r#"filename="package://robot/meshes/a.stl" scale="0.5 0.5 0.5""#), urdfs.as_path()).unwrap();
+    assert!(imported.toml.contains("shape = \"hull\"\nfile = \"../meshes/a.stl\"\nscale = 0.5\n"), "{}", imported.toml);
+    let noted = urdf(&robot(r#"filename="../meshes/a.stl" scale="1 -1 1""#), urdfs.as_path()).unwrap();
+    assert!(left_out(&noted)[0].ends_with("scenes have one scale above zero for all three axes"));
+    let noted = urdf(&robot(r#"filename="a.dae""#), urdfs.as_path()).unwrap();
+    assert!(left_out(&noted)[0].ends_with("`a.dae` is left out: scenes read .glb, .stl and .obj"));
+    let error = urdf(&robot(r#"filename="b.stl""#), urdfs.as_path()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "line 2: link `a`, collision, geometry, mesh: names `b.stl`, and there is no such file; expected it beside the model"
+    );
+}
+
+#[test]
+fn what_no_scene_can_have_is_refused_with_line_element_and_reason() {
+    let link = |name: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>"#
+        )
+    };
+    let joint = |kind: &str, parent: &str, child: &str| {
+        format!(r#"<joint name="j" type="{kind}"><parent link="{parent}"/><child link="{child}"/></joint>"#)
+    };
+    let two = link("a") + "\n" + &link("b");
+    for (text, expected) in [
+        ("<robot><link".to_owned(), "line 1: the file: is not XML"),
+        ("<sdf/>".to_owned(), "line 1: sdf: is not the root of a robot"),
+        (format!("<robot>{}</robot>", two.replace("\"b\"", "\"a\"")), "line 2: link `a`: is there twice"),
+        (
+            format!("<robot>{}</robot>", two.replace("value=\"1\"", "value=\"-1\"")),
+            "line 1: link `a`, inertial, mass: `value` is -1",
+        ),
+        (
+            format!("<robot>{}</robot>", two.replace("ixx=\"1\"", "ixx=\"one\"")),
+            "line 1: link `a`, inertial, inertia: `ixx` is `one`",
+        ),
+        (format!("<robot>{two}\n{}</robot>", joint("revolute", "a", "b")), "line 3: joint `j`: has no `limit`"),
+        (format!("<robot>{two}\n{}</robot>", joint("planar", "a", "b")), "line 3: joint `j`: is of the type `planar`"),
+        (format!("<robot>{two}\n{}</robot>", joint("fixed", "a", "c")), "line 3: joint `j`: has the child `c`"),
+        (
+            format!("<robot>{two}\n{}</robot>", joint("fixed", "a", "b") + &joint("fixed", "b", "a")),
+            "line 1: link `a`: hangs on itself",
+        ),
+        (
+            format!("<robot>{two}<link name=\"c\"/>\n{}</robot>", joint("continuous", "a", "c")),
+            "line 2: link `c`: has no mass",
+        ),
+    ] {
+        let error = import(&text).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}\nis not {expected}");
+    }
+}
+
+#[test]
+fn a_mimic_joint_is_listed() {
+    let robot = double_pendulum([0.0; 2])
+        .replace(r#"<child link="lower"/>"#, r#"<child link="lower"/><mimic joint="shoulder"/>"#);
+    assert_eq!(left_out(&import(&robot).unwrap()), ["line 3: joint `elbow`, mimic: is left out"]);
+}
