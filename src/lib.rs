@@ -20,6 +20,7 @@ pub mod cli;
 #[cfg(feature = "scene")]
 pub mod scenes;
 
+pub use glam;
 pub use metachron_contact as contact;
 pub use metachron_core as core;
 #[cfg(feature = "export")]
@@ -41,10 +42,20 @@ pub use metachron_session as session;
 pub use metachron_viewer as viewer;
 pub use metachron_world as world;
 
-/// The page of worlds in programs: its code runs as a test.
+/// The pages of worlds in programs, of a model of one's own, and of the words of other engines: their code runs as tests.
 #[cfg(doctest)]
-#[doc = include_str!("../docs/world.md")]
-struct WorldPage;
+mod pages {
+    #[doc = include_str!("../docs/world.md")]
+    struct World;
+    #[doc = include_str!("../docs/own-model.md")]
+    struct OwnModel;
+    #[doc = include_str!("../docs/from-rapier.md")]
+    struct FromRapier;
+    #[doc = include_str!("../docs/from-mujoco.md")]
+    struct FromMujoco;
+    #[doc = include_str!("../docs/from-sofa.md")]
+    struct FromSofa;
+}
 
 /// What a program that builds and runs a scene needs.
 pub mod prelude {

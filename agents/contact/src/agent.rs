@@ -35,12 +35,16 @@ pub trait Agent: Send {
     fn shift_clock(&mut self, _by_s: f64) {}
 
     /// The resolution that the simulation runs at; `None` for a model that has none.
-    fn resolution(&self) -> Option<Resolution>;
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
 
-    /// Takes the resolution nearest to `wanted` that the agent supports.
+    /// Takes the resolution nearest to `wanted` that the agent supports; nothing changes in a model that has none.
     ///
     /// Keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
-    fn set_resolution(&mut self, wanted: Resolution);
+    fn set_resolution(&mut self, wanted: Resolution) {
+        let _ = wanted;
+    }
 
     /// Sets the pressure of what fills the agent, inside minus outside, Pa; `false`, and no change, for one that nothing fills and for a
     /// pressure that it refuses.

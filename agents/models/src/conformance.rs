@@ -30,8 +30,10 @@ use metachron_core::{
 };
 
 mod bits;
+mod carrying;
 mod physics;
 
+pub use carrying::Load;
 pub use physics::fall_deviation;
 
 #[cfg(test)]
@@ -65,6 +67,8 @@ pub struct Suite<'a> {
     pub resolutions: Vec<Resolution>,
     /// Builds the agent in a case that converges, and the number of steps of `dt` until it has.
     pub converging: Option<(Make<'a>, u32)>,
+    /// What is put on the agent, if others may rest on it.
+    pub load: Option<Load<'a>>,
     /// Counts allocations, and the number allowed per step once warm.
     pub allocations: Option<(CountAllocations<'a>, f64)>,
 }
@@ -85,6 +89,8 @@ pub enum Promise {
     /// What is saved and read back goes on with the same bits, in an agent built anew and in one that was elsewhere. A model that saves nothing
     /// keeps this promise.
     Archive,
+    /// A body that rests on it gives it its weight, within 1 %, and stays, whatever the rates of both.
+    Carries,
     /// Nothing is allocated once the sizes settle.
     Allocation,
     /// A state that is not finite is refused, never written.
@@ -114,6 +120,7 @@ impl<'a> Suite<'a> {
             closed_form: None,
             resolutions: vec![],
             converging: None,
+            load: None,
             allocations: None,
         }
     }
@@ -145,6 +152,7 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
         (Promise::Residual, physics::residual),
         (Promise::SameBits, bits::same_bits),
         (Promise::Archive, bits::archive),
+        (Promise::Carries, carrying::carries),
         (Promise::Allocation, bits::allocation),
         (Promise::Finite, bits::finite),
     ];

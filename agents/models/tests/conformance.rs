@@ -5,12 +5,12 @@ use metachron_contact::{Agent, AnchorSpring, Neighbour};
 use metachron_core::{AgentId, Anchor, Resolution, ResolutionRange, SimSpan, Snapshot};
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::conformance::fall_deviation;
-use metachron_models::conformance::{Suite, check};
+use metachron_models::conformance::{Load, Suite, check};
 use metachron_models::rigid::{KinematicBody, Led, Restraint, RigidBody, RigidSpec};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
-use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -81,6 +81,31 @@ fn tube_spec(integrator: Integrator, substeps: u32, (clamp, damping_per_s): (boo
     }
 }
 
+fn soft_spec(shape: SoftShape) -> SoftSpec {
+    let matter = SoftMatter {
+        young_pa: 2e4,
+        poisson: 0.4,
+        density_kg_m3: 1050.0,
+        damping_per_s: 0.0,
+        damping_s: 0.0,
+        law: MaterialLaw::Corotational,
+    };
+    SoftSpec {
+        shape,
+        nodes: None,
+        matter,
+        position: DVec3::Z,
+        rotation: DQuat::from_rotation_x(0.3),
+        velocity: DVec3::ZERO,
+        held: vec![],
+        friction: 0.3,
+        traits: ContactTraits::default(),
+        gravity: GRAVITY,
+        self_contact: false,
+        sleep: false,
+    }
+}
+
 fn segments(counts: &[u32]) -> Vec<Resolution> {
     counts.iter().map(|&n| Resolution { eps_m: 1.0 / f64::from(n), n: 3 }).collect()
 }
@@ -106,6 +131,26 @@ fn a_kinematic_body_keeps_every_promise() {
         || Box::new(KinematicBody::new(&RigidSpec { led: Some(led.clone()), ..brick() }).unwrap()) as Box<dyn Agent>;
     let suite = Suite { allocations: Some((&count, 0.0)), ..Suite::new(&make, DT) };
     assert_eq!(check(&suite), []);
+}
+
+#[test]
+fn a_kinematic_body_and_a_held_solid_carry_a_load_of_any_rate() {
+    let still = || {
+        let spec = RigidSpec { position: DVec3::ZERO, rotation: DQuat::IDENTITY, led: Some(Led::default()), ..brick() };
+        Box::new(KinematicBody::new(&spec).unwrap()) as Box<dyn Agent>
+    };
+    let held = || {
+        let shape = SoftShape::Box { size_m: DVec3::new(0.1, 0.1, 0.05), segments: [4, 4, 2] };
+        let corner = DVec3::new(-0.05, -0.05, 0.0);
+        let spec = SoftSpec { position: corner, rotation: DQuat::IDENTITY, ..soft_spec(shape) };
+        let matter = SoftMatter { young_pa: 2e5, damping_s: 0.01, ..spec.matter };
+        Box::new(SoftBody::new(SoftSpec { matter, held: vec![Side::Bottom], ..spec }).unwrap()) as Box<dyn Agent>
+    };
+    for (make, stands_m) in [(&still as &dyn Fn() -> Box<dyn Agent>, DVec3::Z * 0.02), (&held, DVec3::Z * 0.05)] {
+        let load = Load { make, stands_m, half_m: 0.02, mass_kg: 0.3, settles_s: 1.0 };
+        let suite = Suite { load: Some(load), steps: 10, ..Suite::new(make, DT) };
+        assert_eq!(check(&suite), [], "{}", make().model());
+    }
 }
 
 #[test]
@@ -295,29 +340,7 @@ fn a_solid_in_a_cage_keeps_every_promise_at_every_spacing() {
     let surface = Arc::new(SoftShape::Ball { radius_m: 0.1, segments: 8 }.skin().unwrap());
     let make = || {
         let shape = SoftShape::Embedded { surface: surface.clone(), eps_m: 0.1, range_m: (0.034, 0.1) };
-        let matter = SoftMatter {
-            young_pa: 2e4,
-            poisson: 0.4,
-            density_kg_m3: 1050.0,
-            damping_per_s: 0.0,
-            damping_s: 0.0,
-            law: MaterialLaw::Corotational,
-        };
-        let spec = SoftSpec {
-            shape,
-            nodes: None,
-            matter,
-            position: DVec3::Z,
-            rotation: DQuat::from_rotation_x(0.3),
-            velocity: DVec3::ZERO,
-            held: vec![],
-            friction: 0.3,
-            traits: ContactTraits::default(),
-            gravity: GRAVITY,
-            self_contact: false,
-            sleep: false,
-        };
-        Box::new(SoftBody::new(spec).unwrap()) as Box<dyn Agent>
+        Box::new(SoftBody::new(soft_spec(shape)).unwrap()) as Box<dyn Agent>
     };
     let spacings = [0.1, 0.05, 0.034].map(|eps_m| Resolution { eps_m, n: 0 });
     let suite = Suite {

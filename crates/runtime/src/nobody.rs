@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Archive, ArchiveError, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
+use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
 /// No matter, no time, nothing to save.
 pub(super) struct Nobody;
@@ -15,12 +15,6 @@ impl Agent for Nobody {
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
         check_span(dt).map(|_| StepReport { work: 0.0, substeps: 0, at_rest: true })
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn archive(&mut self, _archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         Ok(())

@@ -153,12 +153,6 @@ impl metachron_contact::Agent for Broken {
         Err(metachron_core::StepError::Diverged { model: "broken", dt_s: dt.as_secs_f64(), what })
     }
 
-    fn resolution(&self) -> Option<metachron_core::Resolution> {
-        None
-    }
-
-    fn set_resolution(&mut self, _wanted: metachron_core::Resolution) {}
-
     fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
         into.body = Body::Nothing;
     }

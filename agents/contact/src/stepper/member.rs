@@ -135,7 +135,8 @@ pub trait ClusterMember: Send {
         false
     }
 
-    /// Where it is once it has moved for `t_s` seconds with the velocities `v`; `None` for a body that does not move as a whole.
+    /// Where it is once it has moved for `t_s` seconds with the velocities `v`, of which there need be none where `t_s` is zero; `None` for a
+    /// body that does not move as a whole.
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let _ = (v, t_s);
         None

@@ -1,9 +1,14 @@
-//! The suite catches who breaks a promise: an agent that can be told which.
+//! The suite finds the promise that an agent breaks.
 
-use super::{Breach, Promise, Suite, check};
+use super::{Breach, Load, Promise, Suite, check};
+use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
+use metachron_contact::cluster::Side;
+use metachron_contact::stepper::{ClusterMember, Role};
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
+use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A row of points that falls freely; it keeps every promise but the one in `breaks`.
@@ -143,5 +148,91 @@ fn every_broken_promise_is_reported_and_no_other() {
         assert!(found.contains(&promise), "{promise:?} was not found");
         let others = found.iter().filter(|p| **p != promise && **p != Promise::RefusedSpan).count();
         assert_eq!(others, 0, "breaking {promise:?} was taken for {found:?}");
+    }
+}
+
+/// A slab that stands still, with a skin or without.
+struct Slab {
+    body: KinematicBody,
+    has_skin: bool,
+}
+
+impl Agent for Slab {
+    fn model(&self) -> &'static str {
+        "slab"
+    }
+
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        self.body.step(dt, context)
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        self.body.write_snapshot(into);
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        self.body.momentum()
+    }
+
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
+
+    fn form(&self) -> Option<Arc<CollisionShape>> {
+        self.body.form()
+    }
+
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        Some(self)
+    }
+}
+
+impl ClusterMember for Slab {
+    fn role(&self) -> Role {
+        Role::Kinematic
+    }
+
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+        self.body.begin(h_s)
+    }
+
+    fn skin(&self) -> Option<PlacedShape<'_>> {
+        self.body.skin().filter(|_| self.has_skin)
+    }
+
+    fn side(&self, place: &Place, contact: ContactSide) -> Side {
+        self.body.side(place, contact)
+    }
+
+    fn keep(&mut self) {
+        self.body.keep();
+    }
+
+    fn go_back(&mut self) {
+        self.body.go_back();
+    }
+
+    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
+        self.body.move_to(v, t_s);
+    }
+
+    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
+        self.body.end(v, h_s, touched)
+    }
+}
+
+#[test]
+fn a_slab_carries_a_load_and_one_without_a_skin_is_reported() {
+    for has_skin in [true, false] {
+        let make = || {
+            let solid = Solid::Box { half_extents_m: DVec3::new(0.1, 0.1, 0.01) };
+            let spec = RigidSpec { led: Some(Led::default()), ..RigidSpec::free(solid, DVec3::ZERO, 1.0) };
+            Box::new(Slab { body: KinematicBody::new(&spec).unwrap(), has_skin }) as Box<dyn Agent>
+        };
+        let load = Load { make: &make, stands_m: DVec3::Z * 0.01, half_m: 0.05, mass_kg: 2.0, settles_s: 0.5 };
+        let suite = Suite { load: Some(load), steps: 10, ..Suite::new(&make, SimSpan::from_millis(4)) };
+        let broken: Vec<_> = check(&suite).into_iter().map(|Breach { promise, .. }| promise).collect();
+        let expected: &[Promise] = if has_skin { &[] } else { &[Promise::Carries] };
+        assert_eq!(broken, expected);
     }
 }

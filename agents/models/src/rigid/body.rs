@@ -10,8 +10,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Inertia, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport,
-    archive_values, check_span,
+    Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
+    check_span,
 };
 use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use std::sync::Arc;
@@ -118,10 +118,6 @@ impl Agent for RigidBody {
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
     fn set_motion(&mut self, set: &SetMotion) -> bool {
         let Self { motion, spread, flight: Flight { restraint, .. }, .. } = self;
         let origin_m = set.position_m.unwrap_or(motion.position - motion.rotation * spread.com);
@@ -151,9 +147,6 @@ impl Agent for RigidBody {
         let is_taken = set.is_sound() && self.set_motion(&set);
         is_taken.then_some(()).ok_or_else(|| "a number is not finite or too large".to_owned())
     }
-
-    /// A rigid body has no nodes to redistribute: nothing changes.
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())

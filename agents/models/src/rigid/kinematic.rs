@@ -14,8 +14,8 @@ use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_contact::{Agent, PoseGoal, SetMotion, StepContext};
 use metachron_core::{
-    Anchor, Archive, ArchiveError, Body, Bounds, Resolution, RigidState, SimSpan, SimTime, Snapshot, StepError,
-    StepReport, archive_values, check_span, shortest_turn,
+    Anchor, Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport,
+    archive_values, check_span, shortest_turn,
 };
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use std::sync::Arc;
@@ -235,13 +235,6 @@ impl Agent for KinematicBody {
     fn shift_clock(&mut self, by_s: f64) {
         self.script.iter_mut().for_each(|script| script.begin_later(by_s));
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    /// A rigid body has no nodes to redistribute: nothing changes.
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     /// Only elsewhere: how it moves is for what leads it.
     fn set_motion(&mut self, set: &SetMotion) -> bool {

@@ -17,8 +17,8 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError,
-    StepReport, ToolState, archive_values, check_span, shortest_turn,
+    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, SimSpan, Snapshot, StepError, StepReport,
+    ToolState, archive_values, check_span, shortest_turn,
 };
 use metachron_geometry::ToolShape;
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -227,13 +227,6 @@ impl Agent for Tool {
     fn shift_clock(&mut self, by_s: f64) {
         self.script.begin_later(by_s);
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    /// A tool has no nodes to redistribute: nothing changes.
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();

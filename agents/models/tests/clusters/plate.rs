@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, Role};
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Body, Bounds, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport};
+use metachron_core::{Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use std::sync::Arc;
 
@@ -120,12 +120,6 @@ impl Agent for Plate {
         self.end(&free, h_s, false)?;
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
 use metachron_contact::{Agent, AnchorSpring, StepContext};
-use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState};
+use metachron_core::{AgentId, Anchor, Body, SimSpan, Snapshot, StepError, StepReport, ToolState};
 use metachron_geometry::{
     CollisionShape, ContactSide, ContactTraits, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape,
 };
@@ -239,12 +239,6 @@ impl Agent for Pusher {
         self.place.x += self.m_s * dt.as_secs_f64();
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();

@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Anchor, Resolution, SimSpan, Snapshot, StepError, StepReport};
+use metachron_core::{Anchor, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeError, ShapeKind, ShapePose};
 use metachron_geometry::{Solid, SolidShape};
 
@@ -101,12 +101,6 @@ impl Agent for ShakenFloor {
         self.time_s += dt.as_secs_f64();
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
-
-    fn resolution(&self) -> Option<Resolution> {
-        None
-    }
-
-    fn set_resolution(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
