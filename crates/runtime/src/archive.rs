@@ -69,9 +69,9 @@ impl Cut {
         archive_values!(archive, *timeline, *now)
     }
 
-    /// The same for an executor in real time, whose clock reads the present `now`.
+    /// The same for an executor in real time, whose clock reads the present `now`: its time passes or stands as before.
     pub fn archive_in_real_time(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let (wall, piece) = (self.now, self.timeline.piece());
+        let (wall, own) = (self.now, self.timeline);
         self.archive(archive)?;
         let mut events: Option<VirtualEvents> = None;
         archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)?;
@@ -79,7 +79,8 @@ impl Cut {
             return Ok(());
         }
         self.all.iter_mut().for_each(|placed| placed.runner.rebase(wall));
-        (self.timeline, self.now) = (self.timeline.moved(self.now, wall, piece + 1), wall);
+        let sim = self.timeline.sim_at(self.now);
+        (self.timeline, self.now) = (own.set_to(wall, wall, sim, &self.timeline), wall);
         Ok(())
     }
 }

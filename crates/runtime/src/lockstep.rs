@@ -258,6 +258,7 @@ impl Lockstep {
 
     /// Writes or reads all agents, which were taken from their places, and the events to come; a cut of a run in real time has none of these.
     fn archive_all(&mut self, cut: &mut Cut, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let (own, own_now) = (self.timeline, self.now);
         cut.archive(archive)?;
         let phases = self.entries.iter().map(|entry| (entry.phase, entry.turns)).collect();
         let (served, jobs) = self.cores.jobs();
@@ -268,6 +269,8 @@ impl Lockstep {
         }
         (self.timeline, self.now) = (cut.timeline, cut.now);
         let Some(VirtualEvents { due, served, jobs, phases }) = events else {
+            // a world in real time stands still where it was cut; whether this one does is its own matter
+            self.timeline = own.set_to(own_now, cut.now, cut.timeline.sim_at(cut.now), &cut.timeline);
             self.due.clear();
             self.cores = Cores::new(self.machine.cores);
             for (entry, placed) in self.entries.iter_mut().zip(&cut.all) {

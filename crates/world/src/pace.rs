@@ -73,6 +73,7 @@ impl World {
     /// turn of that one: time goes on by `further` for it.
     fn wait_for_all(&self, further: impl Fn(SimSpan) -> TimelineCommand, poll: Duration) {
         let Some(end) = self.timeline().until() else { return };
+        let mut asked = end;
         while !self.has_stopped() {
             let agents = self.agents();
             let behind = |agent: &&AgentHandle| !has_reached(agent, end);
@@ -80,11 +81,12 @@ impl World {
             if self.time() >= end && !agents.iter().any(|agent| behind(&agent)) {
                 return;
             }
-            let last = self.timeline().until();
-            let leaders = agents.iter().filter(behind).filter_map(|agent| agents.of(agent.led_by()?));
-            let idle = leaders.into_iter().find(|leader| last.is_some_and(|last| leader.latest().moment() >= last));
-            if let Some(leader) = idle {
+            let mut leaders = agents.iter().filter(behind).filter_map(|agent| agents.of(agent.led_by()?));
+            let idle = leaders.find(|leader| leader.latest().moment() >= asked);
+            // where another thread has stopped time, or lets it run, it is not ours to let it go on
+            if let Some(leader) = idle.filter(|_| self.timeline().until() == Some(asked)) {
                 self.drive(further(leader.stats().dt));
+                asked = self.timeline().until().unwrap_or(asked);
             }
             self.wait_until(self.now() + poll);
         }
@@ -95,10 +97,7 @@ impl World {
 /// after it.
 fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
     match agent.state() {
-        AgentState::Running => {
-            let newest = agent.latest();
-            newest.at_rest || newest.moment() >= end
-        }
+        AgentState::Running => agent.latest().moment() >= end,
         AgentState::Resting => !agent.is_woken(),
         AgentState::Parked(_) | AgentState::Gone => true,
     }

@@ -259,8 +259,8 @@ impl World {
     /// either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] where a step does not end, and where a model or a governor does not save its state;
-    /// [`CheckpointError::Stopped`]. The world goes on as it was.
+    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, and where a step takes longer than 0.4 s on threads and
+    /// in a pool: its object has failed then, as at the end of a run. [`CheckpointError::Stopped`]. All else goes on as it was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };

@@ -117,10 +117,12 @@ impl Timeline {
         self.is_free
     }
 
-    /// The piece that goes on at wall time `to` as this one did at wall time `from`, as number `piece`.
+    /// The piece that begins at wall time `to` with the simulated time `sim`, and runs, stands or has as far to go as this one at wall time
+    /// `from`: time was set back or on, and whether it passes is another matter. Its number follows that of `other` too.
     #[must_use]
-    pub fn moved(&self, from: Duration, to: Duration, piece: u64) -> Self {
-        Self { wall: to, sim: self.sim_at(from), piece, ..*self }
+    pub fn set_to(&self, from: Duration, to: Duration, sim: SimTime, other: &Self) -> Self {
+        let until = self.until.map(|end| sim + end.since(self.sim_at(from)));
+        Self { wall: to, sim, until, piece: self.piece.max(other.piece) + 1, ..*self }
     }
 
     /// The number of this piece: it changes with every change to the timeline.
