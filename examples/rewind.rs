@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         *(if falls { &mut falls_m_s } else { &mut stands_m_s }) = speed_m_s;
     }
 
-    let mut again = || -> Result<u64, Box<dyn Error>> {
+    let again = || -> Result<u64, Box<dyn Error>> {
         world.restore(&mark)?;
         throw(&world, falls_m_s)?;
         Ok(world.hash())

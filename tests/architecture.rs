@@ -403,6 +403,17 @@ fn the_map_fits_on_a_page() {
     }
 }
 
+#[test]
+fn every_page_is_in_the_book() {
+    let summary = fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap();
+    let pages = files_below(&root().join("docs"), "md").into_iter().map(|page| relative(&page));
+    // decisions are listed by the page that leads to them
+    let pages = pages.filter(|page| !page.starts_with("docs/decisions/0") && !page.ends_with("SUMMARY.md"));
+    let is_missing = |page: &String| !summary.contains(&format!("({})", page.trim_start_matches("docs/")));
+    let missing: Vec<_> = pages.filter(is_missing).collect();
+    assert!(missing.is_empty(), "not in docs/SUMMARY.md: {missing:#?}");
+}
+
 /// Keys cited as `(KEY99)`, `(KEY99, eq. 1)`: two to six capitals and two digits.
 fn cited_keys(text: &str) -> BTreeSet<String> {
     text.match_indices('(')
