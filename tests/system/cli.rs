@@ -61,6 +61,33 @@ fn generate_writes_scenes_that_load_and_refuses_what_a_scene_does_not_have() {
 }
 
 #[test]
+fn import_writes_scenes_that_load_lists_what_is_left_out_and_refuses_broken_models() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let mass = r#"<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>"#;
+    std::fs::write(path("a.urdf"), format!("<robot name=\"a\">\n<link name=\"a\">{mass}</link>\n<gazebo/></robot>"))
+        .unwrap();
+    let done = metachron(&["import", &path("a.urdf"), "--out", &path("a.toml")]);
+    assert_eq!((code(&done), out(&done).as_str()), (0, ""));
+    assert!(err(&done).contains("a.urdf: line 3: gazebo: is left out"), "{}", err(&done));
+    assert_eq!(out(&metachron(&["import", &path("a.urdf")])), std::fs::read_to_string(path("a.toml")).unwrap());
+    assert_eq!(code(&metachron(&["check", &path("a.toml")])), 0);
+    let again = metachron(&["import", &path("a.urdf"), "--out", &path("a.toml")]);
+    assert!(code(&again) == 2 && err(&again).contains("--force"), "{}", err(&again));
+    std::fs::write(
+        path("b.xml"),
+        "<mujoco><worldbody>\n<body name=\"b\"><joint type=\"screw\"/></body></worldbody></mujoco>",
+    )
+    .unwrap();
+    let broken = metachron(&["import", &path("b.xml")]);
+    assert!(
+        code(&broken) == 2 && err(&broken).contains("b.xml: line 2: body `b`, joint: is of the type `screw`"),
+        "{}",
+        err(&broken)
+    );
+}
+
+#[test]
 fn the_schema_is_json_with_every_model() {
     let schema = metachron(&["schema"]);
     let json: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();

@@ -46,6 +46,7 @@ fn brick() -> RigidSpec {
         velocity: DVec3::ZERO,
         spin: DVec3::new(1.0, 2.0, 3.0),
         mass_kg: 0.7,
+        inertia: None,
         restitution: 0.5,
         friction: 0.4,
         traits: ContactTraits::default(),

@@ -51,7 +51,7 @@ impl Folders<'_> {
             return vec![self.model.join(name.strip_prefix("file://").unwrap_or(name))];
         };
         let rest = path.split_once('/').map_or(path, |(_, rest)| rest);
-        let model = std::path::absolute(self.model).unwrap_or_else(|_| self.model.to_path_buf());
+        let model = absolute(self.model).unwrap_or_else(|| self.model.to_path_buf());
         model.ancestors().flat_map(|folder| [folder.join(path), folder.join(rest)]).collect()
     }
 
@@ -68,10 +68,15 @@ impl Folders<'_> {
     }
 }
 
+/// A path from the root; the empty one, which the folder of a bare file name is, is the folder of the program.
+fn absolute(path: &Path) -> Option<PathBuf> {
+    std::path::absolute(Path::new(".").join(path)).ok()
+}
+
 /// The parts of a path from the root, without `.` and `..`.
 fn plain(path: &Path) -> Option<Vec<String>> {
     let mut parts = Vec::new();
-    for part in std::path::absolute(path).ok()?.components() {
+    for part in absolute(path)?.components() {
         match part {
             Component::ParentDir => drop(parts.pop()),
             Component::CurDir => {}

@@ -7,6 +7,7 @@
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
 
 mod folders;
+mod masses;
 mod mjcf;
 mod model;
 mod pose;
@@ -87,7 +88,7 @@ pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported,
 /// Reads an MJCF model, its classes of defaults and frames resolved. Meshes are looked for in the folder of the model.
 ///
 /// # Errors
-/// [`ImportError`] at the first element that no scene can have, as [`urdf`], and for bodies with several joints.
+/// [`ImportError`] at the first element that no scene can have, as [`urdf`].
 pub fn mjcf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
     of_mjcf(xml::parse(text)?, folders.into())
 }

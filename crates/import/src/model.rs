@@ -38,6 +38,8 @@ pub(crate) struct Link {
     pub(crate) mass: Mass,
     pub(crate) parts: Vec<Part>,
     pub(crate) look: Look,
+    /// Whether its mass is lent (`masses`): it stands for the one between two joints of a body.
+    pub(crate) is_lent: bool,
 }
 
 /// How a body looks, and what its surface is like.
@@ -48,9 +50,26 @@ pub(crate) struct Look {
 }
 
 /// What a file that has contacts of its own says about them.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surface {
     pub(crate) friction: f64,
+    pub(crate) masks: Masks,
+}
+
+/// Bits by which two surfaces collide: where one's `types` have a bit of the other's `partners`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Masks {
+    pub(crate) types: u32,
+    pub(crate) partners: u32,
+}
+
+impl Masks {
+    /// Those of a file that says none.
+    pub(crate) const USUAL: Self = Self { types: 1, partners: 1 };
+
+    pub(crate) const fn collides(self, other: Self) -> bool {
+        self.types & other.partners != 0 || other.types & self.partners != 0
+    }
 }
 
 /// Where the mass of a link comes from.

@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn angles_make_their_rotation_again_also_at_right_angles() {
         for [x, y, z] in
-            [[0.3, -1.2, 2.0], [-2.0, FRAC_PI_2, 0.7], [0.4, -FRAC_PI_2, 1.0], [0.0, 0.0, 3.0], [0.1, 1.5707, 0.2]]
+            [[0.3, -1.2, 2.0], [-2.0, FRAC_PI_2, 0.7], [0.4, -FRAC_PI_2, 1.0], [0.0, 0.0, 3.0], [0.1, 1.5706, 0.2]]
         {
             let rotation = fixed_angles(x, y, z);
             let deg = fixed_angles_deg(rotation);

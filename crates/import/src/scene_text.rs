@@ -3,10 +3,11 @@
 //! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
 
 use crate::LeftOut;
-use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
+use crate::model::{Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles_deg};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::Solid;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// Largest angle of a range of a scene, radians, and a little for rounding.
@@ -24,11 +25,12 @@ pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
         out.push_str("\n[world]\n");
         put(&mut out, "gravity_m_s2", &vector(gravity));
     }
+    let masks = all_masks(model);
     for fixed in &model.fixed {
-        write_fixed(&mut out, fixed);
+        write_fixed(&mut out, fixed, &masks);
     }
     for link in &model.links {
-        write_link(&mut out, link);
+        write_link(&mut out, link, &masks);
     }
     for joint in &model.joints {
         write_joint(&mut out, model, joint, notes);
@@ -71,18 +73,18 @@ fn vector(v: DVec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 
-fn write_fixed(out: &mut String, fixed: &Fixed) {
+fn write_fixed(out: &mut String, fixed: &Fixed, masks: &BTreeSet<Masks>) {
     out.push_str("\n[[object]]\n");
     put(out, "name", &quoted(&fixed.name));
     put(out, "model", "\"rigid\"");
     put(out, "fixed", "true");
     write_shape(out, &fixed.part.shape);
     write_pose(out, fixed.part.pose);
-    write_look(out, &fixed.look, fixed.part.touches);
+    write_look(out, &fixed.look, fixed.part.touches, masks);
 }
 
 /// A link: its object has the axes of the link, so that one solid elsewhere in them is a part, too.
-fn write_link(out: &mut String, link: &Link) {
+fn write_link(out: &mut String, link: &Link, masks: &BTreeSet<Masks>) {
     out.push_str("\n[[object]]\n");
     put(out, "name", &quoted(&link.name));
     put(out, "model", "\"rigid\"");
@@ -99,7 +101,7 @@ fn write_link(out: &mut String, link: &Link) {
     }
     write_pose(out, link.pose);
     write_mass(out, &link.mass);
-    write_look(out, &link.look, link.parts.iter().any(|part| part.touches));
+    write_look(out, &link.look, link.parts.iter().any(|part| part.touches), masks);
     for part in link.parts.iter().filter(|_| whole.is_none()) {
         out.push_str("\n[[object.part]]\n");
         write_shape(out, &part.shape);
@@ -152,7 +154,7 @@ fn write_mass(out: &mut String, mass: &Mass) {
     put(out, "inertia_kg_m2", &format!("[{}]", all.join(", ")));
 }
 
-fn write_look(out: &mut String, look: &Look, touches: bool) {
+fn write_look(out: &mut String, look: &Look, touches: bool, all: &BTreeSet<Masks>) {
     if let Some([r, g, b]) = look.colour {
         put(out, "colour", &quoted(&format!("#{r:02x}{g:02x}{b:02x}")));
     }
@@ -161,10 +163,27 @@ fn write_look(out: &mut String, look: &Look, touches: bool) {
         Some(surface) => {
             put(out, "friction", &exact(surface.friction));
             put(out, "restitution", "0.0");
-            put(out, "contact", "{ friction_rule = \"max\" }");
+            put(out, "contact", &format!("{{ {}friction_rule = \"max\" }}", groups(surface.masks, all)));
         }
         None => {}
     }
+}
+
+/// The masks of all surfaces that have some.
+fn all_masks(model: &Model) -> BTreeSet<Masks> {
+    let fixed = model.fixed.iter().filter(|fixed| fixed.part.touches).map(|fixed| &fixed.look);
+    let links = model.links.iter().filter(|link| link.parts.iter().any(|part| part.touches)).map(|link| &link.look);
+    fixed.chain(links).filter_map(|look| Some(look.surface?.masks)).collect()
+}
+
+/// The groups of a surface: each pair of masks is a group, which collides with those that it should. None where all have the usual masks.
+fn groups(masks: Masks, all: &BTreeSet<Masks>) -> String {
+    if all.iter().all(|masks| *masks == Masks::USUAL) {
+        return String::new();
+    }
+    let name = |masks: &Masks| quoted(&format!("{:x}-{:x}", masks.types, masks.partners));
+    let partners: Vec<String> = all.iter().filter(|other| masks.collides(**other)).map(name).collect();
+    format!("groups = [{}], collides_with = [{}], ", name(&masks), partners.join(", "))
 }
 
 /// A joint. Its first object is the parent, or the child where the parent is the world, which scenes write second: what moves against
@@ -203,8 +222,21 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
         None => {}
     }
     if let Some(motor) = joint.motor {
-        put(out, "motor", &unit.motor(motor));
+        put(out, "motor", &unit.motor(within(motor, joint, notes)));
     }
+}
+
+/// A motor that rests where its joint may be.
+fn within(motor: Motor, joint: &Joint, notes: &mut Vec<LeftOut>) -> Motor {
+    let (Motor::Spring { position, stiffness, damping, max_effort }, Some([least, greatest])) = (motor, joint.range)
+    else {
+        return motor;
+    };
+    if !(least..=greatest).contains(&position) {
+        let what = "its spring or servo rests at the end of its range, where the file has it beyond";
+        notes.push(LeftOut { line: joint.place.line, element: joint.place.label.clone(), what: what.to_owned() });
+    }
+    Motor::Spring { position: position.clamp(least, greatest), stiffness, damping, max_effort }
 }
 
 /// How scenes call what belongs to a joint that turns, or slides.

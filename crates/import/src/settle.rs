@@ -2,14 +2,12 @@
 //!
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
-use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Part, Place, Shape};
+use crate::masses::{STAND_IN_M, ball, lend, repair};
+use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Part, Place};
 use crate::pose::Pose;
 use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
-use metachron_geometry::{COMPOUND_PARTS_MAX, Solid};
-
-/// Radius of what stands in for a link whose file says a mass and nothing else, metres.
-const STAND_IN_M: f64 = 0.01;
+use metachron_geometry::COMPOUND_PARTS_MAX;
 
 /// What a link becomes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +25,7 @@ enum Fate {
 /// # Errors
 /// For a link without mass on a joint that moves.
 pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+    lend(&mut model, notes);
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
         fates.push(fate(link, model.joints.iter().find(|joint| joint.child == at), &fates, &model)?);
@@ -49,6 +48,7 @@ pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model
     let neighbours = neighbours(&model);
     model.apart.extend(neighbours);
     for link in &mut model.links {
+        repair(link, notes);
         choose_parts(link, notes)?;
     }
     Ok(model)
@@ -103,14 +103,16 @@ fn keep(model: &mut Model, fates: &[Fate]) {
     });
 }
 
-/// Links that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of links.
+/// Links that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of links, with those
+/// without mass that carry it.
 /// Shapes overlap there, as those of connected links do.
 fn neighbours(model: &Model) -> Vec<[usize; 2]> {
     let above = |link: usize| model.joints.iter().find(|joint| joint.child == link);
     // the first link of each body; none is the world
     let mut bodies: Vec<Option<usize>> = Vec::with_capacity(model.links.len());
     for link in 0..model.links.len() {
-        let welded = above(link).filter(|joint| joint.kind == Kind::Fixed);
+        let is_lent = |joint: &&Joint| joint.parent.is_some_and(|parent| model.links[parent].is_lent);
+        let welded = above(link).filter(|joint| joint.kind == Kind::Fixed || is_lent(joint));
         bodies.push(welded.map_or(Some(link), |joint| joint.parent.and_then(|parent| bodies[parent])));
     }
     // the body that a body hangs on
@@ -176,11 +178,5 @@ fn stand_in(link: &Link) -> Part {
     let mean = (tensor.x_axis.x + tensor.y_axis.y + tensor.z_axis.z) / 3.0;
     // a ball has 2/5 m r²
     let radius_m = if mean > 0.0 { (2.5 * mean / mass_kg).sqrt().clamp(1e-6, 1e4) } else { STAND_IN_M };
-    Part {
-        place: link.place.clone(),
-        shape: Shape::Solid(Solid::Ball { radius_m }),
-        pose: Pose { position: com_m, ..Pose::IDENTITY },
-        density_kg_m3: None,
-        touches: false,
-    }
+    ball(link, com_m, radius_m)
 }

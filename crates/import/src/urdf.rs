@@ -42,6 +42,9 @@ pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut
             return Err(element.wrong("is there twice; expected names that are one link's each"));
         }
     }
+    if links.is_empty() {
+        return Err(root.wrong("has no `link`"));
+    }
     let drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
     for draft in &drafts {
         for (key, name) in [("parent", draft.parent), ("child", draft.child)] {
@@ -217,13 +220,20 @@ fn link(
     }
     let look = Look { colour: colour(element, touches, colours)?, surface: None };
     let name = element.needed("name")?.to_owned();
-    Ok(Link { name, place: place(element), pose, mass: mass(element)?, parts, look })
+    Ok(Link { name, place: place(element), pose, mass: mass(element)?, parts, look, is_lent: false })
 }
 
 fn mass(element: &Element) -> Result<Mass, ImportError> {
     let Some(inertial) = element.child("inertial") else { return Ok(Mass::None) };
     let mass = inertial.child("mass").ok_or_else(|| inertial.wrong("has no `mass`"))?;
-    let mass_kg = mass.positive("value")?;
+    let mass_kg = mass.needed_number("value")?;
+    if mass_kg < 0.0 {
+        return Err(mass.wrong(format!("`value` is {mass_kg}; expected zero or more")));
+    }
+    if mass_kg == 0.0 {
+        inertial.read_all_within();
+        return Ok(Mass::None);
+    }
     let at = origin(inertial)?;
     let tensor = inertial.child("inertia").ok_or_else(|| inertial.wrong("has no `inertia`"))?;
     let moment = |name: &str| tensor.needed_number(name);

@@ -142,9 +142,11 @@ impl Element {
         self
     }
 
-    /// Counts all attributes as read: what the file says has no meaning where the element is.
-    pub(crate) fn read_all(&self) {
+    /// Counts the element and all in it as read: what it says has no meaning where it is.
+    pub(crate) fn read_all_within(&self) {
+        self.is_read.set(true);
         self.attributes.iter().for_each(|attribute| attribute.is_read.set(true));
+        self.children.iter().for_each(Self::read_all_within);
     }
 
     /// Whether the element has an attribute, which does not count as read.

@@ -58,11 +58,6 @@ fn servo(element: &Element, reader: &mut BodyReader<'_>, joint: usize, damping: 
     if element.tag == "velocity" {
         return Ok(Motor::Damper { damping: value("kv", 1.0)? + damping, max_effort });
     }
-    let range = reader.model.joints[joint].range;
-    let zero = reader.zeros[joint];
-    let position = range.map_or(zero, |[least, greatest]| zero.clamp(least, greatest));
-    if position != zero {
-        reader.notes.push(element.note("rests at the end of its joint's range: its zero is beyond"));
-    }
+    let position = reader.zeros[joint];
     Ok(Motor::Spring { position, stiffness: value("kp", 1.0)?, damping: value("kv", 0.0)? + damping, max_effort })
 }

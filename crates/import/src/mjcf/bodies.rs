@@ -4,8 +4,9 @@
 
 use super::compiler::Compiler;
 use super::geoms::{Geom, Mesh};
+use super::joints::StartedJoint;
 use crate::folders::Folders;
-use crate::model::{Fixed, Joint, Link, Look, Mass, Model, Part, Place};
+use crate::model::{Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Place, Surface};
 use crate::pose::Pose;
 use crate::xml::Element;
 use crate::{ImportError, LeftOut};
@@ -105,38 +106,69 @@ impl<'a> BodyReader<'a> {
     fn body(&mut self, placed: Placed<'_>, host: Host) -> Result<(), ImportError> {
         let element = placed.element.read();
         let contents = Contents::of(element, self.compiler)?;
-        let rest = host.pose.then(placed.frame).then(self.compiler.pose(element)?);
-        let index = self.model.links.len();
         let place = Place { line: element.line, label: element.label.clone() };
-        let joint = match contents.joints.as_slice() {
-            [] => None,
-            [one] => Some(self.joint(*one, host.link, index)?),
-            more => {
-                let expected = "expected at most one: between the objects of a scene a joint leaves one kind of motion";
-                return Err(element.wrong(format!("has {} joints; {expected}", more.len())));
-            }
+        let name = self.unused(element.text("name"), "body");
+        let rest = host.pose.then(placed.frame).then(self.compiler.pose(element)?);
+        let is_fixed = host.is_fixed && contents.joints.is_empty();
+        let from = Host { pose: rest, ..host };
+        let (last, above) = match contents.joints.split_last() {
+            Some((last, outer)) => (Some(last), self.carriers(outer, from, &name, &place)?),
+            None => (None, from),
         };
-        let is_fixed = host.is_fixed && joint.is_none();
-        let pose = rest.then(joint.as_ref().map_or(Pose::IDENTITY, |joint| joint.motion));
+        let index = self.model.links.len();
+        let joint = last.map(|last| self.joint(*last, above.link, index)).transpose()?;
+        if let Some((last, true)) =
+            last.zip(joint.as_ref().map(|joint| joint.between.is_none() && contents.joints.len() > 1))
+        {
+            return Err(free_with_others(*last));
+        }
+        let pose = above.pose.then(joint.as_ref().map_or(Pose::IDENTITY, |joint| joint.motion));
         let geoms = self.geoms(&contents)?;
         let mass = if is_fixed {
-            contents.inertial.inspect(|inertial| inertial.read_all());
+            contents.inertial.inspect(|inertial| inertial.read_all_within());
             Mass::None
         } else {
             self.mass(contents.inertial, &geoms)?
         };
-        let (name, look) = (self.unused(element.text("name"), "body"), look(&geoms));
+        let look = look(&geoms);
+        if let Some(one) = look.surface
+            && geoms.iter().any(|geom| geom.part.touches && geom.surface != one)
+        {
+            self.notes.push(element.note(
+                "has geoms of several frictions or masks: the largest friction is that of all, and all masks together",
+            ));
+        }
         let parts = geoms.into_iter().map(|geom| density(geom, &mass)).collect();
-        self.model.links.push(Link { name, place: place.clone(), pose, mass, parts, look });
+        self.model.links.push(Link { name, place: place.clone(), pose, mass, parts, look, is_lent: false });
         match joint {
             None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
-            Some(joint) => {
-                if let Some(between) = joint.between {
-                    self.push_joint(between, joint.zero);
-                }
-            }
+            Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
         }
         contents.bodies.iter().try_for_each(|body| self.body(*body, Host { link: Some(index), pose, is_fixed }))
+    }
+
+    /// Links without mass, one for each joint of a body but its last, as the joints follow each other; the last of them.
+    fn carriers(&mut self, joints: &[Placed<'_>], from: Host, body: &str, place: &Place) -> Result<Host, ImportError> {
+        let mut at = from;
+        for placed in joints {
+            let link = self.model.links.len();
+            let StartedJoint { between, motion, zero } = self.joint(*placed, at.link, link)?;
+            let between = between.ok_or_else(|| free_with_others(*placed))?;
+            at = Host { link: Some(link), pose: at.pose.then(motion), ..from };
+            let name = self.unused(None, &format!("{body}-{}", placed.element.text("name").unwrap_or("joint")));
+            let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
+            self.model.links.push(Link {
+                name,
+                place: place.clone(),
+                pose: at.pose,
+                mass,
+                parts,
+                look,
+                is_lent: false,
+            });
+            self.push_joint(between, zero);
+        }
+        Ok(at)
     }
 
     fn push_joint(&mut self, joint: Joint, zero: f64) {
@@ -199,17 +231,24 @@ impl<'a> BodyReader<'a> {
     }
 }
 
+fn free_with_others(joint: Placed<'_>) -> ImportError {
+    joint.element.wrong("lets its body move freely, which has other joints; expected one joint")
+}
+
 /// The part of a geom, with its density where the body's mass comes from that.
 fn density(geom: Geom, mass: &Mass) -> Part {
     let density_kg_m3 = geom.density_kg_m3.filter(|_| matches!(mass, Mass::OfParts));
     Part { density_kg_m3, ..geom.part }
 }
 
-/// The look of a body: the colour of its first coloured geom, the friction of its roughest.
+/// The look of a body: the colour of its first coloured geom, the friction of its roughest, the masks of all.
 fn look(geoms: &[Geom]) -> Look {
-    let touched = geoms.iter().filter(|geom| geom.part.touches);
-    let surface = touched.map(|geom| geom.surface).reduce(|a, b| if b.friction > a.friction { b } else { a });
-    Look { colour: geoms.iter().find_map(|geom| geom.colour), surface }
+    let touched = geoms.iter().filter(|geom| geom.part.touches).map(|geom| geom.surface);
+    let both = |a: Surface, b: Surface| Surface {
+        friction: a.friction.max(b.friction),
+        masks: Masks { types: a.masks.types | b.masks.types, partners: a.masks.partners | b.masks.partners },
+    };
+    Look { colour: geoms.iter().find_map(|geom| geom.colour), surface: touched.reduce(both) }
 }
 
 impl Joint {

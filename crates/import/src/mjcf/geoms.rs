@@ -6,7 +6,7 @@ use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
 use crate::ImportError;
 use crate::folders::is_readable;
-use crate::model::{Part, Place, Shape, Surface};
+use crate::model::{Masks, Part, Place, Shape, Surface};
 use crate::pose::Pose;
 use crate::xml::Element;
 use glam::DVec3;
@@ -58,11 +58,8 @@ impl BodyReader<'_> {
         let element = placed.element.read();
         let own = self.compiler.pose(element)?;
         let Some((shape, pose)) = self.shape(element, own)? else { return Ok(None) };
-        let masks = [element.number("contype")?.unwrap_or(1.0), element.number("conaffinity")?.unwrap_or(1.0)];
-        let touches = masks != [0.0; 2];
-        if touches && masks != [1.0; 2] {
-            self.notes.push(element.note("touches all: `contype` and `conaffinity` other than 0 and 1 are left out"));
-        }
+        let masks = Masks { types: mask(element, "contype")?, partners: mask(element, "conaffinity")? };
+        let touches = masks.types != 0 || masks.partners != 0;
         let friction = element.list("friction")?.and_then(|all| all.first().copied()).unwrap_or(FRICTION_DEFAULT);
         if !(0.0..=10.0).contains(&friction) {
             return Err(element.wrong(format!("`friction` is {friction}; expected 0 to 10")));
@@ -83,7 +80,7 @@ impl BodyReader<'_> {
         let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
         let place = Place { line: element.line, label: element.label.clone() };
         let part = Part { place, shape, pose: placed.frame.then(pose), density_kg_m3: None, touches };
-        Ok(Some(Geom { part, density_kg_m3, mass_kg, colour, surface: Surface { friction } }))
+        Ok(Some(Geom { part, density_kg_m3, mass_kg, colour, surface: Surface { friction, masks } }))
     }
 
     /// The shape of a geom and where it is, which `fromto` says otherwise than `own`.
@@ -131,6 +128,17 @@ impl BodyReader<'_> {
         };
         self.notes.push(element.note(format!("`{}` is left out: {why}", mesh.file)));
         Ok(None)
+    }
+}
+
+/// The bits of a mask of contacts.
+fn mask(element: &Element, name: &str) -> Result<u32, ImportError> {
+    let Some(value) = element.number(name)? else { return Ok(1) };
+    let bits = value as u32;
+    if f64::from(bits) == value {
+        Ok(bits)
+    } else {
+        Err(element.wrong(format!("`{name}` is {value}; expected 32 bits")))
     }
 }
 

@@ -1,7 +1,7 @@
 //! URDF robots.
 
 use crate::play::{advance, left_out, position, start};
-use metachron_import::{ImportError, urdf};
+use metachron_import::{Folders, ImportError, urdf};
 use std::path::Path;
 
 fn import(text: &str) -> Result<metachron_import::Imported, ImportError> {
@@ -191,6 +191,13 @@ fn meshes_are_named_from_the_folder_of_the_scene_and_others_are_listed() {
     let imported =
         urdf(&robot(r#"filename="package://robot/meshes/a.stl" scale="0.5 0.5 0.5""#), urdfs.as_path()).unwrap();
     assert!(imported.toml.contains("shape = \"hull\"\nfile = \"../meshes/a.stl\"\nscale = 0.5\n"), "{}", imported.toml);
+    let elsewhere = Folders { model: urdfs.as_path(), scene: Path::new("") };
+    let imported = urdf(&robot(r#"filename="../meshes/a.stl""#), elsewhere).unwrap();
+    assert!(
+        imported.toml.contains("file = \"../") && imported.toml.contains("robot/meshes/a.stl\""),
+        "{}",
+        imported.toml
+    );
     let noted = urdf(&robot(r#"filename="../meshes/a.stl" scale="1 -1 1""#), urdfs.as_path()).unwrap();
     assert!(left_out(&noted)[0].ends_with("scenes have one scale above zero for all three axes"));
     let noted = urdf(&robot(r#"filename="a.dae""#), urdfs.as_path()).unwrap();

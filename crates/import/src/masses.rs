@@ -1,0 +1,165 @@
+//! Masses and moments of inertia that bodies can have.
+//!
+//! In: a [`Model`] as the file has it. Out: the same where what moves weighs something, and moments are those of bodies; all that was changed is
+//! noted. Never here: shapes that are touched.
+
+use crate::LeftOut;
+use crate::model::{Kind, Link, Mass, Model, Part, Shape};
+use crate::pose::Pose;
+use glam::{DMat3, DVec3};
+use metachron_geometry::Solid;
+
+/// Radius of what stands in for a body without a shape or moments of its own, metres.
+pub(crate) const STAND_IN_M: f64 = 0.01;
+/// What a link without mass between two joints weighs, of the body that it carries: the solver takes a thousand to one.
+const LENT: f64 = 1e-3;
+/// Least mass of a body of a scene, kilograms.
+const MASS_MIN_KG: f64 = 1e-9;
+/// Least moment of inertia, of the sum of all three.
+const LEAST: f64 = 1e-9;
+/// How much of the sum the triangle inequality may be missed by: files write few digits.
+const SLACK: f64 = 2e-4;
+
+/// A mass with its mean moment of inertia.
+#[derive(Debug, Clone, Copy)]
+struct Weight {
+    mass_kg: f64,
+    moment_kg_m2: f64,
+}
+
+/// Lends links without mass that move a thousandth of what they carry: files write joints about several axes as joints about one each, with
+/// such links between them.
+pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
+    let weights: Vec<Option<Weight>> = model.links.iter().map(weight).collect();
+    for at in 0..model.links.len() {
+        let Some(joint) = model.joints.iter().find(|joint| joint.child == at && joint.kind != Kind::Fixed) else {
+            continue;
+        };
+        let is_massless = matches!(model.links[at].mass, Mass::None);
+        let Some((carried, weight)) = carried(model, at, &weights).filter(|_| is_massless) else { continue };
+        let what = format!("has no mass, and moves: a thousandth of that of `{}` is added", model.links[carried].name);
+        let com_m = joint.anchor_m;
+        let link = &mut model.links[at];
+        notes.push(LeftOut { line: link.place.line, element: link.place.label.clone(), what });
+        let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::splat(LENT * weight.moment_kg_m2)));
+        link.mass = Mass::Given { mass_kg: (LENT * weight.mass_kg).max(MASS_MIN_KG), com_m, inertia_kg_m2 };
+        link.is_lent = true;
+        if link.parts.is_empty() {
+            link.parts.push(ball(link, com_m, STAND_IN_M));
+        }
+    }
+}
+
+/// The first link with a mass that hangs on a link, through others without one.
+fn carried(model: &Model, at: usize, weights: &[Option<Weight>]) -> Option<(usize, Weight)> {
+    let mut open = vec![at];
+    while let Some(link) = open.pop() {
+        for joint in model.joints.iter().filter(|joint| joint.parent == Some(link)) {
+            match weights[joint.child] {
+                Some(weight) => return Some((joint.child, weight)),
+                None => open.push(joint.child),
+            }
+        }
+    }
+    None
+}
+
+fn weight(link: &Link) -> Option<Weight> {
+    let of_ball = |mass_kg: f64, radius_m: f64| Weight { mass_kg, moment_kg_m2: 0.4 * mass_kg * radius_m * radius_m };
+    match link.mass {
+        Mass::None => None,
+        Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } => {
+            Some(Weight { mass_kg, moment_kg_m2: tensor.diagonal().element_sum() / 3.0 })
+        }
+        Mass::Given { mass_kg, .. } => Some(of_ball(mass_kg, 10.0 * STAND_IN_M)),
+        Mass::OfParts => {
+            let solids = link.parts.iter().filter_map(|part| match &part.shape {
+                Shape::Solid(solid) => Some((solid.volume_m3().ok()?, part.density_kg_m3?)),
+                Shape::Hull { .. } => None,
+            });
+            let mut sum = Weight { mass_kg: 0.0, moment_kg_m2: 0.0 };
+            for (volume_m3, density_kg_m3) in solids {
+                // as of balls of the same volumes: of a thousandth, the digits do not count
+                let radius_m = (0.75 * volume_m3 / std::f64::consts::PI).cbrt();
+                let one = of_ball(volume_m3 * density_kg_m3, radius_m);
+                sum = Weight { mass_kg: sum.mass_kg + one.mass_kg, moment_kg_m2: sum.moment_kg_m2 + one.moment_kg_m2 };
+            }
+            (sum.mass_kg > 0.0).then_some(sum)
+        }
+    }
+}
+
+/// A ball on a link that nothing touches.
+pub(crate) fn ball(link: &Link, at_m: DVec3, radius_m: f64) -> Part {
+    Part {
+        place: link.place.clone(),
+        shape: Shape::Solid(Solid::Ball { radius_m }),
+        pose: Pose { position: at_m, ..Pose::IDENTITY },
+        density_kg_m3: None,
+        touches: false,
+    }
+}
+
+/// Adds to all three moments of inertia of a link as little as makes them those of a body.
+pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) {
+    let Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } = &mut link.mass else { return };
+    if is_of_a_body(*tensor) {
+        return;
+    }
+    let scale = tensor.to_cols_array().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let mut added = if scale > 0.0 { 1e-4 * scale } else { 0.4 * *mass_kg * STAND_IN_M * STAND_IN_M };
+    while !is_of_a_body(*tensor + DMat3::from_diagonal(DVec3::splat(added))) {
+        added *= 2.0;
+    }
+    *tensor += DMat3::from_diagonal(DVec3::splat(added));
+    let what = format!("has moments of inertia that no body has: {added:.3e} kg·m² is added to each");
+    notes.push(LeftOut { line: link.place.line, element: link.place.label.clone(), what });
+}
+
+/// Whether all principal moments are above zero, and none is larger than the sum of the others.
+fn is_of_a_body(tensor: DMat3) -> bool {
+    let sum = tensor.diagonal().element_sum();
+    let shifted = |by: f64| DMat3::from_diagonal(DVec3::splat(by));
+    is_positive(tensor - shifted(LEAST * sum)) && is_positive(shifted(0.5 * sum * (1.0 + SLACK)) - tensor)
+}
+
+/// Whether a symmetric matrix has eigenvalues above zero alone (Sylvester's criterion).
+fn is_positive(m: DMat3) -> bool {
+    m.x_axis.x > 0.0 && m.x_axis.x * m.y_axis.y - m.x_axis.y * m.y_axis.x > 0.0 && m.determinant() > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Look, Place};
+
+    fn repaired(moments: [f64; 3]) -> (DVec3, usize) {
+        let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::from_array(moments)));
+        let mut link = Link {
+            name: String::new(),
+            place: Place { line: 1, label: String::new() },
+            pose: Pose::IDENTITY,
+            mass: Mass::Given { mass_kg: 2.0, com_m: DVec3::ZERO, inertia_kg_m2 },
+            parts: Vec::new(),
+            look: Look::default(),
+            is_lent: false,
+        };
+        let mut notes = Vec::new();
+        repair(&mut link, &mut notes);
+        let Mass::Given { inertia_kg_m2: Some(tensor), .. } = link.mass else { panic!("the mass is gone") };
+        (tensor.diagonal(), notes.len())
+    }
+
+    #[test]
+    fn moments_that_no_body_has_are_raised_and_others_stay() {
+        assert_eq!(repaired([1.0, 2.0, 3.0]), (DVec3::new(1.0, 2.0, 3.0), 0)); // a flat plate
+        for moments in [[1.0, 1.0, 3.0], [1.0, 1.0, 0.0], [0.0; 3], [-1.0, 1.0, 1.0]] {
+            let (raised, notes) = repaired(moments);
+            let (most, sum) = (raised.max_element(), raised.element_sum());
+            assert!(
+                raised.min_element() > 0.0 && 2.0 * most <= sum * (1.0 + 1e-3) && notes == 1,
+                "{moments:?}: {raised}"
+            );
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Mass properties that a rigid object is given.
+
+use glam::{DMat3, DVec3};
+use metachron_models::rigid::GivenInertia;
+use metachron_scene::{Source, load};
+use metachron_world::Spec;
+
+fn given(keys: &str) -> Result<Option<GivenInertia>, String> {
+    let text =
+        format!("format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n{keys}");
+    let source = Source::memory("inertia", text.as_bytes()).unwrap();
+    let scene =
+        load(&source, &[]).map_err(|error| format!("{} {}", error.problems[0].line, error.problems[0].message))?;
+    let Spec::Rigid(body) = &scene.agents[0].spec else { panic!("it is not rigid") };
+    Ok(body.inertia)
+}
+
+#[test]
+fn six_numbers_are_the_tensor_about_the_centre_of_mass() {
+    let keys = "mass_kg = 2\ncentre_of_mass_m = [0.1, 0, 0]\ninertia_kg_m2 = [3, 4, 5, 0.1, 0.2, 0.3]";
+    let expected = DMat3::from_cols(DVec3::new(3.0, 0.1, 0.2), DVec3::new(0.1, 4.0, 0.3), DVec3::new(0.2, 0.3, 5.0));
+    assert_eq!(given(keys), Ok(Some(GivenInertia { com_m: DVec3::X * 0.1, about_com_kg_m2: expected })));
+    assert_eq!(given("mass_kg = 2"), Ok(None));
+}
+
+#[test]
+fn what_no_body_has_is_refused_where_it_is() {
+    for (keys, expected) in [
+        ("mass_kg = 2\ninertia_kg_m2 = [1, 1, 3, 0, 0, 0]", "8 `inertia_kg_m2` of `a` cannot be had by a body"),
+        ("mass_kg = 2\ninertia_kg_m2 = [1, 1, 0, 0, 0, 0]", "8 `inertia_kg_m2` of `a` cannot be had by a body"),
+        ("mass_kg = 2\ninertia_kg_m2 = [1, 1, nan, 0, 0, 0]", "8 `inertia_kg_m2` of `a` cannot be had by a body"),
+        ("mass_kg = 2\ncentre_of_mass_m = [0, 0, 1]", "8 `centre_of_mass_m` of `a` has no moments of inertia"),
+        ("inertia_kg_m2 = [1, 1, 1, 0, 0, 0]", "7 `inertia_kg_m2` of `a` has no mass"),
+    ] {
+        let said = given(keys).expect_err(keys);
+        assert!(said.starts_with(expected), "{said}\nis not {expected}");
+    }
+}
