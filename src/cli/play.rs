@@ -42,7 +42,7 @@ fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<(
 }
 
 /// Called for every frame; returns whether to go on.
-type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
+pub(super) type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
 
 /// Width and height of a headless picture where no size is given, pixels.
 const PICTURE_SIZE: [u32; 2] = [1280, 720];

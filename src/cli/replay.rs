@@ -4,7 +4,7 @@
 //! Never here: how a recording is repeated ([`metachron_world::World::replay`]).
 
 use super::args::ReplayArgs;
-use super::play::headless;
+use super::play::{GoOn, headless};
 use super::run::{Request, RunLength, check_outputs, finish, stem, style};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, message};
@@ -45,7 +45,7 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         source,
     };
     let until = args.until.and_then(SimSpan::from_secs_f64).map(|span| SimTime::ZERO + span);
-    let play = |go_on: &mut dyn FnMut(super::run::Step) -> bool| {
+    let play = |go_on: GoOn<'_>| {
         let session = Session::replay(request.scene.clone(), recording.clone(), until)?;
         headless(session, &request, request.png.clone(), go_on)
     };

@@ -5,7 +5,7 @@
 
 use super::args::{OutputArgs, RunArgs, StyleWord};
 use super::exports::ExportPaths;
-use super::play::play;
+use super::play::{GoOn, play};
 use anyhow::Context;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
@@ -125,7 +125,7 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
 /// Plays with a bar that shows how far it is, writes what was asked for, and judges.
 pub(super) fn finish(
     output: &OutputArgs,
-    play: &dyn Fn(&mut dyn FnMut(Step) -> bool) -> anyhow::Result<Played>,
+    play: &dyn Fn(GoOn<'_>) -> anyhow::Result<Played>,
     name: &str,
 ) -> anyhow::Result<Exit> {
     let bar = Bar::new(name, output.quiet);
