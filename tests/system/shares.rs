@@ -296,6 +296,10 @@ fn library(policy: &str, frame_hz: f64) -> (f64, [u32; 2], f64) {
         ("target.render_scale", "[1.0, 1.0]".to_owned()),
         ("machine.draw_setup_ms", "0.24".to_owned()),
         ("machine.draw_pixel_ns", "4.8".to_owned()),
+        ("machine.shading.flat", "{ triangle_us = 0.20, pixel_ns = 1.7 }".to_owned()),
+        ("machine.shading.gouraud", "{ pixel_ns = 4.0 }".to_owned()),
+        ("machine.shading.per-pixel", "{ pixel_ns = 4.3 }".to_owned()),
+        ("machine.shading.textured", "{ triangle_us = 0.35, pixel_ns = 9.9 }".to_owned()),
     ];
     let source = Source::open(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/library.toml")).expect("a built-in scene");
     let scene = metachron_scene::load(&source, &set.map(|(key, value)| (key.to_owned(), value)));

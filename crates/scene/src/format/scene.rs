@@ -285,8 +285,7 @@ pub struct ShadingCostFile {
     pub triangle_us: Option<f64>,
     /// Microseconds per vertex, 0 … 1e4. Default 0.
     pub vertex_us: Option<f64>,
-    /// Nanoseconds per pixel that the object covers, 0 … 1e6. Default: the preset's, 1.7 flat, 4.0 by Gouraud, 4.3 with light at every pixel
-    /// and 9.9 textured in `two-cores-software`, a twentieth of that in `workstation`.
+    /// Nanoseconds per pixel that the object covers, 0 … 1e6. Default 0.
     pub pixel_ns: Option<f64>,
 }
 
