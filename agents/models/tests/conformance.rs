@@ -197,16 +197,6 @@ const OTHERS: [(Integrator, u32); 4] =
     [(Integrator::SymplecticEuler, 40), (Integrator::Xpbd, 64), (Integrator::Bdf2, 1), (Integrator::EnergyMomentum, 1)];
 
 #[test]
-fn a_body_that_keyframes_lead_keeps_every_promise() {
-    let key = |at_s, x: f64| Keyframe { at_s, tip_m: DVec3::X * x, rotation: DQuat::from_rotation_y(x), jaw: 0.0 };
-    let led = Led { keyframes: vec![key(0.0, 0.0), key(0.3, 1.0), key(1.0, 0.2)], repeat: true };
-    let make =
-        || Box::new(KinematicBody::new(&RigidSpec { led: Some(led.clone()), ..brick() }).unwrap()) as Box<dyn Agent>;
-    let suite = Suite { allocations: Some((&count, 0.0)), ..Suite::new(&make, DT) };
-    assert_eq!(check(&suite), []);
-}
-
-#[test]
 fn a_falling_tube_keeps_every_promise_by_every_integrator() {
     for (integrator, substeps) in OTHERS {
         let make = || tube_by(integrator, substeps, (false, 0.0));

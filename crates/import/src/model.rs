@@ -1,4 +1,4 @@
-//! A robot as both kinds of files describe it: links, joints, and who does not collide with whom.
+//! A robot as both kinds of files describe it: links, joints, and which links do not collide with each other.
 //!
 //! In: what the readers found. Out: plain data. Never here: XML, TOML.
 

@@ -291,7 +291,7 @@ fn balls(ball: &Arc<ProgressiveMesh>, side: u32, painted: bool) -> SceneView {
     scene_view
 }
 
-/// A square of one model, each copy placed where it is told.
+/// A square of one model, each copy at its own place.
 fn square(side: u32, placed: impl Fn(DVec3) -> Placement, model: &Model) -> SceneView {
     let appearance = Appearance { colour: [200, 120, 100], material: Material::Plastic };
     let actor = |id| Actor { id: AgentId(id), form: Form::Scenery(model.clone(), placed(place(id, side))), appearance };

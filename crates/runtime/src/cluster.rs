@@ -176,7 +176,7 @@ impl ClusterSeat {
         }
     }
 
-    /// Forgets what contacts on edges and triangles of skins have borne.
+    /// Forgets what contacts on edges and triangles of skins remember of earlier steps.
     pub fn forget_features(&mut self) {
         self.memory.forget_features();
     }

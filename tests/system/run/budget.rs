@@ -10,7 +10,6 @@ draw_setup_ms = 1.0
 draw_object_us = 100.0
 draw_triangle_us = 0.0
 draw_pixel_ns = 0.0
-shading.per-pixel.pixel_ns = 0.0
 [camera]
 eye_m = [0.0, -3.0, 0.0]
 [[object]]

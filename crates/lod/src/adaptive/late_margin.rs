@@ -39,7 +39,7 @@ pub struct LateMargin {
 }
 
 impl LateMargin {
-    /// A margin of 0 for now. `share` of frames may be late: 0 … 1, where 1 asks for no margin.
+    /// One without residuals: its margin is 0. `share` of frames may be late: 0 … 1, where 1 asks for no margin.
     #[must_use]
     pub fn new(share: f64) -> Self {
         let share = crate::within(share, 0.0, 1.0);

@@ -53,7 +53,7 @@ impl AgentRunner {
         steps
     }
 
-    /// Forgets what contacts of it and of those it leads have borne on edges and triangles, where one of them has lost some: others have their
+    /// Forgets what contacts of it and of those it leads remember of earlier steps on edges and triangles, where one of them has lost some: others have their
     /// numbers now.
     pub fn forget_features(&mut self) {
         let Self { led, cluster, carved, .. } = self;

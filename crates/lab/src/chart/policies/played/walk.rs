@@ -27,8 +27,7 @@ pub(in super::super) enum Times {
 
 /// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
 /// for choosing is what one core was measured to take with the default policy (`chart policies`, selection).
-/// Light at every pixel, texture and strokes have no price a pixel here, whatever the preset says.
-const DECLARED: [(&str, &str); 16] = [
+const DECLARED: [(&str, &str); 12] = [
     ("executor", "lockstep"),
     ("machine.draw_setup_ms", "0.1"),
     ("machine.draw_pixel_ns", "0.2"),
@@ -38,10 +37,6 @@ const DECLARED: [(&str, &str); 16] = [
     ("machine.shading.gouraud.triangle_us", "0.14"),
     ("machine.shading.flat.pixel_ns", "0.3"),
     ("machine.shading.gouraud.pixel_ns", "0.5"),
-    ("machine.shading.per-pixel.pixel_ns", "0"),
-    ("machine.shading.textured.pixel_ns", "0"),
-    ("machine.shading.points.pixel_ns", "0"),
-    ("machine.shading.lines.pixel_ns", "0"),
     ("machine.choose_object_ns", "50"),
     ("machine.noise", "0.01"),
     ("machine.wander", "0.05"),
