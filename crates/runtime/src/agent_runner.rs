@@ -13,7 +13,6 @@ use super::agent_clock::{AgentClock, LAG_CAP, Start};
 use super::cluster::{ClusterSeat, Leap, Led, Span};
 use super::events::{AgentEvent, EventKind};
 use super::faults::Faults;
-use super::form_slot::FormWriter;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::helpers::Helped;
@@ -40,8 +39,6 @@ pub(super) struct AgentRunner {
     pub governor: Option<Box<dyn Governor>>,
     pub faults: Faults,
     pub writer: SlotWriter<Snapshot>,
-    /// Of its shapes after the first.
-    pub form: FormWriter,
     /// Matter was taken out of it since its cluster last stepped.
     pub carved: bool,
     pub observer: Observer,

@@ -83,14 +83,19 @@ impl Peer {
 
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
-        let (Some(mine), Some(theirs)) = (self.shared.form.first(), other.shared.form.first()) else { return false };
+        let (mine, theirs) = (self.shared.form.look(), other.shared.form.look());
+        let (Some(mine), Some(theirs)) = (&*mine, &*theirs) else { return false };
         mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
+    }
+
+    fn is_tool(&self) -> bool {
+        self.shared.form.look().as_ref().is_some_and(|shape| is_led(shape))
     }
 
     /// The neighbour `other` as seen by this agent.
     fn neighbour(&self, other: &Self) -> Neighbour {
         // a tool needs the form to grasp it, even if it passes through it
-        let known = self.touches(other) || self.shared.form.first().is_some_and(is_led);
+        let known = self.touches(other) || self.is_tool();
         Neighbour {
             id: other.shared.id,
             step_s: other.shared.wanted_hz.recip(),
@@ -305,7 +310,7 @@ const fn is_led(form: &CollisionShape) -> bool {
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
         // a tool needs the form of what it may grasp, whoever steps both
-        let is_tool = peers.get(me).and_then(|peer| peer.shared.form.first()).is_some_and(is_led);
+        let is_tool = peers.get(me).is_some_and(Peer::is_tool);
         let form = neighbour.form.take().filter(|_| is_tool);
         (neighbour.form, neighbour.law) = (form, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {

@@ -62,8 +62,7 @@ impl AgentRunner {
 
     /// Publishes the contact shape, where it is another one.
     pub fn publish_form(&mut self) {
-        let form = self.agent.form();
-        self.shared.form.publish(&mut self.form, form);
+        self.shared.form.publish(self.agent.form());
     }
 
     /// Publishes a withheld state: the last state of an agent is never withheld.

@@ -312,7 +312,7 @@ fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
 
 /// Whether any two agents could touch.
 fn may_any_touch(all: &[Peer]) -> bool {
-    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.first().is_some()).collect();
+    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.look().is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
@@ -395,7 +395,6 @@ fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
         governor: spawn.governor,
         faults,
         writer,
-        form: None,
         carved: false,
         observer: peers.observer(id, &links),
         links: spawn.attached,
