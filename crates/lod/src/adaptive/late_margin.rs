@@ -5,7 +5,7 @@
 
 /// A frame that exceeds T by more than this fraction is late.
 pub const LATE: f64 = 0.05;
-/// The share of frames that may be late: of [`FRAMES`] the fourth exceeds the bound. Users are promised 1 of 50, and not all is exchangeable.
+/// The share of frames that may be late: of 256 the fourth exceeds the bound. Users are promised 1 of 50, and not all is exchangeable.
 pub const LATE_SHARE: f64 = 1.0 / 64.0;
 /// Frames whose residuals are stored: nine seconds at 30 Hz. With fewer the bound wanders, with more a machine that calms down waits longer.
 const FRAMES: usize = 256;
