@@ -43,7 +43,7 @@ impl Export {
 
 #[pymethods]
 impl Export {
-    /// Writes the world as it is now.
+    /// Writes the world as it is now. `OSError` where a file cannot be written, `RuntimeError` after `close`.
     fn write(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
             let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
