@@ -129,6 +129,17 @@ impl<'a> Tuned<'a> {
         }
     }
 
+    /// That its agents were led through their ranges and answered as work does that goes with elements and steps, and that no gains of their
+    /// table are better than those found.
+    fn tunes_the_agents_own_loops(&self) {
+        for plant in self.said["agents"]["plants"].as_array().unwrap() {
+            assert!((0.5..1.1).contains(&number(plant, "/power")), "{}: {plant}", self.scene);
+        }
+        let rows = self.said["agents"]["rows"].as_array().unwrap();
+        let (found, named) = rows.split_last().unwrap();
+        assert!(named.iter().all(|row| number(found, "/objective") <= number(row, "/objective")), "{rows:?}");
+    }
+
     /// That it says all that it promises to say, and that its pushes come back as predicted.
     fn says_what_is_promised_and_comes_back_as_predicted(&self) {
         for key in [
@@ -290,6 +301,7 @@ fn the_gains_for_the_tube_hold_its_frames_and_beat_the_others() {
     let tuned = Tuned::new("tube", Vec::new());
     tuned.says_what_is_promised_and_comes_back_as_predicted();
     tuned.gives_the_best_of_its_table_inside_the_ranges_of_scenes();
+    tuned.tunes_the_agents_own_loops();
     assert!(tuned.holds_wherever_it_can() >= 4, "{}", tuned.said["plant"]);
     tuned.beats_the_printed_gains_and_a_relay(30.0, 1.0);
     tuned.rests_on_the_clamp_and_leaves(60.0, 1.0);

@@ -1,7 +1,7 @@
-//! Ranges of the gains of the feedback laws that hold a picture at its time.
+//! Ranges of the gains of the feedback laws that hold a picture at its time, and agents at their share.
 //!
 //! In: nothing. Out: the least and the greatest value of each gain, which scene files, their schema, the sliders of the window and the search
-//! for gains all allow. Never here: a law. Theory: `docs/theory/control.md`, eq. 1 and 7.
+//! for gains all allow. Never here: a law. Theory: `docs/theory/control.md`, eq. 1, 7 and 19.
 
 /// α of the printed law, dimensionless per frame/s: the change of ε̂ for each frame per second that is missing.
 pub const ALPHA: (f64, f64) = (1e-9, 1.0);
@@ -13,3 +13,7 @@ pub const KAPPA: (f64, f64) = (1e-3, 1.99);
 pub const LEAD: (f64, f64) = (0.0, 1.99);
 /// The fraction of a frame that the corrected law leaves free.
 pub const MARGIN: (f64, f64) = (0.0, 0.9);
+/// The share of the way to a finer level that one demand of an agent goes, dimensionless.
+pub const REFINE: (f64, f64) = (0.02, 1.0);
+/// The share of a delay by others, of logarithms, that one demand of an agent removes, dimensionless.
+pub const YIELD: (f64, f64) = (0.02, 1.99);

@@ -6,12 +6,14 @@ use super::output::BadInput;
 use anyhow::Context;
 use metachron_core::gains;
 use metachron_lod::adaptive::{DEFAULT_MARGIN, MARGIN_MAX};
-use metachron_lod::control::Law;
+use metachron_lod::control::{Law, RateGains};
 use metachron_lod::tune::{Candidate, NORMALISED};
 use std::path::Path;
 
 /// The keys of `[target]` that a fragment may have.
-const KEYS: [&str; 6] = ["policy", "law", "alpha", "beta", "kappa", "lead"];
+const KEYS: [&str; 8] = ["policy", "law", "alpha", "beta", "kappa", "lead", AGENT_REFINE, AGENT_YIELD];
+const AGENT_REFINE: &str = "agent_refine";
+const AGENT_YIELD: &str = "agent_yield";
 const MARGIN: &str = "margin";
 /// Longest fragment, bytes.
 const BYTES_MAX: u64 = 1 << 16;
@@ -137,8 +139,8 @@ fn digits(value: f64) -> String {
     if value < 0.01 { format!("{value:.3e}") } else { format!("{value:.3}") }
 }
 
-/// The scene fragment that selects `law`, with `comment` above it.
-pub fn fragment(law: Law, comment: &str) -> String {
+/// The scene fragment that selects `law`, and the gains of the `agents` where some were found, with `comment` above it.
+pub fn fragment(law: Law, agents: Option<RateGains>, comment: &str) -> String {
     let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
     let gains = match law {
         Law::Printed { alpha, beta } => format!("law = \"printed\"\nalpha = {alpha:e}\nbeta = {beta:e}\n"),
@@ -146,7 +148,10 @@ pub fn fragment(law: Law, comment: &str) -> String {
             format!("law = \"corrected\"\nkappa = {kappa}\nlead = {lead}\nmargin = {margin}\n")
         }
     };
-    format!("{comment}[target]\npolicy = \"feedback\"\n{gains}")
+    let agents = agents.map_or_else(String::new, |RateGains { refine, yielding }| {
+        format!("{AGENT_REFINE} = {refine}\n{AGENT_YIELD} = {yielding}\n")
+    });
+    format!("{comment}[target]\npolicy = \"feedback\"\n{gains}{agents}")
 }
 
 /// Refuses a path that is already taken, or in a folder that does not exist.
@@ -238,11 +243,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("gains.toml");
         let law = Law::Corrected { kappa: 0.375, lead: 0.125, margin: 0.0625 };
-        write(&path, &fragment(law, "one\ntwo")).unwrap();
+        let agents = RateGains { refine: 0.75, yielding: 0.25 };
+        write(&path, &fragment(law, Some(agents), "one\ntwo")).unwrap();
         let over = overrides(&path).unwrap();
         let value = |key: &str| over.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
         assert_eq!(value("target.kappa"), Some("0.375"));
         assert_eq!(value("target.law"), Some("\"corrected\""));
+        assert_eq!((value("target.agent_refine"), value("target.agent_yield")), (Some("0.75"), Some("0.25")));
         std::fs::write(&path, "[target]\nframe_hz = 3.0\n").unwrap();
         assert!(overrides(&path).unwrap_err().to_string().contains("frame_hz"));
         std::fs::write(&path, "[[object]]\n").unwrap();

@@ -13,7 +13,7 @@ use metachron_geometry::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
     ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PictureControl, Pieces, Policy,
-    Prices, RateControl, RateDemand, RateLimits, Stages, Stroke, Value,
+    Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
 };
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
@@ -27,6 +27,7 @@ use std::sync::Arc;
 /// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
 pub(super) struct Governors {
     share: f64,
+    gains: RateGains,
     /// The shared data so far.
     pub controlled: ControlledAgents,
 }
@@ -34,13 +35,24 @@ pub(super) struct Governors {
 impl Governors {
     /// Of the agents of `scene`.
     pub fn of(scene: &Scene) -> Self {
-        let share = fair_share(machine(scene).cores, scene.agents.len());
-        Self { share, controlled: ControlledAgents::default() }
+        Self { share: share(scene), gains: rate_gains(scene), controlled: ControlledAgents::default() }
     }
 
-    /// The governor of one agent; none where the scene fixes its step and its resolution.
+    /// The governor of one agent's dt and ε; none where the scene fixes both.
     pub fn governor(&mut self, member: &Member) -> Option<Box<dyn Governor>> {
-        governor(member, self.share, &mut self.controlled)
+        let meshed = member.spec.adapts_spacing();
+        if let Some(tolerance_m) = member.tolerance_m {
+            return error_governor(member, tolerance_m, meshed, &mut self.controlled);
+        }
+        let limits = rate_limits(member, self.share);
+        let control = RateControl::new(limits, self.gains, meshed.then_some(member.start.eps_m));
+        if !control.steers() {
+            return None;
+        }
+        let (least, fair) = (control.least_part(), control.share());
+        let budget = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, least, fair));
+        self.controlled.budgets.push(Arc::clone(&budget));
+        Some(Box::new(RateGovernor(control, budget)))
     }
 }
 
@@ -63,27 +75,32 @@ pub(super) const ROOM: f64 = 0.75;
 /// Largest share of its period that an agent may take even if cores are idle: past it every hiccup makes the agent late.
 pub(super) const SHARE_MAX: f64 = 0.6;
 
-/// The governor of the agent's dt and ε; none where the scene fixes both.
-fn governor(member: &Member, share: f64, controlled: &mut ControlledAgents) -> Option<Box<dyn Governor>> {
-    let meshed = member.spec.adapts_spacing();
-    if let Some(tolerance_m) = member.tolerance_m {
-        return error_governor(member, tolerance_m, meshed, controlled);
-    }
-    let limits = RateLimits {
+/// The share of its period that each agent of `scene` may take at the start.
+fn share(scene: &Scene) -> f64 {
+    fair_share(machine(scene).cores, scene.agents.len())
+}
+
+/// The gains of the agents' controllers: the scene's, or the law's own.
+fn rate_gains(scene: &Scene) -> RateGains {
+    let (given, own) = (&scene.target.gains, RateGains::default());
+    RateGains { refine: given.agent_refine.unwrap_or(own.refine), yielding: given.agent_yield.unwrap_or(own.yielding) }
+}
+
+/// The limits of the controller of each agent of `scene` that keeps a rate and leaves something to choose.
+pub(super) fn controlled_members(scene: &Scene) -> impl Iterator<Item = (&Member, RateLimits)> {
+    let share = share(scene);
+    let members = scene.agents.iter().filter(|member| member.tolerance_m.is_none());
+    members.map(move |member| (member, rate_limits(member, share))).filter(|(_, limits)| limits.top() > 0.0)
+}
+
+fn rate_limits(member: &Member, share: f64) -> RateLimits {
+    RateLimits {
         dt_wanted_s: member.pace.dt.as_secs_f64(),
         dt_max_s: member.pace.dt_range.1.as_secs_f64(),
-        eps_m: meshed.then_some(member.simulation.eps_m),
+        eps_m: member.spec.adapts_spacing().then_some(member.simulation.eps_m),
         work_power: member.spec.work_power(),
         share,
-    };
-    let control = RateControl::new(limits, meshed.then_some(member.start.eps_m));
-    if !control.steers() {
-        return None;
     }
-    let (least, fair) = (control.least_part(), control.share());
-    let budget = Arc::new(AgentBudget::new(member.id, member.pace.rate_hz, least, fair));
-    controlled.budgets.push(Arc::clone(&budget));
-    Some(Box::new(RateGovernor(control, budget)))
 }
 
 /// The governor of an agent with an error tolerance.

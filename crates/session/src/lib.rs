@@ -17,6 +17,7 @@
 //! assert!((outcome.sim_s - 0.5).abs() < 0.02); // 30 frames at 60 Hz, to a frame
 //! assert!(outcome.adapter.is_none());
 //! ```
+mod agent_experiment;
 mod assemble;
 #[cfg(feature = "picture")]
 pub mod calibrate;
@@ -46,6 +47,7 @@ mod step_response;
 mod trace;
 mod visible_resolution;
 
+pub use agent_experiment::{AgentExperiment, AgentResponse, agent_experiment};
 pub use assemble::law;
 pub use coupling_record::Coupling;
 pub use error::SessionError;

@@ -123,7 +123,7 @@ pub struct Factors {
     pub hysteresis: Option<f64>,
 }
 
-/// Gains of the feedback laws; `None` is the law's own default.
+/// Gains of the laws that hold frames and agents at their times; `None` is the law's own default.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gains {
     /// α of the printed law.
@@ -136,6 +136,10 @@ pub struct Gains {
     pub lead: Option<f64>,
     /// Share of the frame time that is left free, 0 … 0.9.
     pub margin: Option<f64>,
+    /// Of the agents' own loops: share of the way to a finer level that one demand goes, 0.02 … 1.
+    pub agent_refine: Option<f64>,
+    /// Of the agents' own loops: share of a delay by others that one demand removes, 0.02 … 1.99.
+    pub agent_yield: Option<f64>,
 }
 
 /// The camera of a scene.

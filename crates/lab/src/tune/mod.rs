@@ -3,6 +3,7 @@
 //! In: a scene, a machine (declared, or the one present with `--live`). Out: a table, a fragment of TOML that `run --gains` and a scene
 //! take, a figure. Never here: how gains are judged ([`metachron_lod::tune`] does), the experiment's frames ([`metachron_session`] draws them).
 
+mod agents;
 mod checked;
 mod figures;
 mod report;
@@ -131,7 +132,8 @@ fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     std::fs::create_dir_all(folder)
         .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
     let tuned = look_for_gains(args, on, stopped)?;
-    gains::write(fragment, &gains::fragment(tuned.law, &report::comment(on, &tuned)))?;
+    let agents = agents::tune(args, &on.scene, stopped)?;
+    gains::write(fragment, &gains::fragment(tuned.law, agents.gains(), &report::comment(on, &tuned)))?;
     let mut files = vec![fragment.to_owned()];
     let mut checked = Vec::new();
     // after an interrupt the user does not wait for figures
@@ -140,9 +142,9 @@ fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
         checked = checked::check(args, on, &tuned, stopped)?;
     }
     data(&if args.common.json {
-        report::json(on, &tuned, &checked, &files)?
+        report::json(on, &report::Found { tuned: &tuned, agents: &agents, checked: &checked, files: &files })?
     } else {
-        report::text(on, &tuned, &checked, &files)
+        report::text(on, &report::Found { tuned: &tuned, agents: &agents, checked: &checked, files: &files })
     })?;
     if tuned.interrupted {
         message("interrupted: the best gains so far were written");

@@ -3,6 +3,7 @@
 //! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
 
 use super::super::chart::table::{Cell, Table};
+use super::agents::AgentLoops;
 use super::checked::Checked;
 use super::{Identified, origin_name};
 use metachron_console::gains;
@@ -11,8 +12,17 @@ use metachron_lod::tune::{Candidate, Explanation, Margins, Tuning, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
+/// All that a tuning has found.
+pub(super) struct Found<'a> {
+    pub tuned: &'a Tuning,
+    pub agents: &'a AgentLoops,
+    pub checked: &'a [Checked],
+    pub files: &'a [PathBuf],
+}
+
 /// The table of a tuning, the plant, the files.
-pub(super) fn text(on: &Identified, tuned: &Tuning, checked: &[Checked], files: &[PathBuf]) -> String {
+pub(super) fn text(on: &Identified, found: &Found<'_>) -> String {
+    let Found { tuned, agents, checked, files } = found;
     let mut table = Table::new(&[
         "law",
         "gains",
@@ -47,13 +57,14 @@ pub(super) fn text(on: &Identified, tuned: &Tuning, checked: &[Checked], files: 
     }
     let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
     format!(
-        "{}{}{}\n{}\nbest: {}\n{}files: {}\n",
+        "{}{}{}\n{}\nbest: {}\n{}{}files: {}\n",
         plant(on),
         speed_note(tuned),
         constraint_notes(tuned),
         table.text(),
         gains::gains_text(tuned.best.candidate),
         checked.iter().map(Checked::text).collect::<String>(),
+        agents.text(),
         files.join(", ")
     )
 }
@@ -134,7 +145,8 @@ pub(super) fn comment(on: &Identified, tuned: &Tuning) -> String {
 }
 
 /// The same as JSON: the best law at the top level, together with everything else.
-pub(super) fn json(on: &Identified, tuned: &Tuning, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
+pub(super) fn json(on: &Identified, found: &Found<'_>) -> anyhow::Result<String> {
+    let Found { tuned, agents, checked, files } = found;
     let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(origin_name(row.origin), &row.verdict)).collect();
     let tried: Vec<_> = tuned
         .found
@@ -149,7 +161,7 @@ pub(super) fn json(on: &Identified, tuned: &Tuning, checked: &[Checked], files: 
     let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
         "checked": checked.iter().map(Checked::json).collect::<Vec<_>>(),
-        "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
+        "agents": agents.json(), "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
     });
     if let (Some(whole), Value::Object(rest)) = (whole.as_object_mut(), rest) {
         whole.extend(rest);

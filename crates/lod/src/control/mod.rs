@@ -42,7 +42,7 @@ pub use plan::{FrameWork, LevelDemand, Plan, detail};
 pub use policy::{Law, Policy};
 pub use price::{Backdrop, Measured, Misses, Prices};
 pub use query::Promise;
-pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure, VisibleDetail};
+pub use rate::{RateControl, RateDemand, RateGains, RateLimits, TurnMeasure, VisibleDetail};
 pub use status::Status;
 pub use tolerance::{ErrorControl, ErrorLimits, ErrorMeasure};
 pub use view::{Kind, ObjectView, Pieces, Shading, Stroke};

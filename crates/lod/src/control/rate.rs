@@ -9,6 +9,7 @@ mod full_load;
 use crate::Bound;
 use crate::log_law::ERROR_MAX;
 use full_load::{FullLoad, IN_A_ROW};
+use metachron_core::gains;
 
 /// Measured times of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +37,34 @@ pub struct RateLimits {
     pub work_power: f64,
     /// The fraction of its period that the agent's work may take, 0.01 … 1. Cores over agents, less some reserve, is fair.
     pub share: f64,
+}
+
+/// The gains of the law: how much of a difference one demand removes. What an agent's own work asks to coarsen it removes at once: its load
+/// is known, and late turns lose simulated time.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct RateGains {
+    /// Share of the way to a finer level that one demand goes, 0.02 … 1, where nobody else delays the agent.
+    pub refine: f64,
+    /// κ: share of a delay by others, of logarithms, that one demand removes, 0.02 … 1.99.
+    pub yielding: f64,
+}
+
+impl Default for RateGains {
+    fn default() -> Self {
+        Self { refine: 0.5, yielding: 0.5 }
+    }
+}
+
+impl RateGains {
+    fn sound(self) -> Self {
+        let own = Self::default();
+        let kept =
+            |gain: f64, own: f64, (low, high): (f64, f64)| if gain.is_finite() { gain.clamp(low, high) } else { own };
+        Self {
+            refine: kept(self.refine, own.refine, gains::REFINE),
+            yielding: kept(self.yielding, own.yielding, gains::YIELD),
+        }
+    }
 }
 
 /// The finest detail of an agent's simulation that makes a visible difference.
@@ -68,19 +97,14 @@ const SPIKE: f64 = 8.0;
 /// Above this ratio of real to wanted period, beyond what the agent's own work explains, the agent counts as delayed by others.
 const LATE: f64 = 1.03;
 
-/// κ: the share of such a delay (of logarithms) that one demand removes.
-const KAPPA: f64 = 0.5;
-
 /// Least |Δ ln| of a demand, dimensionless: re-meshing costs accuracy, which 10 % of ε do not justify.
 pub(super) const DEMAND_MIN: f64 = 0.095;
 
 /// Windows without delay before anything gets finer: initially a second, doubled whenever that turns out to have been too early.
 const PATIENCE: (u32, u32) = (4, 128);
 
-/// Greatest refinement by one demand after delays by others, ln 1.25: a small step tests whether they are still there.
+/// Greatest refinement by one demand after delays by others, and least before, ln 1.25: a small step tests whether they are still there.
 const REFINE_MAX: f64 = 0.223;
-/// … otherwise the fraction of the distance that one demand refines.
-const REFINE_PART: f64 = 0.5;
 
 /// The dead zone of ln(load/share), 80 % … 105 %: wider than [`DEMAND_MIN`], so that there is always an ε at which it rests.
 const DEAD: (f64, f64) = (-0.223, 0.049);
@@ -98,12 +122,45 @@ struct Window {
     late: f64,
 }
 
+impl RateLimits {
+    /// Upper end of the range of z that ε covers: p ln(coarsest ε / finest ε) with the power p of work.
+    fn eps_end(&self) -> f64 {
+        self.eps_m.map_or(0.0, |(fine, coarse)| self.work_power * ratio_ln(coarse, fine))
+    }
+
+    /// Upper end of the range of z, the logarithm of a ratio of work: that of ε, and ln(longest dt / wanted dt) beyond it. 0 where nothing can
+    /// be chosen.
+    #[must_use]
+    pub fn top(&self) -> f64 {
+        self.eps_end() + ratio_ln(self.dt_max_s, self.dt_wanted_s)
+    }
+
+    /// z of a step and a spacing: the inverse of [`RateLimits::demand`] inside its range.
+    #[must_use]
+    pub fn z_of(&self, demand: &RateDemand) -> f64 {
+        let finer =
+            self.eps_m.zip(demand.eps_m).map_or(0.0, |((fine, _), eps_m)| self.work_power * ratio_ln(eps_m, fine));
+        finer + ratio_ln(demand.dt_s, self.dt_wanted_s)
+    }
+
+    /// The step and the spacing at `z`, 0 … [`RateLimits::top`] (control.md, eq. 17).
+    #[must_use]
+    pub fn demand(&self, z: f64) -> RateDemand {
+        let eps_end = self.eps_end();
+        let coarsened = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
+        let of_eps = z.min(eps_end) / self.work_power;
+        let eps_m = self.eps_m.map(|(fine, coarse)| coarsened(fine, coarse, of_eps));
+        let dt_s = coarsened(self.dt_wanted_s, self.dt_max_s, (z - eps_end).max(0.0));
+        RateDemand { dt_s, eps_m }
+    }
+}
+
 /// Controls dt and ε of one agent.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct RateControl {
     limits: RateLimits,
-    /// Upper ends of the two ranges of z, each the logarithm of a ratio of work: p ln(coarsest ε / finest ε) with the power p of work, and that
-    /// plus ln(longest dt / wanted dt).
+    gains: RateGains,
+    /// Upper ends of the two ranges of z.
     eps_end: f64,
     top: f64,
     window: Window,
@@ -128,9 +185,8 @@ pub struct RateControl {
 impl RateControl {
     /// A controller of an agent that presently steps by `dt_wanted_s` and simulates at `eps_m`.
     #[must_use]
-    pub fn new(limits: RateLimits, eps_m: Option<f64>) -> Self {
-        let eps_end = limits.eps_m.map_or(0.0, |(fine, coarse)| limits.work_power * ratio_ln(coarse, fine));
-        let top = eps_end + ratio_ln(limits.dt_max_s, limits.dt_wanted_s);
+    pub fn new(limits: RateLimits, gains: RateGains, eps_m: Option<f64>) -> Self {
+        let (eps_end, top) = (limits.eps_end(), limits.top());
         let start = eps_m
             .zip(limits.eps_m)
             .map_or(0.0, |(now, (fine, _))| (limits.work_power * ratio_ln(now, fine)).min(eps_end));
@@ -138,6 +194,7 @@ impl RateControl {
             RateLimits { share: if limits.share > 0.0 { limits.share.clamp(0.01, 1.0) } else { 1.0 }, ..limits };
         Self {
             limits,
+            gains: gains.sound(),
             eps_end,
             top,
             window: Window::default(),
@@ -277,7 +334,7 @@ impl RateControl {
 
     /// Delayed by others: the last refinement was too much, is reverted, and tried again after twice the wait.
     fn coarsen_for_others(&mut self, lateness: f64) {
-        self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(ERROR_MAX)).min(self.top);
+        self.aim = (self.aim.max(self.sent) + self.gains.yielding * libm::log(lateness).min(ERROR_MAX)).min(self.top);
         if let Some(before) = self.refined_from.take() {
             self.patience = (2 * self.patience).min(PATIENCE.1);
             self.aim = self.aim.max(before);
@@ -287,7 +344,7 @@ impl RateControl {
     /// With time to spare: refines, once delays by others have ceased for long enough.
     fn refine(&mut self, to: f64) {
         if self.calm >= self.patience {
-            let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.own_target - to) } else { 0.0 };
+            let part = if self.patience == PATIENCE.0 { self.gains.refine * (self.own_target - to) } else { 0.0 };
             self.aim = to.max(self.own_target - part.max(REFINE_MAX)).max(0.0);
         }
     }
@@ -310,14 +367,10 @@ impl RateControl {
         to != from && ((to - from).abs() >= DEMAND_MIN || to <= 0.0 || to >= self.top)
     }
 
-    /// The present demand (control.md, eq. 17).
+    /// The present demand.
     #[must_use]
     pub fn demand(&self) -> RateDemand {
-        let coarsened = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
-        let of_eps = self.target().min(self.eps_end) / self.limits.work_power;
-        let eps_m = self.limits.eps_m.map(|(fine, coarse)| coarsened(fine, coarse, of_eps));
-        let dt_s = coarsened(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.target() - self.eps_end).max(0.0));
-        RateDemand { dt_s, eps_m }
+        self.limits.demand(self.target())
     }
 
     /// The end of the range at which the agent rests: finest with time to spare, or coarsest and still late.

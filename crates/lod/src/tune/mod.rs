@@ -1,4 +1,5 @@
-//! Tuning: finds, explains and checks gains. How a scene's frame time responds to its resolution, and which law holds it best.
+//! Tuning: finds, explains and checks gains. How a scene's frame time responds to its resolution, and which law holds it best; likewise an
+//! agent's load to its step and spacing.
 //!
 //! In: frames of an experiment ([`Observed`]). Out: the plant behind them ([`Plant`]), the behaviour of a law on it ([`explain`],
 //! [`judge`]) and the best gains ([`search()`]). Closed loops are simulated with the controller used for drawing,
@@ -6,6 +7,8 @@
 //! agents, drawing, files.
 //! Theory: `docs/theory/control.md`, section 8.
 
+mod agent_plant;
+mod agent_tuning;
 mod candidate;
 mod disturbance;
 mod equilibria;
@@ -23,6 +26,8 @@ mod tuning;
 #[cfg(test)]
 mod tests;
 
+pub use agent_plant::{AgentIdentifyError, AgentPlant, AgentWindow};
+pub use agent_tuning::{AgentTuning, AgentVerdict, judge_agents, tune_agents};
 pub use candidate::Candidate;
 pub use disturbance::Disturbance;
 pub use equilibria::{FixedPoint, fixed_points};

@@ -41,6 +41,8 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         kappa: gain("kappa", f.kappa, gain_range(gains::KAPPA)),
         lead: gain("lead", f.lead, gain_range(gains::LEAD)),
         margin: gain("margin", f.margin, gain_range(gains::MARGIN)),
+        agent_refine: gain("agent_refine", f.agent_refine, gain_range(gains::REFINE)),
+        agent_yield: gain("agent_yield", f.agent_yield, gain_range(gains::YIELD)),
     });
     let mut factor = |key: &str, value: Option<f64>| value.map(|v| c.number(&place, key, v, &allowed(0.0..=1.0, "")));
     let factors = file.map_or_else(Factors::default, |f| Factors {

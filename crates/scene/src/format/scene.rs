@@ -133,6 +133,12 @@ pub struct TargetFile {
     /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02.
     #[schemars(range(min = gains::MARGIN.0, max = gains::MARGIN.1))]
     pub margin: Option<f64>,
+    /// Gain of the agents' own loops: share of the way to a finer level that one demand goes, 0.02 … 1. Default 0.5.
+    #[schemars(range(min = gains::REFINE.0, max = gains::REFINE.1))]
+    pub agent_refine: Option<f64>,
+    /// Gain of the agents' own loops: share of a delay by others that one demand removes, 0.02 … 1.99. Default 0.5.
+    #[schemars(range(min = gains::YIELD.0, max = gains::YIELD.1))]
+    pub agent_yield: Option<f64>,
     /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the
     /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
     pub lag_ms: Option<f64>,

@@ -31,7 +31,7 @@ struct Agent {
 impl Agent {
     fn new(full_s: f64) -> Self {
         let now = RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) };
-        let control = RateControl::new(limits(), now.eps_m);
+        let control = RateControl::new(limits(), RateGains::default(), now.eps_m);
         Self { control, full_s, bursts: None, now, time_s: 0.0, demands: Vec::new() }
     }
 
@@ -105,7 +105,7 @@ fn demands_stop_once_the_load_is_on_target() {
 
 #[test]
 fn an_agent_delayed_by_others_refines_ever_more_rarely() {
-    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut control = RateControl::new(limits(), RateGains::default(), Some(0.005));
     let (mut now, mut time_s, mut retunes) = (control.demand(), 0.0, Vec::new());
     while time_s < 240.0 {
         // others leave it a core's time only while it is coarse: its own work is small all along
@@ -124,7 +124,7 @@ fn an_agent_delayed_by_others_refines_ever_more_rarely() {
 
 #[test]
 fn one_delay_by_the_scheduler_changes_nothing() {
-    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut control = RateControl::new(limits(), RateGains::default(), Some(0.005));
     for turn in 0..5000 {
         let work_s = if turn == 2500 { 0.05 } else { 0.45 * PERIOD_S };
         let measure = TurnMeasure { work_s, wanted_period_s: PERIOD_S, real_period_s: PERIOD_S, dt_s: PERIOD_S };
@@ -136,7 +136,7 @@ fn one_delay_by_the_scheduler_changes_nothing() {
 fn fixed_values_switch_the_controller_off() {
     let fixed = RateLimits { dt_max_s: PERIOD_S, eps_m: Some((0.01, 0.01)), ..limits() };
     for limits in [fixed, RateLimits { eps_m: None, ..fixed }] {
-        let mut control = RateControl::new(limits, Some(0.01));
+        let mut control = RateControl::new(limits, RateGains::default(), Some(0.01));
         let turn = TurnMeasure { work_s: 1.0, wanted_period_s: PERIOD_S, real_period_s: 1.0, dt_s: PERIOD_S };
         assert!(!control.steers() && (0..100).all(|_| control.after_turn(&turn).is_none()));
     }
@@ -144,7 +144,7 @@ fn fixed_values_switch_the_controller_off() {
 
 #[test]
 fn a_model_without_eps_slows_down() {
-    let mut control = RateControl::new(RateLimits { eps_m: None, ..limits() }, None);
+    let mut control = RateControl::new(RateLimits { eps_m: None, ..limits() }, RateGains::default(), None);
     let mut dt_s = PERIOD_S;
     for _ in 0..5000 {
         let turn = TurnMeasure { work_s: PERIOD_S, wanted_period_s: PERIOD_S, real_period_s: dt_s, dt_s };
@@ -155,7 +155,7 @@ fn a_model_without_eps_slows_down() {
 
 #[test]
 fn invalid_turns_are_left_out() {
-    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut control = RateControl::new(limits(), RateGains::default(), Some(0.005));
     for bad in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
         for at in 0..4 {
             let mut x = [PERIOD_S; 4];
@@ -169,7 +169,7 @@ fn invalid_turns_are_left_out() {
 
 #[test]
 fn demands_stay_in_their_ranges_whatever_is_measured() {
-    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut control = RateControl::new(limits(), RateGains::default(), Some(0.005));
     let mut seed = 1_u64;
     for _ in 0..100_000 {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -279,7 +279,7 @@ fn after_bursts_an_agent_is_as_fine_as_before_within_ten_seconds() {
 
 #[test]
 fn an_agent_delayed_now_and_then_by_bursts_of_others_keeps_its_resolution() {
-    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut control = RateControl::new(limits(), RateGains::default(), Some(0.005));
     for turn in 0..20_000 {
         // every second for a tenth of one
         let real_period_s = if turn % 240 < 24 { 3.0 * PERIOD_S } else { PERIOD_S };
@@ -291,7 +291,7 @@ fn an_agent_delayed_now_and_then_by_bursts_of_others_keeps_its_resolution() {
 #[test]
 fn work_that_falls_as_the_cube_of_spacing_finds_its_spacing_at_once() {
     let limits = RateLimits { work_power: 3.0, dt_max_s: PERIOD_S, ..limits() };
-    let mut control = RateControl::new(limits, Some(0.005));
+    let mut control = RateControl::new(limits, RateGains::default(), Some(0.005));
     let mut eps_m = 0.005_f64;
     let mut demands = 0;
     for _ in 0..2000 {
