@@ -19,7 +19,7 @@ use std::sync::Arc;
 /// Promises, tested for every model: a step advances exactly `dt`; a refused step leaves the state bit for bit;
 /// the same calls give the same bits; nothing is allocated once the sizes settle; a state that is not finite is never written.
 pub trait Agent: Send {
-    /// The model's name as scenes write it: `tube`, `rigid`, `sheet`, `solid`, `rope`, `tool`, `synthetic`.
+    /// The model's name: as scenes write it `tube`, `rigid`, `sheet`, `solid`, `rope`, `tool` or `synthetic`, else one of its own.
     fn model(&self) -> &'static str;
 
     /// Advances the state by exactly `dt`: the step of a body that touches nothing. The runtime steps members ([`Self::member`]) by their

@@ -39,8 +39,8 @@ impl Log {
     pub fn of_replay(recording: &Recording) -> Self {
         let mut demands: BTreeMap<AgentId, VecDeque<_>> = BTreeMap::new();
         for entry in &recording.entries {
-            if let Entry::Demand(agent, content, demand) = entry {
-                demands.entry(*agent).or_default().push_back((*content, *demand));
+            if let Entry::Demand(agent, turns_before, demand) = entry {
+                demands.entry(*agent).or_default().push_back((*turns_before, *demand));
             }
         }
         let script = Script { demands, played: 0, of: recording.entries.len(), fault: None };
@@ -141,8 +141,8 @@ impl Script {
                 answers.pop_front();
                 demand
             }
-            Some((content, _)) => {
-                *content -= 1;
+            Some((turns_before, _)) => {
+                *turns_before -= 1;
                 Demand::default()
             }
             None => Demand::default(),

@@ -60,7 +60,7 @@ pub(super) enum Entry {
     Remove(AgentId),
     /// It was put into the state of this checkpoint, as the bytes of its file.
     Restore(Vec<u8>),
-    /// The governor of an agent answered a turn; before that it was content with so many.
+    /// The governor of an agent asked for this after a turn; for so many turns before that it asked for nothing.
     Demand(AgentId, u32, Demand),
     /// The recording ended, with this hash of all states.
     End(u64),
@@ -233,8 +233,8 @@ pub(super) struct Recorder {
     out: Box<dyn Write + Send>,
     /// Those that are not written yet.
     entries: Vec<Entry>,
-    /// For each agent, how often its governor was content since it last asked for something.
-    content: BTreeMap<AgentId, u32>,
+    /// For each agent, how often its governor asked for nothing since it last asked for something.
+    silent_turns: BTreeMap<AgentId, u32>,
     /// Why no more is written.
     failed: Option<std::io::Error>,
 }
@@ -253,7 +253,7 @@ impl Recorder {
         out.write_all(&FORMAT.to_le_bytes())?;
         let (mut program, mut head) = (PROGRAM.to_owned(), Head { of, scene });
         write_chunk(&mut *out, |archive| archive_values!(archive, program, head))?;
-        Ok(Self { out, entries: Vec::new(), content: BTreeMap::new(), failed: None })
+        Ok(Self { out, entries: Vec::new(), silent_turns: BTreeMap::new(), failed: None })
     }
 
     /// The file at `path`, anew.
@@ -276,11 +276,11 @@ impl Recorder {
 
     /// Writes down how the governor of `agent` has answered.
     pub fn note_demand(&mut self, agent: AgentId, demand: Demand) {
-        let content = self.content.entry(agent).or_default();
+        let silent_turns = self.silent_turns.entry(agent).or_default();
         if demand == Demand::default() {
-            *content += 1;
+            *silent_turns += 1;
         } else {
-            let before = std::mem::take(content);
+            let before = std::mem::take(silent_turns);
             self.entries.push(Entry::Demand(agent, before, demand));
         }
     }

@@ -1,7 +1,8 @@
 //! What code above the models asks of an agent, answered by its spec: mass, momentum, division into elements.
 //!
 //! In: a [`Spec`] or a [`Member`]. Out: numbers, or the same member divided otherwise. Never here: steps, pictures.
-//! A new model is added to these functions, and nothing above this crate has to know it.
+//! A new model is added to these functions. Above this crate only scene files and pictures know models one by one: `docs/ARCHITECTURE.md`,
+//! "a new model goes".
 
 use crate::scene::{Member, Spec};
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! The primal-dual way: semismooth Newton on the projected laws of contact (AC91), each step one system of the members' size.
 //!
 //! In: an iterate, started from impulses of the last step. Out: the same where all laws hold, or the word that they do not.
-//! Never here: what to do then (`convex.rs`). Theory: `docs/theory/clusters.md`, eq. 7–9.
+//! Never here: what to do then (`convex.rs`). Theory: `docs/theory/clusters.md`, eq. 5, 7–9, 16.
 
 use super::cone::Form;
 use super::iterate::{Iterate, Refined};

@@ -62,7 +62,7 @@ pub trait ClusterMember: Send {
         &[]
     }
 
-    /// Hears before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
+    /// Receives before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
     fn leave(&mut self, unanswered: &[DVec3]) {
         let _ = unanswered;
     }
