@@ -332,7 +332,7 @@ impl AgentRunner {
             *into = nothing;
             true
         });
-        self.withheld = !self.writer.publish();
+        self.withheld = !self.show();
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_nowhere(self.id(), time);
         }

@@ -46,6 +46,7 @@ impl Follower {
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
         let AssembledRun { actors, all } = assemble(spawns, Helpers::none())?;
+        all.set_ordered();
         let followed = actors.into_iter().map(|actor| Followed { actor, ..Followed::default() }).collect();
         let timeline = Timeline::new().after(Duration::ZERO, TimelineCommand::Pause);
         Ok(Self { timeline, now: Duration::ZERO, followed, all })

@@ -212,6 +212,7 @@ impl Run for Threads {
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
+        self.all.set_ordered();
         self.cut(|cut, mine| {
             begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
             *mine = Some(order);
