@@ -262,7 +262,7 @@ pub struct RunArgs {
     /// Run the scene a second time as a reference, all agents on one very fine common clock, and report the differences (headless only)
     #[arg(long)]
     pub oracle: bool,
-    /// Write down what is done to the run, so that `metachron replay` repeats it to the bit (lockstep only)
+    /// Write down what is done to the run, so that `metachron replay` repeats it to the bit
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
     /// What is written and printed.

@@ -32,10 +32,6 @@ use std::path::{Path, PathBuf};
 
 /// Begins to write down what is done to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
-    if !session.is_virtual() {
-        let why = "--record writes down what is done to a run in lockstep; add --executor lockstep";
-        return Err(BadInput(why.to_owned()).into());
-    }
     let file = File::create(path).with_context(|| format!("the recording {} cannot be written", path.display()))?;
     let (name, text) = (request.source.name().to_owned(), request.source.text().to_owned());
     Ok(session.begin_recording(Box::new(file), SceneText { name, text, overrides: request.overrides.clone() })?)

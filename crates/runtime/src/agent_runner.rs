@@ -1,6 +1,6 @@
 //! One turn of an agent, the same for every executor.
 //!
-//! begin   take commands, drop lag, look around, step, write the snapshot
+//! begin   take commands, drop lag, look around, step, write the snapshot ([`super::turn_parts`])
 //! finish  record, publish, touch, call the governor, rest or go on
 //!
 //! Between the two an executor lets the turn's time pass: on a thread it has passed, lockstep charges it. A turn that fails, by an error of
@@ -8,9 +8,8 @@
 //! the other agents go on. Never here: threads, sleeping, events, any law of control, the step and the turns of the agents that an agent
 //! leads ([`super::cluster`]).
 
-use super::agent_clock::Timeline;
-use super::agent_clock::{AgentClock, LAG_CAP, Start};
-use super::cluster::{ClusterSeat, Leap, Led, Span};
+use super::agent_clock::{AgentClock, Start, Timeline};
+use super::cluster::{ClusterSeat, Led};
 use super::events::{AgentEvent, EventKind};
 use super::faults::Faults;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -117,7 +116,7 @@ pub(super) struct TurnPeriod {
 }
 
 impl TurnPeriod {
-    fn record(&mut self, timeline: &Timeline, wall: Duration) {
+    pub(super) fn record(&mut self, timeline: &Timeline, wall: Duration) {
         let piece = timeline.piece();
         match self.last.filter(|&(_, p)| p == piece) {
             None => self.period_s = None,
@@ -155,24 +154,6 @@ impl AgentRunner {
         }
         self.notify_reader();
         self.metrics.pace(&self.shared.gauges, &self.pace);
-    }
-
-    /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
-    /// and is parked now.
-    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
-        self.shared.sleep.clear_wake(self.id());
-        self.admit_arrivals();
-        match contained(|| self.attempt(timeline, wall)) {
-            Ok((open, effort)) => {
-                self.open = open;
-                Some(effort)
-            }
-            Err(reason) => {
-                self.park(reason);
-                self.disband(timeline, wall);
-                None
-            }
-        }
     }
 
     /// Ends the turn that began: it took `turn_s` seconds of the caller, those it leads included, and it is wall time `wall`.
@@ -290,62 +271,6 @@ impl AgentRunner {
         self.close();
     }
 
-    /// Returns no open turn if it waits instead, or hands its turns over before it steps.
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<PendingTurn>, Effort), String> {
-        self.take_commands()?;
-        let now = timeline.sim_at(wall);
-        let near = self.keeps_common_time(now, self.pace.is_late(timeline, wall));
-        let before = self.pace.time();
-        let start = self.pace.begin(timeline, wall, near);
-        let jumped = self.pace.time().since(before);
-        if near && start.late > LAG_CAP || self.pace.clock_offset() > SimSpan::ZERO {
-            self.shared.sleep.note_far_behind(now);
-        }
-        // even if it waits: the awaited agents may wait for one that it leads
-        let alone = self.gather(timeline, wall, Leap { start: &start, jumped });
-        self.forget_features();
-        if self.waits(wall) || self.should_join() {
-            return Ok((None, Effort { work: 0.0, steps: alone }));
-        }
-        self.record_period(timeline, wall);
-        let time = self.pace.time();
-        self.led.members_at(time).for_each(|actor| actor.record_period(timeline, wall));
-        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.metrics.turns());
-        let is_met = self.peers.broad_phase.get().is_some() || !self.links.is_empty();
-        let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
-        let resolution = self.resolution();
-        let led = self.led.members_at(time).count() as u32;
-        let (StepOutcome { report, dt }, led) = match self.step_alone(Span::Wanted(wanted)) {
-            Ok(outcome) => (outcome, led),
-            Err(reason) if led == 0 => return Err(reason),
-            // they part: one of them will fail alone, the others find together again
-            Err(_) => {
-                self.release_all();
-                (self.step_alone(Span::Wanted(self.pace.wanted()))?, 0)
-            }
-        };
-        if start.dropped > SimSpan::ZERO {
-            self.tell(EventKind::RateMissed);
-        }
-        self.pace.shorten(wanted, dt);
-        let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
-        if rests && self.cluster.is_some() {
-            self.rest_members();
-        }
-        let mut open = PendingTurn { start, dt, resolution, errors_m: [0.0; 2], rests };
-        self.write_led(&open);
-        self.write_snapshot(self.pace.time() + dt, rests)?;
-        open.errors_m = self.errors_m();
-        self.pace.advance_by(dt);
-        Ok((Some(open), Effort { work: report.work, steps: 1 + led + alone }))
-    }
-
-    fn record_period(&mut self, timeline: &Timeline, wall: Duration) {
-        if self.governor.is_some() {
-            self.turn_period.record(timeline, wall);
-        }
-    }
-
     /// Its resolution, if a governor needs it.
     pub fn resolution(&self) -> Option<Resolution> {
         self.governor.as_ref().and_then(|_| self.agent.resolution())
@@ -354,16 +279,6 @@ impl AgentRunner {
     /// The error estimates of the state that was written last, metres: in all, and the part caused by its time steps.
     pub fn errors_m(&self) -> [f64; 2] {
         self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m])
-    }
-
-    /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
-    /// not be where its leader expects it.
-    fn should_join(&mut self) -> bool {
-        if self.shared.handover.is_none() || self.observer.neighbours().is_empty() {
-            return false;
-        }
-        self.observer.refresh();
-        self.seek_leader().is_some()
     }
 
     /// Obeys the commands that came in.
@@ -417,7 +332,7 @@ impl AgentRunner {
             *into = nothing;
             true
         });
-        self.withheld = !self.writer.publish();
+        self.withheld = !self.show();
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_nowhere(self.id(), time);
         }

@@ -9,7 +9,8 @@ use super::cluster::{Place, Placed, check_places};
 use super::handle::Shared;
 use super::lockstep::Phase;
 use super::sleep::SleepRegistry;
-use metachron_core::{Archive, ArchiveError, archive_values};
+use super::turn_order::{PartKind, TurnOrder};
+use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -69,12 +70,28 @@ impl Cut {
         archive_values!(archive, *timeline, *now)
     }
 
+    /// As [`Self::archive`], where no events follow, and none are heard of.
+    pub fn archive_whole(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.archive(archive)?;
+        let mut events: Option<VirtualEvents> = None;
+        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)
+    }
+
+    /// As [`Self::archive_in_real_time`], of a run whose turns are noted in `order`.
+    pub fn archive_in_order(
+        &mut self,
+        archive: &mut Archive<'_>,
+        order: Option<&TurnOrder>,
+    ) -> Result<(), ArchiveError> {
+        let noted = order.filter(|_| archive.is_reading());
+        noted.inspect(|order| order.hold().note(PartKind::Restore, AgentId(0), self.now));
+        self.archive_in_real_time(archive)
+    }
+
     /// The same for an executor in real time, whose clock reads the present `now`: its time passes or stands as before.
     pub fn archive_in_real_time(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let (wall, own) = (self.now, self.timeline);
-        self.archive(archive)?;
-        let mut events: Option<VirtualEvents> = None;
-        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)?;
+        self.archive_whole(archive)?;
         if !archive.is_reading() {
             return Ok(());
         }

@@ -112,6 +112,14 @@ pub(super) enum Span {
     AtMost(SimSpan),
 }
 
+/// A step that is to be made, by an agent that has looked around.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StepPlan {
+    dt: SimSpan,
+    /// Which steps the members of its cluster make in it; `None` of an agent that is no member of any.
+    members: Option<Plan>,
+}
+
 /// A bug: only agents with a seat are stepped in clusters.
 const NO_SEAT: &str = "has no seat in a cluster";
 
@@ -276,14 +284,37 @@ impl AgentRunner {
     /// # Errors
     /// The reason why one of them cannot go on.
     pub fn step_alone(&mut self, span: Span) -> Result<StepOutcome, String> {
-        if self.cluster.is_some() {
-            return self.step_cluster(span);
-        }
-        let (Span::Wanted(dt) | Span::AtMost(dt)) = span;
+        let plan = self.plan_step(span)?;
+        self.make_step(plan)
+    }
+
+    /// Looks around before such a step: all that it depends on is known then, whatever others do meanwhile.
+    ///
+    /// # Errors
+    /// The reason why it cannot be made.
+    pub fn plan_step(&mut self, span: Span) -> Result<StepPlan, String> {
         let time = self.pace.time();
-        let step = PlannedStep { start: self.pace.scene_time(), dt };
-        self.observe(step, &Membership::default());
-        let (me, neighbours) = (self.shared.id, self.observer.neighbours());
+        if self.cluster.is_none() {
+            let (Span::Wanted(dt) | Span::AtMost(dt)) = span;
+            let step = PlannedStep { start: self.pace.scene_time(), dt };
+            self.observe(step, &Membership::default());
+            return Ok(StepPlan { dt, members: None });
+        }
+        self.led.note_membership(self.shared.id, time);
+        let (plan, dt) = self.plan(span)?;
+        self.look(time, dt);
+        Ok(StepPlan { dt, members: Some(plan) })
+    }
+
+    /// Makes the step that was planned: reads and writes nothing of others.
+    ///
+    /// # Errors
+    /// The reason why one of them cannot go on.
+    pub fn make_step(&mut self, StepPlan { dt, members }: StepPlan) -> Result<StepOutcome, String> {
+        if let Some(plan) = members {
+            return self.step_cluster(plan, dt);
+        }
+        let (me, time, neighbours) = (self.shared.id, self.pace.time(), self.observer.neighbours());
         let Acting { springs: hands, forces, motors, pose } = prepared(&mut self.loads, time, dt);
         let context = StepContext { me, time, neighbours, hands, forces, motors, pose: *pose, links: &self.links };
         let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
@@ -303,11 +334,8 @@ impl AgentRunner {
     ///
     /// # Errors
     /// The reason why a member cannot go on: all that belong to the cluster stop with it.
-    fn step_cluster(&mut self, span: Span) -> Result<StepOutcome, String> {
+    fn step_cluster(&mut self, plan: Plan, dt: SimSpan) -> Result<StepOutcome, String> {
         let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.turns());
-        self.led.note_membership(id, time);
-        let (plan, dt) = self.plan(span)?;
-        self.look(time, dt);
         let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
         let mut list = recycled(std::mem::take(&mut seat.participants));
         let mut sides = recycled(std::mem::take(&mut seat.sides));

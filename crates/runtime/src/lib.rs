@@ -39,6 +39,7 @@ mod events;
 #[cfg(test)]
 mod executor_tests;
 mod faults;
+mod follower;
 mod form_slot;
 mod governor;
 mod handle;
@@ -68,6 +69,8 @@ mod table;
 #[cfg(test)]
 mod testing;
 mod threads;
+mod turn_order;
+mod turn_parts;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -76,6 +79,7 @@ pub use agents::Agents;
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};
 pub use faults::Faults;
+pub use follower::Follower;
 pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;
@@ -89,8 +93,10 @@ pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
+pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A run of agents, on any executor.
@@ -139,6 +145,17 @@ pub trait Run: Send {
     /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then. Any error
     /// while reading leaves a run that is not usable any more.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError>;
+
+    /// Makes the parts of its turns in `order` from now on, which begins between two turns; before it does, writes its state to `begun` if
+    /// that is given. In lockstep the order follows from the calls, and is not noted. Who holds `order` keeps turns from going on, but does
+    /// not keep this from returning.
+    ///
+    /// # Errors
+    /// Those of [`Run::archive`]; the order is not noted then.
+    fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
+        drop(order);
+        begun.map_or(Ok(()), |archive| self.archive(archive))
+    }
 
     /// Simulated time now.
     fn sim_now(&self) -> SimTime {

@@ -14,6 +14,7 @@ use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
 use metachron_core::{AgentId, Archive, ArchiveError, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
 /// Data of all agents that have ever been in a run.
@@ -24,6 +25,8 @@ pub(super) struct Peers {
     pub broad_phase: OnceLock<BroadPhase>,
     /// Who helps with the turns of large clusters.
     pub helpers: Helpers,
+    /// Whether the order of turns is noted, or followed: what a turn publishes is seen by the next.
+    pub is_ordered: AtomicBool,
 }
 
 /// Data of one agent for its peers.

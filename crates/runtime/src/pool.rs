@@ -23,11 +23,12 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::turn_order::TurnOrder;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use shared::PoolState;
 use std::num::NonZero;
-use std::sync::Arc;
 use std::sync::mpsc::Sender;
+use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use supervisor::{Message, Supervisor};
@@ -109,6 +110,28 @@ impl Pool {
         Ok(())
     }
 
+    /// Ends all workers between turns, does something with the agents and the order of their turns, and lets them go on.
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError> {
+        self.halt();
+        let mut homes = Vec::new();
+        self.state.clear(|actor| homes.push(Some(actor)));
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let (agents, timeline) = (self.all.handles.len(), self.state.timeline.read());
+        let mut cut = Cut { all, agents, timeline, now: self.state.clock.now() };
+        let outcome = act(&mut cut, &mut self.state.order.lock().unwrap_or_else(PoisonError::into_inner));
+        if cut.timeline != timeline {
+            self.state.timeline.set(cut.timeline);
+        }
+        self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
+        // some may have been woken, or have returned from a leader
+        self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(self.go_on().map_err(no_thread))
+    }
+
     fn end(&mut self) {
         self.halt();
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
@@ -159,21 +182,16 @@ impl Run for Pool {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.halt();
-        let mut homes = Vec::new();
-        self.state.clear(|actor| homes.push(Some(actor)));
-        let all = take_apart(homes.into_iter(), &self.all.handles);
-        let agents = self.all.handles.len();
-        let mut cut = Cut { all, agents, timeline: self.state.timeline.read(), now: self.state.clock.now() };
-        let outcome = cut.archive_in_real_time(archive);
-        if archive.is_reading() {
-            self.state.timeline.set(cut.timeline);
-        }
-        self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
-        // some may have been woken, or have returned from a leader
-        self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
-        outcome.and(self.go_on().map_err(no_thread))
+        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+    }
+
+    fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
+        self.all.set_ordered();
+        self.cut(|cut, mine| {
+            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
+            *mine = Some(order);
+            Ok(())
+        })
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

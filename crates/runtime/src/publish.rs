@@ -8,7 +8,9 @@ use super::agent_runner::{AgentRunner, PendingTurn};
 use super::metrics::Entry;
 use super::probe::Trace;
 use metachron_core::SimTime;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::Duration;
 
 impl AgentRunner {
@@ -26,7 +28,7 @@ impl AgentRunner {
     /// Publishes the state that was written last; whether it is visible.
     pub fn publish(&mut self, now: SimTime) -> bool {
         let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
-        let published = self.writer.publish();
+        let published = self.show();
         if published {
             self.notify_reader();
             if concerns {
@@ -60,6 +62,17 @@ impl AgentRunner {
         }
     }
 
+    /// Publishes the state that was written last; whether it did. In a run that is recorded, and in its replay, no reader keeps it from that.
+    pub fn show(&mut self) -> bool {
+        let mut published = self.writer.publish();
+        while !published && self.writer.filled().is_some() && self.peers.is_ordered.load(Relaxed) {
+            // readers are in their cells for nanoseconds, unless they are suspended there
+            thread::yield_now();
+            published = self.writer.publish();
+        }
+        published
+    }
+
     /// Publishes the contact shape, where it is another one.
     pub fn publish_form(&mut self) {
         self.shared.form.publish(self.agent.form());
@@ -67,7 +80,7 @@ impl AgentRunner {
 
     /// Publishes a withheld state: the last state of an agent is never withheld.
     pub fn show_withheld(&mut self) {
-        if std::mem::take(&mut self.withheld) && self.writer.publish() {
+        if std::mem::take(&mut self.withheld) && self.show() {
             self.notify_reader();
         }
     }

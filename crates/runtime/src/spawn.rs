@@ -25,6 +25,7 @@ use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Description of an agent to be started.
@@ -187,6 +188,11 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
 }
 
 impl Everyone {
+    /// From now on the order of turns is noted, or followed.
+    pub fn set_ordered(&self) {
+        self.peers.is_ordered.store(true, Relaxed);
+    }
+
     /// Takes an agent out: at its next turn, or at once where it makes no more.
     ///
     /// # Errors
@@ -294,7 +300,8 @@ fn peers(
     if may_any_touch(&all) {
         broad_phase.get_or_init(|| BroadPhase::new(all.len()));
     }
-    (Peers { all: all.into_iter().collect(), broad_phase, helpers }, writers)
+    let is_ordered = AtomicBool::new(false);
+    (Peers { all: all.into_iter().collect(), broad_phase, helpers, is_ordered }, writers)
 }
 
 /// For each agent the joints that hold it to others.

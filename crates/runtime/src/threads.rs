@@ -18,6 +18,8 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::turn_order::{Held, PartKind, TurnOrder, in_force};
+use super::turn_parts::Begun;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -44,6 +46,8 @@ pub struct Threads {
     farewells: Sender<AgentId>,
     ended: Receiver<AgentId>,
     priority: Priority,
+    /// Where the parts of turns are noted; `None` of a run that is not recorded.
+    order: Option<Arc<TurnOrder>>,
 }
 
 impl Threads {
@@ -60,7 +64,8 @@ impl Threads {
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (farewells, ended) = channel();
-        let mut run = Self { clock, timeline, all, threads: Vec::new(), farewells, ended, priority };
+        let (threads, order) = (Vec::new(), None);
+        let mut run = Self { clock, timeline, all, threads, farewells, ended, priority, order };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
             let shared = Arc::clone(&run.all.handles[id.0 as usize].shared);
@@ -84,6 +89,7 @@ impl Threads {
             clock: Arc::clone(&self.clock),
             timeline: Arc::clone(&self.timeline),
             batch: CpuBatch::default(),
+            order: self.order.clone(),
         };
         let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
@@ -128,6 +134,24 @@ impl Threads {
             self.begin(actor, shared)?;
         }
         Ok(())
+    }
+
+    /// Ends all threads between turns, does something with the agents and the order of their turns, and lets them go on.
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError> {
+        let homes = self.halt();
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let agents = self.all.handles.len();
+        let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
+        let outcome = act(&mut cut, &mut self.order);
+        if cut.timeline != self.timeline.read() {
+            self.timeline.set(cut.timeline);
+        }
+        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(gone_on.map_err(no_thread))
     }
 
     fn end(&mut self) {
@@ -184,17 +208,16 @@ impl Run for Threads {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let homes = self.halt();
-        let all = take_apart(homes.into_iter(), &self.all.handles);
-        let agents = self.all.handles.len();
-        let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
-        let outcome = cut.archive_in_real_time(archive);
-        if archive.is_reading() {
-            self.timeline.set(cut.timeline);
-        }
-        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
-        outcome.and(gone_on.map_err(no_thread))
+        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+    }
+
+    fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
+        self.all.set_ordered();
+        self.cut(|cut, mine| {
+            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
+            *mine = Some(order);
+            Ok(())
+        })
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
@@ -221,6 +244,7 @@ struct AgentThread {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
     batch: CpuBatch,
+    order: Option<Arc<TurnOrder>>,
 }
 
 impl AgentThread {
@@ -242,14 +266,14 @@ impl AgentThread {
     /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
     fn make_own_turns(&mut self, mut actor: Box<AgentRunner>) -> Option<Box<AgentRunner>> {
         let sleep = Arc::clone(&actor.shared.sleep);
-        let mut next = actor.next(&self.timeline.read(), self.clock.now());
+        let mut next = self.take_up(&mut actor);
         while !sleep.stopping() {
             next = match next {
                 Next::Due => self.wait_or_turn(&mut actor),
                 Next::Rest => self.rest(&mut actor),
                 Next::Join(leader) => {
                     self.settle(&mut actor);
-                    actor = hand_over(actor, leader).err()?;
+                    actor = self.hand_over(actor, leader).err()?;
                     Next::Due
                 }
                 Next::Parked => {
@@ -259,6 +283,25 @@ impl AgentThread {
             };
         }
         Some(actor)
+    }
+
+    /// How `actor` goes on, of which this thread has just taken the turns.
+    fn take_up(&mut self, actor: &mut AgentRunner) -> Next {
+        let order = in_force(&mut self.order);
+        let mut held = order.as_deref().map(TurnOrder::hold);
+        let (timeline, now) = (self.timeline.read(), self.clock.now());
+        if let (Some(held), true) = (&mut held, actor.open.is_some()) {
+            held.note(PartKind::Show, actor.id(), now);
+        }
+        actor.next(&timeline, now)
+    }
+
+    /// Hands `actor` over to `leader`, if that admits it now.
+    fn hand_over(&mut self, actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
+        let order = in_force(&mut self.order);
+        let mut held = order.as_deref().map(TurnOrder::hold);
+        held.iter_mut().for_each(|held| held.note(PartKind::Join, actor.id(), self.clock.now()));
+        hand_over(actor, leader)
     }
 
     /// Waits until the agent returns from its leader.
@@ -272,15 +315,19 @@ impl AgentThread {
 
     /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which is harmless.
     fn wait_or_turn(&mut self, actor: &mut AgentRunner) -> Next {
+        let order = in_force(&mut self.order);
+        let held = order.as_deref().map(TurnOrder::hold);
         let timeline = self.timeline.read();
         let now = self.clock.now();
         match actor.pace.due(&timeline) {
-            Some(due) if due <= now => self.turn(actor, &timeline, now),
+            Some(due) if due <= now => self.turn(actor, &timeline, now, held),
             Some(due) => {
+                drop(held);
                 thread::park_timeout(due - now);
                 Next::Due
             }
             None => {
+                drop(held);
                 self.settle(actor);
                 thread::park();
                 Next::Due
@@ -289,24 +336,30 @@ impl AgentThread {
     }
 
     fn rest(&mut self, actor: &mut AgentRunner) -> Next {
-        if actor.try_wake(&self.timeline.read(), self.clock.now()) {
+        let order = in_force(&mut self.order);
+        let mut held = order.as_deref().map(TurnOrder::hold);
+        let (timeline, now) = (self.timeline.read(), self.clock.now());
+        if actor.try_wake(&timeline, now) {
+            held.iter_mut().for_each(|held| held.note(PartKind::Wake, actor.id(), now));
             return Next::Due;
         }
+        drop(held);
         self.settle(actor);
         thread::park();
         Next::Rest
     }
 
-    fn turn(&mut self, actor: &mut AgentRunner, timeline: &Timeline, began: Duration) -> Next {
+    fn turn(&mut self, actor: &mut AgentRunner, timeline: &Timeline, began: Duration, held: Option<Held<'_>>) -> Next {
         self.batch.open();
         let started = Instant::now();
-        let next = match actor.begin(timeline, began) {
+        let Begun { effort, mut held } = actor.begin_in(timeline, began, held);
+        let now = self.clock.now();
+        held.iter_mut().for_each(|held| held.note_end(now));
+        let next = match effort {
             None => Next::Parked,
-            Some(_) => {
-                let now = self.clock.now();
-                actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64())
-            }
+            Some(_) => actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64()),
         };
+        drop(held);
         let wall = started.elapsed();
         actor.count(wall);
         if self.batch.add(wall) {

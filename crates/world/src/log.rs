@@ -7,13 +7,21 @@ use super::Member;
 use super::assemble::Govern;
 use super::recording::{Entry, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
-use metachron_runtime::{Demand, Governor, TurnMeasure};
+use metachron_runtime::{Agents, Demand, Governor, OrderLog, TurnMeasure, TurnOrder, TurnPart, state_hash};
 use std::collections::{BTreeMap, VecDeque};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{
+    AtomicBool,
+    Ordering::{Acquire, Release},
+};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-/// Whether a world is recorded, replayed or neither. In lockstep only one thread at a time is here.
+/// Whether a world is recorded, replayed or neither. In lockstep, and in an order of turns, only one thread at a time is here.
 #[derive(Default)]
-pub(super) struct Log(Mutex<Mode>);
+pub(super) struct Log {
+    mode: Mutex<Mode>,
+    /// Whether it is recorded or replayed: governors look at this alone where it is not.
+    is_heard: AtomicBool,
+}
 
 #[derive(Default)]
 enum Mode {
@@ -21,7 +29,8 @@ enum Mode {
     #[default]
     Fresh,
     Unrecorded,
-    Recorded(Recorder),
+    /// In real time with the order of its turns.
+    Recorded(Recorder, Option<Arc<TurnOrder>>),
     Replayed(Script),
 }
 
@@ -44,14 +53,14 @@ impl Log {
             }
         }
         let script = Script { demands, played: 0, of: recording.entries.len(), fault: None };
-        Self(Mutex::new(Mode::Replayed(script)))
+        Self { mode: Mutex::new(Mode::Replayed(script)), is_heard: AtomicBool::new(true) }
     }
 
     /// Writes down what is about to be done.
     pub fn note(&self, entry: impl FnOnce() -> Entry) {
         let mut mode = self.mode();
         match &mut *mode {
-            Mode::Recorded(recorder) => recorder.note(entry()),
+            Mode::Recorded(recorder, _) => recorder.note(entry()),
             Mode::Fresh => *mode = Mode::Unrecorded,
             Mode::Unrecorded | Mode::Replayed(_) => {}
         }
@@ -71,26 +80,36 @@ impl Log {
     }
 
     pub fn is_recorded(&self) -> bool {
-        matches!(*self.mode(), Mode::Recorded(_))
+        matches!(*self.mode(), Mode::Recorded(..))
     }
 
     pub fn is_replayed(&self) -> bool {
         matches!(*self.mode(), Mode::Replayed(_))
     }
 
-    /// Begins to write down.
-    pub fn record(&self, recorder: Recorder) {
-        *self.mode() = Mode::Recorded(recorder);
+    /// Begins to write down, in real time what happens in `order`.
+    pub fn record(&self, recorder: Recorder, order: Option<Arc<TurnOrder>>) {
+        *self.mode() = Mode::Recorded(recorder, order);
+        self.is_heard.store(true, Release);
+    }
+
+    /// The order of turns of a world that is recorded in real time.
+    pub fn order(&self) -> Option<Arc<TurnOrder>> {
+        if let Mode::Recorded(_, order) = &*self.mode() { order.clone() } else { None }
     }
 
     /// Takes the recorder, if there is one: nothing more is written down.
     pub fn take_recorder(&self) -> Option<Recorder> {
         let mut mode = self.mode();
-        if !matches!(*mode, Mode::Recorded(_)) {
+        if !matches!(*mode, Mode::Recorded(..)) {
             return None;
         }
+        self.is_heard.store(false, Release);
         match std::mem::replace(&mut *mode, Mode::Unrecorded) {
-            Mode::Recorded(recorder) => Some(recorder),
+            Mode::Recorded(recorder, order) => {
+                order.inspect(|order| order.close());
+                Some(recorder)
+            }
             _ => None,
         }
     }
@@ -110,15 +129,18 @@ impl Log {
     }
 
     fn mode(&self) -> MutexGuard<'_, Mode> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.mode.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What the governor of `agent` asks for after a turn: what `answer` says, or what the recording says.
     fn demand(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
+        if !self.is_heard.load(Acquire) {
+            return answer();
+        }
         let mut mode = self.mode();
         match &mut *mode {
             Mode::Replayed(script) => script.next(agent),
-            Mode::Recorded(recorder) => {
+            Mode::Recorded(recorder, _) => {
                 let demand = answer();
                 recorder.note_demand(agent, demand);
                 demand
@@ -129,6 +151,23 @@ impl Log {
                 answer()
             }
         }
+    }
+}
+
+/// Writes down the turns of a world.
+pub(super) struct TurnsToLog {
+    pub log: Weak<Log>,
+    pub agents: Agents,
+}
+
+impl OrderLog for TurnsToLog {
+    fn take(&self, parts: &mut Vec<TurnPart>) {
+        if let Some(log) = self.log.upgrade()
+            && let Mode::Recorded(recorder, _) = &mut *log.mode()
+        {
+            recorder.note_turns(parts, || state_hash(&self.agents));
+        }
+        parts.clear();
     }
 }
 

@@ -1,25 +1,28 @@
 //! A world that is recorded, and one that repeats a recording.
 //!
-//! In: a world in lockstep, a place to write to; a recording. Out: a recording; a world that does what it says.
+//! In: a world, a place to write to; a recording. Out: a recording; a world that does what it says.
 //! Never here: the file ([`super::recording`]), what is written down where ([`super::world`]).
 
 use super::Scene;
+use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{CheckpointError, SceneIdentity};
 use super::kinds::ExecutorKind;
-use super::log::Log;
+use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
-use super::replay::Player;
-use super::world::{Shared, State, World};
-use metachron_core::SimTime;
+use super::replay::{Followed, Player};
+use super::world::{Setting, Shared, State, World, WorldError};
+use metachron_core::{Archive, SimTime};
+use metachron_runtime::{Follower, Lockstep, SystemClock, TurnOrder};
+use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
 impl World {
-    /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit. In
-    /// lockstep only. A world that has run before begins with a checkpoint. Commands of other threads wait for the call in progress from now on;
-    /// one that is sent while this call runs may be left out.
+    /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit: of a
+    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint. In lockstep commands of
+    /// other threads wait for the call in progress from now on; one that is sent while this call runs may be left out.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.
@@ -34,22 +37,41 @@ impl World {
     /// [`RecordError`]; nothing is recorded then.
     pub fn record_to(&self, out: Box<dyn Write + Send>, scene: Option<SceneText>) -> Result<(), RecordError> {
         self.check_recordable()?;
+        if self.executor() != ExecutorKind::Lockstep {
+            return self.record_turns(out, scene);
+        }
         let begun = (!self.shared.log.is_fresh()).then(|| self.checkpoint()).transpose();
         let begun = begun.map_err(RecordError::Begun)?;
         let identity = &self.shared.identity;
         if let Some(checkpoint) = &begun {
             identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
         }
-        let mut recorder = Recorder::begin(out, identity.clone(), scene)?;
+        let mut recorder = Recorder::begin(out, identity.clone(), scene, false)?;
         begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
-        self.shared.log.record(recorder);
+        self.shared.log.record(recorder, None);
+        Ok(())
+    }
+
+    /// Begins to record a world in real time, between two turns of all of its objects.
+    fn record_turns(&self, out: Box<dyn Write + Send>, scene: Option<SceneText>) -> Result<(), RecordError> {
+        let (Shared { identity, log, .. }, agents) = (&*self.shared, self.agents());
+        let mut state = self.state();
+        let State::Running(run) = &mut *state else { return Err(RecordError::Stopped) };
+        let is_fresh = log.is_fresh();
+        identity.check(&identity.now(agents)).map_err(RecordError::Begun)?;
+        let mut recorder = Recorder::begin(out, identity.clone(), scene, true)?;
+        let turns = TurnsToLog { log: Arc::downgrade(log), agents: agents.clone() };
+        let (order, mut archive) = (Arc::new(TurnOrder::new(Box::new(turns))), Archive::writer());
+        // no turn is made in this order before the log has what it begins with
+        let _held = order.between();
+        let begun = run.record(Arc::clone(&order), (!is_fresh).then_some(&mut archive));
+        begun.map_err(|error| RecordError::Begun(CheckpointError::Refused(error)))?;
+        recorder.note(if is_fresh { Entry::Timeline(run.timeline()) } else { Entry::Begin(archive.into_bytes()) });
+        log.record(recorder, Some(Arc::clone(&order)));
         Ok(())
     }
 
     fn check_recordable(&self) -> Result<(), RecordError> {
-        if self.executor() != ExecutorKind::Lockstep {
-            return Err(RecordError::RealTime);
-        }
         if self.has_stopped() || self.shared.log.is_replayed() { Err(RecordError::Stopped) } else { Ok(()) }
     }
 
@@ -58,12 +80,14 @@ impl World {
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
+        let order = self.shared.log.order();
+        let _held = order.as_deref().map(TurnOrder::between);
         let recorder = self.shared.log.take_recorder();
         recorder.map_or(Ok(false), |recorder| recorder.end(self.hash()).map(|()| true))
     }
 
-    /// Starts `scene` in lockstep and does again what `recording` says, as far as time is let pass, but no further than to `until`: the
-    /// same bits. It takes no commands. A call that let time pass is repeated whole: time may pass further than it was let, until the last.
+    /// Starts `scene` on one thread and does again what `recording` says, as far as time is let pass, but no further than to `until`: the
+    /// same bits. As in lockstep its clock is virtual, and reads what the recorded one did. It takes no commands. A call that let time pass is repeated whole: time may pass further than it was let, until the last.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`] where the recording is of another scene; those of [`World::start`].
@@ -83,30 +107,30 @@ impl World {
     ) -> Result<Self, CheckpointError> {
         let identity = SceneIdentity::of(scene);
         identity.check(recording.identity())?;
-        let world = Self::start_logged(scene, ExecutorKind::Lockstep, govern, Log::of_replay(&recording))?;
-        world.follow(recording, until);
-        Ok(world)
-    }
-
-    /// From now on its run does what `recording` says.
-    fn follow(&self, recording: Recording, until: Option<SimTime>) {
-        let Shared { gravity, surroundings, identity, log, .. } = &*self.shared;
-        let mut state = self.state();
-        let State::Running(run) = &*state else { return };
-        let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
-        let State::Running(run) = std::mem::replace(&mut *state, State::Stopped { now, time, timeline }) else {
-            return;
+        let surroundings = assemble::surroundings(scene)?;
+        let log = Arc::new(Log::of_replay(&recording));
+        let lockstep = ExecutorKind::Lockstep;
+        let spawns = assemble::spawns(scene, &surroundings, lockstep, &mut logged(govern, &log))?;
+        let run = if recording.is_real_time() {
+            Followed::RealTime(Box::new(Follower::start(spawns).map_err(WorldError::Run)?))
+        } else {
+            Followed::Lockstep(Box::new(Lockstep::start(spawns, assemble::machine(scene)).map_err(WorldError::Run)?))
         };
-        *state = State::Running(Box::new(Player {
+        let player = Player {
             run,
             recording,
             played: 0,
+            turns: VecDeque::new(),
+            present: None,
+            restored: None,
             until,
-            log: Arc::clone(log),
-            gravity: *gravity,
-            surroundings: Arc::clone(surroundings),
-            identity: identity.clone(),
-        }));
+            log: Arc::clone(&log),
+            gravity: scene.gravity,
+            surroundings: Arc::clone(&surroundings),
+            identity,
+        };
+        let setting = Setting { surroundings, clock: Arc::new(SystemClock::new()), log };
+        Ok(Self::of_run(scene, lockstep, Box::new(player), setting))
     }
 
     /// The share of its recording that a replay has played, 0 … 1, or why it plays no more of it; `None` of other worlds.

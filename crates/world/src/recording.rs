@@ -1,6 +1,7 @@
 //! A recording: everything that was done to a world from outside, in the order in which it was done, so that the same can be done again.
 //!
-//! In: the calls that change a world in lockstep, the answers of its governors. Out: a file, and the calls read from one.
+//! In: the calls that change a world, the answers of its governors; of one in real time the parts of its turns. Out: a file, and all that read
+//! from one.
 //! Never here: how they are made again ([`super::replay`]), the state of an object.
 //!
 //! A file: [`MAGIC`], the version of the format, then chunks, each with its length and checksum, so that a file that was cut short is read to its
@@ -8,8 +9,8 @@
 
 use super::builder::{Part, Rigid, Soft, Tube};
 use super::checkpoint::{CheckpointError, SceneIdentity, checksum};
-use metachron_core::{AgentId, Archive, ArchiveError, Body, archive_values};
-use metachron_runtime::{Command, Demand, TimelineCommand};
+use metachron_core::{AgentId, Archive, ArchiveError, Body, SimTime, archive_values};
+use metachron_runtime::{Command, Demand, PartKind, Timeline, TimelineCommand, TurnPart};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -18,11 +19,16 @@ use std::time::Duration;
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Bytes of a chunk before its contents: length and checksum.
 const CHUNK_HEAD: usize = 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
 const CHUNK_ENTRIES: usize = 128;
+/// As many parts of turns leave the process at once, and none is kept from it longer than this, of the run's time.
+const CHUNK_PARTS: usize = 1000;
+const WRITE_INTERVAL: Duration = Duration::from_millis(200);
+/// How often a recording in real time says what all states are, so that a replay that goes another way says so early.
+const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// The program that can repeat what it has recorded, to the bit.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
@@ -42,6 +48,8 @@ pub struct SceneText {
 struct Head {
     of: SceneIdentity,
     scene: Option<SceneText>,
+    /// Whether it is of a world on threads or in a pool, whose turns are in it.
+    real_time: bool,
 }
 
 /// Something that was done to a world from outside.
@@ -52,6 +60,16 @@ pub(super) enum Entry {
     /// Work of this length occupied a core.
     Spend(Duration),
     Drive(TimelineCommand),
+    /// In real time: the state in which it began.
+    Begin(Vec<u8>),
+    /// In real time: from now on time passes by this timeline.
+    Timeline(Timeline),
+    /// In real time: what joins next begins at this moment.
+    Present(SimTime),
+    /// In real time: parts of turns, in the order in which they were made.
+    Turns(PackedTurns),
+    /// In real time: all states have this hash now.
+    Check(u64),
     Command(AgentId, Command),
     SetState(AgentId, Box<Body>),
     AddRigid(String, Box<Rigid>),
@@ -66,13 +84,51 @@ pub(super) enum Entry {
     End(u64),
 }
 
+/// Parts of turns, each with its time since the one before.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct PackedTurns {
+    from: Duration,
+    parts: Vec<PackedPart>,
+}
+
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+struct PackedPart {
+    kind: PartKind,
+    agent: AgentId,
+    /// Readings of two clocks of a pool may be in another order than what was made with them.
+    after_ns: i64,
+}
+
+impl PackedTurns {
+    fn pack(parts: &[TurnPart]) -> Self {
+        let from = parts.first().map_or(Duration::ZERO, |part| part.wall);
+        let mut before = from;
+        let pack = |TurnPart { kind, agent, wall }: &TurnPart| {
+            let after_ns = nanos(*wall) - nanos(before);
+            before = *wall;
+            PackedPart { kind: *kind, agent: *agent, after_ns }
+        };
+        Self { from, parts: parts.iter().map(pack).collect() }
+    }
+
+    /// The parts, in their order.
+    pub fn parts(&self) -> impl Iterator<Item = TurnPart> + '_ {
+        let mut wall_ns = nanos(self.from);
+        self.parts.iter().map(move |PackedPart { kind, agent, after_ns }| {
+            wall_ns = wall_ns.saturating_add(*after_ns);
+            TurnPart { kind: *kind, agent: *agent, wall: Duration::from_nanos(wall_ns.max(0) as u64) }
+        })
+    }
+}
+
+fn nanos(wall: Duration) -> i64 {
+    i64::try_from(wall.as_nanos()).unwrap_or(i64::MAX)
+}
+
 /// Why a world is not recorded, or a recording could not be kept.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// A world in real time: when its objects step is not known from what is done to it.
-    #[error("only a world in lockstep can be recorded; this one runs in real time")]
-    RealTime,
     /// The world was stopped, or is a replay.
     #[error("a world that was stopped, or is a replay, cannot be recorded")]
     Stopped,
@@ -210,6 +266,12 @@ impl Recording {
         }
     }
 
+    /// Whether it is of a world on threads or in a pool, whose turns are in it.
+    #[must_use]
+    pub const fn is_real_time(&self) -> bool {
+        self.head.real_time
+    }
+
     pub(super) const fn identity(&self) -> &SceneIdentity {
         &self.head.of
     }
@@ -235,6 +297,9 @@ pub(super) struct Recorder {
     entries: Vec<Entry>,
     /// For each agent, how often its governor asked for nothing since it last asked for something.
     silent_turns: BTreeMap<AgentId, u32>,
+    /// Up to when turns are written, and when states were last hashed.
+    written: Duration,
+    hashed: Duration,
     /// Why no more is written.
     failed: Option<std::io::Error>,
 }
@@ -248,12 +313,14 @@ impl Recorder {
         mut out: Box<dyn Write + Send>,
         of: SceneIdentity,
         scene: Option<SceneText>,
+        real_time: bool,
     ) -> Result<Self, RecordError> {
         out.write_all(&MAGIC)?;
         out.write_all(&FORMAT.to_le_bytes())?;
-        let (mut program, mut head) = (PROGRAM.to_owned(), Head { of, scene });
+        let (mut program, mut head) = (PROGRAM.to_owned(), Head { of, scene, real_time });
         write_chunk(&mut *out, |archive| archive_values!(archive, program, head))?;
-        Ok(Self { out, entries: Vec::new(), silent_turns: BTreeMap::new(), failed: None })
+        let (entries, silent_turns) = (Vec::new(), BTreeMap::new());
+        Ok(Self { out, entries, silent_turns, written: Duration::ZERO, hashed: Duration::ZERO, failed: None })
     }
 
     /// The file at `path`, anew.
@@ -272,6 +339,20 @@ impl Recorder {
             self.flush();
         }
         self.entries.push(entry);
+    }
+
+    /// Writes down the parts of turns that were made, and now and then what `hash` says that states are then.
+    pub fn note_turns(&mut self, parts: &[TurnPart], hash: impl FnOnce() -> u64) {
+        let Some(newest) = parts.last().map(|part| part.wall) else { return };
+        self.entries.push(Entry::Turns(PackedTurns::pack(parts)));
+        if newest > self.hashed + CHECK_INTERVAL {
+            self.hashed = newest;
+            self.entries.push(Entry::Check(hash()));
+        }
+        if newest > self.written + WRITE_INTERVAL || parts.len() >= CHUNK_PARTS {
+            self.written = newest;
+            self.flush();
+        }
     }
 
     /// Writes down how the governor of `agent` has answered.

@@ -20,7 +20,7 @@ use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
-    Timeline, TimelineCommand, state_hash, wait_until,
+    Timeline, TimelineCommand, TurnOrder, state_hash, wait_until,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -167,6 +167,13 @@ pub(super) enum State {
     Stopped { now: Duration, time: SimTime, timeline: Timeline },
 }
 
+/// What a world has besides its run.
+pub(super) struct Setting {
+    pub surroundings: Arc<ClusterScene>,
+    pub clock: Arc<SystemClock>,
+    pub log: Arc<Log>,
+}
+
 /// Why a replay refuses what is asked of it.
 const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
@@ -184,21 +191,9 @@ impl World {
     /// # Errors
     /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
     pub fn start_governed(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Self, WorldError> {
-        Self::start_logged(scene, executor, govern, Log::default())
-    }
-
-    pub(super) fn start_logged(
-        scene: &Scene,
-        executor: ExecutorKind,
-        govern: Govern<'_>,
-        log: Log,
-    ) -> Result<Self, WorldError> {
-        let (executor, log) = (assemble::executor(executor, scene.agents.len()), Arc::new(log));
+        let (executor, log) = (assemble::executor(executor, scene.agents.len()), Arc::<Log>::default());
         let surroundings = assemble::surroundings(scene)?;
-        let spawns = match executor {
-            ExecutorKind::Lockstep => assemble::spawns(scene, &surroundings, executor, &mut logged(govern, &log))?,
-            _ => assemble::spawns(scene, &surroundings, executor, govern)?,
-        };
+        let spawns = assemble::spawns(scene, &surroundings, executor, &mut logged(govern, &log))?;
         let clock = Arc::new(SystemClock::new());
         let priority = assemble::priority(scene);
         let mut run: Box<dyn Run> = match executor {
@@ -209,6 +204,12 @@ impl World {
         if executor != ExecutorKind::Lockstep {
             run.drive(TimelineCommand::Pause);
         }
+        Ok(Self::of_run(scene, executor, run, Setting { surroundings, clock, log }))
+    }
+
+    /// The world of a run of the agents of `scene`.
+    pub(super) fn of_run(scene: &Scene, executor: ExecutorKind, run: Box<dyn Run>, setting: Setting) -> Self {
+        let Setting { surroundings, clock, log } = setting;
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
         let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
@@ -228,7 +229,7 @@ impl World {
             is_free: AtomicBool::new(false),
             log,
         };
-        Ok(Self { shared: Arc::new(shared) })
+        Self { shared: Arc::new(shared) }
     }
 
     /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.
@@ -284,7 +285,8 @@ impl World {
         if self.shared.log.is_replayed() {
             return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
         }
-        self.shared.log.note(|| Entry::Restore(checkpoint.to_bytes()));
+        // in real time the turns in progress end before it is read
+        self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
         let outcome = read_state(run.as_mut(), &checkpoint.state);
         self.see(run.as_ref());
         let Err(reason) = outcome else { return Ok(()) };
@@ -359,15 +361,17 @@ impl World {
             }
             _ => {}
         }
-        // a recording has the order of commands and waits
         let log = &self.shared.log;
         if log.is_replayed() {
             return Err(refused(REPLAYED.to_owned()));
         }
-        let _order = log.is_recorded().then(|| self.state());
-        agent.send(command).map_err(|error| refused(error.to_string()))?;
-        log.note(|| Entry::Command(object.id(), command));
-        Ok(())
+        let _waits = self.between_calls();
+        let note = |log: &Log, sent: &Result<(), String>| {
+            if sent.is_ok() {
+                log.note(|| Entry::Command(object.id(), command));
+            }
+        };
+        self.in_order(|| agent.send(command).map_err(|error| error.to_string()), note).map_err(refused)
     }
 
     /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
@@ -412,9 +416,9 @@ impl World {
         if log.is_replayed() {
             return refused(REPLAYED.to_owned());
         }
-        let _order = log.is_recorded().then(|| self.state());
-        agent.set_state(state.clone());
-        log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
+        let _waits = self.between_calls();
+        let note = |log: &Log, (): &()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
+        self.in_order(|| agent.set_state(state.clone()), note);
         Ok(())
     }
 
@@ -442,12 +446,15 @@ impl World {
         let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        let joined = run.add(spawn)?.id();
-        match entry {
-            Some(entry) => log.note(|| entry),
-            None => log.note_begun(),
-        }
-        Ok(self.shared.tag.object(joined))
+        let note = |log: &Log, joined: &Result<AgentHandle, RunError>| {
+            let (Ok(joined), Some(entry)) = (joined, entry) else { return log.note_begun() };
+            if self.executor() != ExecutorKind::Lockstep {
+                log.note(|| Entry::Present(joined.latest().moment()));
+            }
+            log.note(|| entry);
+        };
+        let joined = self.in_order(|| run.add(spawn), note)?;
+        Ok(self.shared.tag.object(joined.id()))
     }
 
     /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
@@ -463,9 +470,12 @@ impl World {
             return Err(refused(REPLAYED.to_owned()));
         }
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        run.remove(object.id()).map_err(|error| refused(error.to_string()))?;
-        log.note(|| Entry::Remove(object.id()));
-        Ok(())
+        let note = |log: &Log, left: &Result<(), String>| {
+            if left.is_ok() {
+                log.note(|| Entry::Remove(object.id()));
+            }
+        };
+        self.in_order(|| run.remove(object.id()).map_err(|error| error.to_string()), note).map_err(refused)
     }
 
     /// Events of its objects from now on.
@@ -541,7 +551,9 @@ impl World {
 
     /// Lets a frame's own `work` pass: it occupies a core of the declared machine in lockstep, and has passed by itself elsewhere.
     pub fn spend(&self, work: Duration) {
-        self.with_run(|| Entry::Spend(work), |run| run.spend(work));
+        if self.executor() == ExecutorKind::Lockstep {
+            self.with_run(|| Entry::Spend(work), |run| run.spend(work));
+        }
     }
 
     /// The timeline in force.
@@ -555,7 +567,18 @@ impl World {
 
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&self, drive: TimelineCommand) {
-        self.with_run(|| Entry::Drive(drive), |run| run.drive(drive));
+        if self.executor() == ExecutorKind::Lockstep {
+            return self.with_run(|| Entry::Drive(drive), |run| run.drive(drive));
+        }
+        let State::Running(run) = &mut *self.state() else { return };
+        self.see(run.as_ref());
+        let note = |log: &Log, timeline: &Timeline| log.note(|| Entry::Timeline(*timeline));
+        let act = || {
+            run.drive(drive);
+            run.timeline()
+        };
+        self.in_order(act, note);
+        self.see(run.as_ref());
     }
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
@@ -617,7 +640,28 @@ impl World {
         matches!(*self.state(), State::Stopped { .. })
     }
 
-    /// Does something with a world that runs; nothing with one that was stopped.
+    /// Does something to the world and notes what, with no turn in progress where the order of turns is recorded.
+    fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&Log, &T)) -> T {
+        let log = &self.shared.log;
+        let order = log.order();
+        let _held = order.as_deref().map(TurnOrder::between);
+        let done = act();
+        // a recording that has begun meanwhile does not have it
+        if order.is_some() || self.executor() == ExecutorKind::Lockstep {
+            note(log, &done);
+        } else {
+            log.note_begun();
+        }
+        done
+    }
+
+    /// Waits until no call lets time pass, where a recording has the order of calls alone.
+    fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
+        let is_ordered = self.executor() == ExecutorKind::Lockstep && self.shared.log.is_recorded();
+        is_ordered.then(|| self.state())
+    }
+
+    /// Does something with a world in lockstep that runs; nothing with one that was stopped.
     fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
             self.shared.log.note(entry);

@@ -12,6 +12,7 @@ use super::super::clock::Clock;
 use super::super::cluster::Handover;
 use super::super::sleep::SleepRegistry;
 use super::super::table::Table;
+use super::super::turn_order::{PartKind, TurnOrder};
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
 use crossbeam::utils::CachePadded;
@@ -37,6 +38,8 @@ pub(super) struct PoolState {
     pub handles: Agents,
     queues: Vec<CachePadded<WorkerQueue>>,
     resting: Table<AtomicCell<Option<Box<AgentRunner>>>>,
+    /// Where the parts of turns are noted; `None` of a run that is not recorded. It changes where no worker works.
+    pub order: Mutex<Option<Arc<TurnOrder>>>,
     /// Those that make no more turns.
     #[expect(clippy::vec_box, reason = "agents move as the boxes that all else holds them in")]
     parked: Mutex<Vec<Box<AgentRunner>>>,
@@ -60,18 +63,21 @@ impl PoolState {
     ) -> Self {
         let resting = Table::of(handles.len());
         let queues = std::iter::repeat_with(CachePadded::default).take(workers).collect();
-        let (timeline, parked) = (SharedTimeline::new(), Mutex::default());
-        let state = Self { clock, timeline, sleep, handles, queues, resting, parked };
+        let (timeline, order, parked) = (SharedTimeline::new(), Mutex::default(), Mutex::default());
+        let state = Self { clock, timeline, sleep, handles, queues, resting, order, parked };
         state.distribute(actors, Duration::ZERO);
         state
     }
 
     /// Gives agents that make turns of their own to workers, by their numbers.
     pub fn distribute(&self, actors: Vec<Option<Box<AgentRunner>>>, now: Duration) {
-        let (timeline, workers) = (self.timeline.read(), self.queues.len());
+        let (timeline, order, workers) = (self.timeline.read(), self.order(), self.queues.len());
         // neighbours in the scene share a worker, and still every worker gets agents of each kind
         let block = (actors.len() / (8 * workers)).clamp(1, 64);
         for (at, mut actor) in actors.into_iter().enumerate().filter_map(|(at, actor)| Some((at, actor?))) {
+            if let (Some(order), true) = (&order, actor.open.is_some()) {
+                order.hold().note(PartKind::Show, actor.id(), now);
+            }
             match actor.next(&timeline, now) {
                 Next::Parked => self.store_parked(actor),
                 Next::Rest => {
@@ -82,6 +88,11 @@ impl PoolState {
                 Next::Due | Next::Join(_) => self.queues[at / block % workers].with(|queue| queue.put(actor, now)),
             }
         }
+    }
+
+    /// Where the parts of turns are noted.
+    pub fn order(&self) -> Option<Arc<TurnOrder>> {
+        self.order.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Stores one that makes no more turns.

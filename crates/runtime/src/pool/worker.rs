@@ -7,6 +7,8 @@ use super::super::agent_clock::Timeline;
 use super::super::agent_runner::{AgentRunner, Next};
 use super::super::cluster::hand_over;
 use super::super::cpu::CpuShare;
+use super::super::turn_order::{PartKind, TurnOrder, in_force};
+use super::super::turn_parts::Begun;
 use super::shared::PoolState;
 use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
@@ -36,15 +38,16 @@ pub(super) struct Worker {
     now: Duration,
     awake_since: Duration,
     given_up: bool,
+    order: Option<Arc<TurnOrder>>,
     /// The agent of the last turn, if it waits for another one.
     last: Option<Box<AgentRunner>>,
 }
 
 impl Worker {
     pub fn new(state: Arc<PoolState>, at: usize, watchdog: Arc<WatchdogWord>) -> Self {
-        let (now, timeline) = (state.clock.now(), state.timeline.read());
-        let cpu = CpuShare::new();
-        Self { state, at, watchdog, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
+        let (now, timeline, order) = (state.clock.now(), state.timeline.read(), state.order());
+        let (cpu, awake_since) = (CpuShare::new(), now);
+        Self { state, at, watchdog, cpu, turns: 0, timeline, now, awake_since, given_up: false, order, last: None }
     }
 
     /// Works until the run is to end, or until the worker is given up.
@@ -90,7 +93,11 @@ impl Worker {
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
         let watched = self.watchdog.begin(self.turns, actor.id());
-        let begun = actor.begin(timeline, began);
+        let order = in_force(&mut self.order);
+        let held = order.as_deref().map(TurnOrder::hold);
+        // a part uses the piece that is in force when its place in the order comes
+        let timeline = &held.as_ref().map_or(*timeline, |_| self.state.timeline.read());
+        let Begun { effort, mut held } = actor.begin_in(timeline, began, held);
         if !self.watchdog.end(watched) {
             self.given_up = true;
             return None;
@@ -101,16 +108,23 @@ impl Worker {
         // the clock is read once per turn: the time after the step counts for the next one
         self.now = self.state.clock.now();
         let wall = self.now.saturating_sub(began);
-        let next = match begun {
+        held.iter_mut().for_each(|held| held.note_end(self.now));
+        let next = match effort {
             None => Next::Parked,
             Some(_) => actor.finish(timeline, self.now, wall.as_secs_f64()),
         };
         actor.count(wall);
         actor.settle(self.cpu.count(wall));
+        if let (Next::Join(_), Some(held)) = (next, &mut held) {
+            held.note(PartKind::Join, actor.id(), self.now);
+        }
+        if let Next::Join(leader) = next {
+            return hand_over(actor, leader).err();
+        }
+        drop(held);
         match next {
-            Next::Due => Some(actor),
+            Next::Due | Next::Join(_) => Some(actor),
             Next::Rest => self.store_resting(actor, timeline),
-            Next::Join(leader) => hand_over(actor, leader).err(),
             Next::Parked => {
                 self.state.store_parked(actor);
                 None
@@ -148,9 +162,13 @@ impl Worker {
     /// Wakes `actor` if it was woken by a caller; else stores it at rest again.
     fn wake(&self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         loop {
+            let mut held = self.order.as_deref().map(TurnOrder::hold);
+            let timeline = &held.as_ref().map_or(*timeline, |_| self.state.timeline.read());
             if actor.try_wake(timeline, self.now) {
+                held.iter_mut().for_each(|held| held.note(PartKind::Wake, actor.id(), self.now));
                 return Some(actor);
             }
+            drop(held);
             actor = self.state.store_resting(actor)?;
         }
     }

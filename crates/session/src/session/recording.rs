@@ -18,8 +18,7 @@ impl Session {
         Self::open_as(scene, |scene, govern| Ok(World::replay_governed(scene, govern, recording, until)?))
     }
 
-    /// Writes down from now on what is done to its agents, with the text of the scene, so that [`Session::replay`] can do it again. In
-    /// lockstep only.
+    /// Writes down from now on what is done to its agents, with the text of the scene, so that [`Session::replay`] can do it again.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.

@@ -1,0 +1,206 @@
+//! A recording of a world on threads or in a pool repeats it on one thread, to the bit.
+
+use glam::{DQuat, DVec3};
+use metachron_contact::joint::JointKind;
+use metachron_core::{Anchor, SimSpan, SimTime};
+use metachron_geometry::Solid;
+use metachron_runtime::{Demand, Governor, TurnMeasure};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{
+    BadRecording, Command, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World,
+};
+use std::io::Write;
+use std::sync::{Arc, Mutex};
+
+/// Bytes that are written while they are kept.
+#[derive(Clone, Default)]
+struct Kept(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Kept {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.lock().unwrap().extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Kept {
+    fn read(&self) -> Result<Recording, BadRecording> {
+        Recording::from_bytes(&self.0.lock().unwrap())
+    }
+}
+
+const fn ms(count: u64) -> SimSpan {
+    SimSpan::from_millis(count)
+}
+
+fn recorded(world: &World) -> Kept {
+    let kept = Kept::default();
+    world.record_to(Box::new(kept.clone()), None).unwrap();
+    kept
+}
+
+/// Plays all of a recording.
+fn replayed(scene: &Scene, recording: Recording) -> World {
+    let world = World::replay(scene, recording, None).unwrap();
+    while world.replayed().unwrap().unwrap() < 1.0 {
+        world.advance(ms(10));
+    }
+    world
+}
+
+/// A heap that forms and parts, a hinged arm, a tube, and what comes to rest.
+fn scene() -> Scene {
+    let hinge = JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
+    let ball = |x: f64, speed: f64, hz: f64| {
+        Rigid::ball(0.05).mass_kg(0.2).at([x, 0.0, 0.2]).velocity_m_s([speed, 0.0, 0.0]).rate_hz(hz)
+    };
+    let tube = Tube::along(&[[-0.2, 0.1, 0.12], [0.2, 0.1, 0.12]]).radius_m(0.01).segments(6);
+    Scene::builder()
+        .fixed("floor", Solid::Plane)
+        .add("left", ball(-0.3, 1.0, 240.0))
+        .add("right", ball(0.3, -0.7, 170.0))
+        .add("arm", Rigid::capsule(0.02, 0.1).at([0.0, -0.3, 0.3]))
+        .joint("arm", None, hinge, [0.0, -0.3, 0.4])
+        .add("tube", tube)
+        .add("still", Rigid::cuboid([0.05; 3]).at([1.0, 0.0, 0.05]))
+        .build()
+        .unwrap()
+}
+
+const EXECUTORS: [ExecutorKind; 2] = [ExecutorKind::Threads, ExecutorKind::Pool];
+
+/// Lets everything happen that a recording in real time has, half of it from another thread.
+fn play(world: &World) {
+    let [left, arm, still, tube] = world.objects(["left", "arm", "still", "tube"]).unwrap();
+    let hand = world.clone();
+    let pushes = std::thread::spawn(move || {
+        for at in 0..40 {
+            let push = Command::force(Anchor::Local(DVec3::ZERO), DVec3::Y * f64::from(at % 3)).key(1).for_ms(30);
+            hand.command(arm, push).unwrap();
+            hand.command(left, Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::X * 0.01)).unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+    });
+    world.advance(ms(700));
+    let fifth = world.add("fifth", Rigid::ball(0.04).mass_kg(0.1).at([0.0, 0.0, 0.5])).unwrap();
+    world.command(tube, Command::velocity(DVec3::Z, DVec3::ZERO)).unwrap();
+    world.advance(ms(600));
+    world.remove(left).unwrap();
+    world.command(still, Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::Z * 0.3)).unwrap();
+    world.advance(ms(500));
+    world.command(fifth, Command::teleport(DVec3::new(0.1, 0.0, 0.4), DQuat::IDENTITY)).unwrap();
+    world.advance(ms(300));
+    pushes.join().unwrap();
+}
+
+#[test]
+fn a_replay_of_turns_ends_with_the_same_bits_whatever_was_done() {
+    for executor in EXECUTORS {
+        let world = World::start(&scene(), executor).unwrap();
+        let kept = recorded(&world);
+        world.set_pace(Pace::Factor(4.0)).unwrap();
+        let mut events = world.events(EventFilter::all());
+        play(&world);
+        let all: Vec<_> = events.drain().collect();
+        let is_told = |which: fn(&Happening) -> bool| all.iter().any(|event| which(&event.what));
+        assert!(is_told(|what| matches!(what, Happening::Contact(contact) if contact.begins)));
+        assert!(is_told(|what| matches!(what, Happening::Contact(contact) if !contact.begins)));
+        assert!(is_told(|what| matches!(what, Happening::Joined(_))) && is_told(|what| *what == Happening::Left));
+        assert!(is_told(|what| *what == Happening::Rests) && is_told(|what| *what == Happening::Wakes));
+        assert!(world.end_recording().unwrap());
+        let recording = kept.read().unwrap();
+        assert!(recording.is_complete() && recording.is_real_time());
+        let hash = recording.hash();
+        let again = replayed(&scene(), recording);
+        assert_eq!(Some(again.hash()), hash, "{executor:?}");
+    }
+}
+
+#[test]
+fn a_recording_of_turns_that_begins_later_and_goes_back_is_repeated() {
+    for executor in EXECUTORS {
+        let world = World::start(&scene(), executor).unwrap();
+        world.set_pace(Pace::Free).unwrap();
+        world.advance(ms(400));
+        let mark = world.checkpoint().unwrap();
+        world.advance(ms(200));
+        let kept = recorded(&world);
+        world.advance(ms(300));
+        world.restore(&mark).unwrap();
+        world.advance(ms(300));
+        world.stop();
+        let recording = kept.read().unwrap();
+        let hash = recording.hash();
+        assert_eq!(Some(replayed(&scene(), recording).hash()), hash, "{executor:?}");
+    }
+}
+
+#[test]
+fn a_recording_of_turns_that_was_cut_short_is_repeated_to_its_last_whole_chunk() {
+    let world = World::start(&scene(), ExecutorKind::Threads).unwrap();
+    let kept = recorded(&world);
+    world.set_pace(Pace::Factor(4.0)).unwrap();
+    for _ in 0..40 {
+        world.advance(ms(100));
+    }
+    world.end_recording().unwrap();
+    let whole = kept.0.lock().unwrap().clone();
+    let times: Vec<_> = [3, 2, 1]
+        .map(|share| whole.len() / share - 1)
+        .into_iter()
+        .map(|length| {
+            let recording = Recording::from_bytes(&whole[..length]).unwrap();
+            assert!(!recording.is_complete() && recording.lost_bytes() > 0);
+            replayed(&scene(), recording).time()
+        })
+        .collect();
+    assert!(times.is_sorted() && times[2] > times[0], "{times:?}");
+}
+
+#[test]
+fn a_replay_of_turns_stops_where_it_is_told_to_and_is_of_its_scene_alone() {
+    let world = World::start(&scene(), ExecutorKind::Pool).unwrap();
+    let kept = recorded(&world);
+    world.set_pace(Pace::Free).unwrap();
+    world.advance(ms(300));
+    world.end_recording().unwrap();
+    let until = SimTime::ZERO + ms(120);
+    let again = World::replay(&scene(), kept.read().unwrap(), Some(until)).unwrap();
+    again.advance(ms(60_000));
+    assert!(again.replayed() == Some(Ok(1.0)) && again.time() >= until && again.time() < until + ms(30));
+    let other = Scene::builder().add("ball", Rigid::ball(0.05)).build().unwrap();
+    let error = World::replay(&other, kept.read().unwrap(), None).unwrap_err().to_string();
+    assert!(error.contains("moving objects") && error.contains("expected 1"), "{error}");
+}
+
+/// Asks for another step after the time that its turns take, which no replay has.
+struct Moody(u64);
+
+impl Governor for Moody {
+    fn after_step(&mut self, turn: &TurnMeasure) -> Demand {
+        self.0 += 1;
+        let dt = self.0.is_multiple_of(3).then(|| SimSpan::from_nanos(3_000_000 + (turn.work_s * 1e9) as u64 % 4096));
+        Demand { dt, resolution: None }
+    }
+}
+
+#[test]
+fn a_replay_of_turns_takes_what_governors_answered_from_the_recording() {
+    let mut scene = scene();
+    scene.agents.iter_mut().for_each(|member| member.pace.dt_range = (ms(1), ms(9)));
+    let moody = &mut |_: &Member| Some(Box::new(Moody(0)) as Box<dyn Governor>);
+    let world = World::start_governed(&scene, ExecutorKind::Threads, moody).unwrap();
+    let kept = recorded(&world);
+    world.set_pace(Pace::Factor(4.0)).unwrap();
+    world.advance(ms(1000));
+    world.end_recording().unwrap();
+    let (recording, others) = (kept.read().unwrap(), &mut |_: &Member| Some(Box::new(Moody(7)) as Box<dyn Governor>));
+    let hash = recording.hash();
+    let again = World::replay_governed(&scene, others, recording, None).unwrap();
+    again.advance(ms(60_000));
+    assert_eq!((again.replayed(), Some(again.hash())), (Some(Ok(1.0)), hash));
+}
