@@ -4,7 +4,7 @@
 
 use super::MetachronWorld;
 use super::axes::{to_bevy, to_metachron};
-use super::messages::{Refused, refuse};
+use super::messages::Refused;
 use super::objects::{Followers, Follows};
 use bevy_ecs::lifecycle::HookContext;
 use bevy_ecs::prelude::*;
@@ -68,19 +68,20 @@ pub(super) struct Held {
     drag: Drag,
 }
 
-fn let_go(mut world: DeferredWorld<'_>, context: HookContext) {
-    take_back(&mut world, context.entity);
+fn let_go(world: DeferredWorld<'_>, context: HookContext) {
+    take_back(&world, context.entity);
 }
 
 /// Takes the spring back that an entity's drag has sent to the object that it follows.
-pub(super) fn take_back(world: &mut DeferredWorld<'_>, entity: Entity) {
+pub(super) fn take_back(world: &DeferredWorld<'_>, entity: Entity) {
     let (Some(drag), Some(follows)) = (world.get::<Drag>(entity).copied(), world.get::<Follows>(entity).copied())
     else {
         return;
     };
-    let Some(simulation) = world.get_resource::<MetachronWorld>() else { return };
-    let outcome = simulation.command(follows.0, drag.command().taken_back());
-    refuse(world, entity, outcome);
+    if let Some(simulation) = world.get_resource::<MetachronWorld>() {
+        // an object that takes no such command has no such spring
+        let _ = simulation.command(follows.0, drag.command().taken_back());
+    }
 }
 
 impl Drag {
@@ -136,11 +137,13 @@ fn seize(world: &MetachronWorld, followers: &Followers, ray: Ray3d, spring: Spri
 /// Sends the springs of new and changed drags.
 pub(super) fn pull(
     world: Res<'_, MetachronWorld>,
-    drags: Query<'_, '_, (Entity, &Follows, &Drag), Or<(Changed<Drag>, Changed<Follows>)>>,
+    drags: Query<'_, '_, (Entity, Ref<'_, Follows>, Ref<'_, Drag>)>,
     mut commands: Commands<'_, '_>,
     mut refused: MessageWriter<'_, Refused>,
 ) {
-    for (entity, follows, drag) in &drags {
+    let is_news =
+        |(_, follows, drag): &(Entity, Ref<'_, Follows>, Ref<'_, Drag>)| follows.is_changed() || drag.is_changed();
+    for (entity, follows, drag) in drags.iter().filter(is_news) {
         match world.command(follows.0, drag.command()) {
             Ok(()) | Err(WorldError::Gone { .. }) => {}
             Err(error) => {

@@ -2,10 +2,10 @@
 //!
 //! In: components. Out: objects that join and leave, transforms. Never here: meshes, time.
 
+use super::MetachronWorld;
 use super::axes::{rotation_to_bevy, to_bevy};
 use super::drag::take_back;
 use super::messages::{Refused, refuse};
-use super::MetachronWorld;
 use bevy_ecs::lifecycle::HookContext;
 use bevy_ecs::prelude::*;
 use bevy_ecs::world::DeferredWorld;
@@ -70,7 +70,7 @@ fn begin_to_follow(mut world: DeferredWorld<'_>, context: HookContext) {
 }
 
 fn cease_to_follow(mut world: DeferredWorld<'_>, context: HookContext) {
-    take_back(&mut world, context.entity);
+    take_back(&world, context.entity);
     let followed = world.get::<Follows>(context.entity).map(|follows| follows.0);
     if let (Some(object), Some(mut followers)) = (followed, world.get_resource_mut::<Followers>())
         && followers.of(object) == Some(context.entity)

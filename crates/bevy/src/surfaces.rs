@@ -17,8 +17,8 @@ use metachron_world::{Frame, Object};
 /// Gives an entity that [`Follows`] an object a [`Mesh3d`] of the object's surface: that of a rigid body in its own axes, made once; those of
 /// tubes, ropes, sheets and solids in the world's axes and those of tools in their own, written again whenever they move.
 ///
-/// Where cells are removed or a body divides itself otherwise the triangles are new too. Points of a mesh that bends are not within the box
-/// that Bevy's frustum culling found at first: give it `NoFrustumCulling`. Without `Assets<Mesh>` in the app nothing is made.
+/// Where cells are removed or a body divides itself otherwise the triangles are new too. Bevy finds the box of a changed mesh anew by itself.
+/// Without `Assets<Mesh>` in the app nothing is made.
 #[derive(Debug, Default, Component)]
 pub struct SurfaceMesh {
     handle: Option<Handle<Mesh>>,
