@@ -27,7 +27,7 @@ fn main() -> Result<AppExit, Box<dyn std::error::Error>> {
     Ok(App::new()
         .add_plugins((TaskPoolPlugin::default(), TimePlugin, TransformPlugin, ScheduleRunnerPlugin::run_loop(FRAME)))
         .init_resource::<Assets<Mesh>>()
-        .add_plugins(MetachronPlugin::start(&scene, ExecutorKind::Auto)?)
+        .add_plugins(MetachronPlugin::start(&scene, ExecutorKind::Lockstep)?)
         .add_systems(Startup, spawn)
         .add_systems(Update, (show.run_if(on_timer(Duration::from_millis(200))), listen, end))
         .run())
@@ -55,7 +55,7 @@ fn show(
         match mesh {
             Some(VertexAttributeValues::Float32x3(points)) => {
                 let heights = || points.iter().map(|point| point[1]);
-                let (low, high) = (heights().fold(f32::INFINITY, f32::min), heights().fold(0.0, f32::max));
+                let (low, high) = (heights().fold(f32::MAX, f32::min), heights().fold(f32::MIN, f32::max));
                 print!("   {} {low:.3} to {high:.3}", label.0);
             }
             _ => print!("   {} {:.3}", label.0, transform.translation.y),
