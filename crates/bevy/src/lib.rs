@@ -14,7 +14,7 @@ pub use axes::{rotation_to_bevy, rotation_to_metachron, to_bevy, to_metachron};
 pub use drag::{Drag, PointerDrag, Spring};
 pub use messages::{ContactMessage, Refused, StateMessage};
 pub use objects::{Follows, Simulated};
-pub use surfaces::{SurfaceMesh, mesh_of};
+pub use surfaces::{SurfaceMesh, fixed_mesh};
 
 use bevy_app::{App, Plugin, PostUpdate};
 use bevy_asset::AssetEventSystems;

@@ -12,7 +12,7 @@ use bevy_mesh::{Indices, Mesh, Mesh3d, PrimitiveTopology};
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, RigidState, SimTime, ToolState};
 use metachron_export::Surface;
-use metachron_world::{Frame, Object};
+use metachron_world::{Frame, Object, Scene};
 
 /// Gives an entity that [`Follows`] an object a [`Mesh3d`] of the object's surface: that of a rigid body in its own axes, made once; those of
 /// tubes, ropes, sheets and solids in the world's axes and those of tools in their own, written again whenever they move.
@@ -32,9 +32,13 @@ struct Drawn {
     state: SimTime,
 }
 
-/// A surface as a mesh in Bevy's axes, with smooth normals: such as that of the solids that never move, [`Surface::fixed`].
+/// The solids of a scene that never move as one mesh, for an entity at the origin; a plane is a square of 4 m.
 #[must_use]
-pub fn mesh_of(surface: &Surface) -> Mesh {
+pub fn fixed_mesh(scene: &Scene) -> Mesh {
+    mesh_of(&Surface::fixed(scene))
+}
+
+fn mesh_of(surface: &Surface) -> Mesh {
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default());
     write(&mut mesh, surface);
     mesh

@@ -52,6 +52,17 @@ fn place(app: &App, entity: Entity) -> Vec3 {
     app.world().get::<GlobalTransform>(entity).unwrap().translation()
 }
 
+/// Triangles and points of an entity's mesh.
+fn mesh(app: &App, entity: Entity) -> (Vec<u32>, Vec<Vec3>) {
+    let handle = app.world().get::<Mesh3d>(entity).unwrap();
+    let mesh = app.world().resource::<Assets<Mesh>>().get(handle).unwrap();
+    let Some(Indices::U32(triangles)) = mesh.indices() else { panic!("no triangles") };
+    let Some(VertexAttributeValues::Float32x3(points)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else {
+        panic!("no points")
+    };
+    (triangles.clone(), points.iter().map(|p| Vec3::from(*p)).collect())
+}
+
 fn ray_down(x: f32, y: f32) -> Ray3d {
     Ray3d::new(Vec3::new(x, y, 0.0), Dir3::NEG_Y)
 }
@@ -79,23 +90,50 @@ fn the_mesh_of_a_soft_cube_moves_and_keeps_its_triangles() {
     let cube = Soft::cuboid([0.2; 3], [2; 3]).young_pa(2e4).at([0.0, 0.0, 0.2]);
     let cube = app.world_mut().spawn((Simulated::new(cube), SurfaceMesh::default())).id();
     app.update();
-    let read = |app: &App| {
-        let handle = app.world().get::<Mesh3d>(cube).unwrap();
-        let mesh = app.world().resource::<Assets<Mesh>>().get(handle).unwrap();
-        let Some(Indices::U32(indices)) = mesh.indices() else { panic!("no indices") };
-        let Some(VertexAttributeValues::Float32x3(points)) = mesh.attribute(Mesh::ATTRIBUTE_POSITION) else {
-            panic!("no points")
-        };
-        (indices.clone(), points.iter().map(|p| Vec3::from(*p)).collect::<Vec<_>>())
-    };
-    let (triangles, before) = read(&app);
+    let (triangles, before) = mesh(&app, cube);
     assert!(before.iter().all(|p| (0.1 - 1e-3..0.3 + 1e-3).contains(&p.y)), "the cube is where it began");
     run::<StateMessage>(&mut app, 1.0);
-    let (same, after) = read(&app);
+    let (same, after) = mesh(&app, cube);
     assert_eq!(triangles, same);
     let lowest = |points: &[Vec3]| points.iter().map(|p| p.y).fold(f32::INFINITY, f32::min);
     assert!((lowest(&before) - 0.1).abs() < 1e-3 && lowest(&after).abs() < 1e-3, "it came down to the floor");
     assert_eq!(place(&app, cube), Vec3::ZERO);
+}
+
+#[test]
+fn a_mesh_has_other_triangles_when_cells_are_removed() {
+    let mut app = app(ExecutorKind::Lockstep);
+    let block = Soft::cuboid([0.2; 3], [3; 3]).young_pa(2e4).at([0.0, 0.0, 0.1]);
+    let block = app.world_mut().spawn((Simulated::new(block).named("block"), SurfaceMesh::default())).id();
+    app.update();
+    let (before, _) = mesh(&app, block);
+    let world = app.world().resource::<MetachronWorld>();
+    // the cell at a corner: its three outer faces go, and three inner ones come
+    let corner = DVec3::new(0.0667, 0.0667, 0.1667);
+    world.command(world.object("block").unwrap(), Command::carve(corner, corner, 0.01)).unwrap();
+    run::<StateMessage>(&mut app, 0.1);
+    let (after, points) = mesh(&app, block);
+    assert_ne!(before, after);
+    assert!(points.iter().all(|p| p.distance(Vec3::new(0.1, 0.2, -0.1)) > 0.05), "the corner is gone");
+}
+
+#[test]
+fn an_object_of_the_scene_is_followed_and_drawn_in_its_own_axes() {
+    let capsule = Rigid::capsule(0.1, 0.3).at([0.0, 2.0, 1.0]).turned(DQuat::from_rotation_x(0.5)).gravity_scale(0.0);
+    let scene = Scene::builder().add("capsule", capsule).build().unwrap();
+    let mut app = App::new();
+    app.add_plugins((TaskPoolPlugin::default(), TimePlugin, TransformPlugin))
+        .init_resource::<Assets<Mesh>>()
+        .add_plugins(MetachronPlugin::start(&scene, ExecutorKind::Lockstep).unwrap());
+    let object = app.world().resource::<MetachronWorld>().object("capsule").unwrap();
+    let entity = app.world_mut().spawn((Follows(object), SurfaceMesh::default())).id();
+    app.update();
+    let shown = app.world().get::<GlobalTransform>(entity).unwrap();
+    assert!(shown.translation().distance(Vec3::new(0.0, 1.0, -2.0)) < 1e-6, "{shown:?}");
+    assert!((shown.rotation() * Vec3::Y).distance(Vec3::new(0.0, 0.5_f32.cos(), 0.5_f32.sin())) < 1e-6);
+    let (_, points) = mesh(&app, entity);
+    let reach = |of: fn(&Vec3) -> f32| points.iter().map(|p| of(p).abs()).fold(0.0, f32::max);
+    assert!((reach(|p| p.y) - 0.4).abs() < 1e-3 && (reach(|p| p.x) - 0.1).abs() < 1e-3, "it stands along y");
 }
 
 #[test]
