@@ -1,14 +1,17 @@
 //! Entities and objects: which entity brought an object into the world, and which one follows which.
 //!
-//! In: components. Out: objects that join and leave, transforms. Never here: meshes, time.
+//! In: components. Out: objects that join and leave, transforms of a frame. Never here: what a mesh is made of, time.
 
 use super::MetachronWorld;
 use super::axes::{rotation_to_bevy, to_bevy};
 use super::drag::take_back;
 use super::messages::{Refused, refuse};
+use super::surfaces::SurfaceMesh;
+use bevy_asset::Assets;
 use bevy_ecs::lifecycle::HookContext;
 use bevy_ecs::prelude::*;
 use bevy_ecs::world::DeferredWorld;
+use bevy_mesh::Mesh;
 use bevy_transform::components::Transform;
 use metachron_core::Body;
 use metachron_world::{Frame, Object, Part, WorldError};
@@ -43,7 +46,7 @@ impl Simulated {
 }
 
 /// Leads the entity's [`Transform`] by an object: centre of mass and rotation of a rigid body, tip and rotation of a tool. What bends has no
-/// place of its own: its entity stays at the origin, where its [`super::SurfaceMesh`] is in the world's axes.
+/// place of its own: its entity stays at the origin, where its [`SurfaceMesh`] is in the world's axes.
 ///
 /// The newest state of the object is led on by its velocities to the world's time, for at most 0.1 s. The scale is left as it is. A parent's
 /// transform comes on top: entities that follow have none, or one at the origin. When the object has left the entity stays where it was.
@@ -106,12 +109,22 @@ pub(super) fn join(
     }
 }
 
-/// Leads the entities by their objects.
-pub(super) fn place(world: Res<'_, MetachronWorld>, mut followers: Query<'_, '_, (&Follows, &mut Transform)>) {
+/// Leads the entities by their objects, and bends their meshes, all at one moment.
+pub(super) fn show(
+    world: Res<'_, MetachronWorld>,
+    mut meshes: Option<ResMut<'_, Assets<Mesh>>>,
+    mut followers: Query<'_, '_, (Entity, &Follows, &mut Transform, Option<&mut SurfaceMesh>)>,
+    mut commands: Commands<'_, '_>,
+) {
     let frame = world.frame();
-    for (follows, mut transform) in &mut followers {
-        if let Ok(place) = place_of(&frame, follows.0) {
-            transform.set_if_neq(place.with_scale(transform.scale));
+    for (entity, follows, mut transform, mesh) in &mut followers {
+        // what has left stays where it was
+        let Ok(place) = place_of(&frame, follows.0) else { continue };
+        transform.set_if_neq(place.with_scale(transform.scale));
+        if let (Some(mut mesh), Some(meshes)) = (mesh, &mut meshes)
+            && let Some(fresh) = mesh.redraw(&frame, follows.0, meshes)
+        {
+            commands.entity(entity).insert(fresh);
         }
     }
 }

@@ -3,9 +3,7 @@
 //! In: shapes and newest states. Out: meshes whose points move; triangles are written again only where they changed.
 //! Never here: materials, places of entities.
 
-use super::MetachronWorld;
 use super::axes::to_bevy;
-use super::objects::Follows;
 use bevy_asset::{Assets, Handle, RenderAssetUsages};
 use bevy_ecs::prelude::*;
 use bevy_mesh::{Indices, Mesh, Mesh3d, PrimitiveTopology};
@@ -14,7 +12,7 @@ use metachron_core::{Body, RigidState, SimTime, ToolState};
 use metachron_export::Surface;
 use metachron_world::{Frame, Object, Scene};
 
-/// Gives an entity that [`Follows`] an object a [`Mesh3d`] of the object's surface: that of a rigid body in its own axes, made once; those of
+/// Gives an entity that [`super::Follows`] an object a [`Mesh3d`] of the object's surface: that of a rigid body in its own axes, made once; those of
 /// tubes, ropes, sheets and solids in the world's axes and those of tools in their own, written again whenever they move.
 ///
 /// Where cells are removed or a body divides itself otherwise the triangles are new too. Bevy finds the box of a changed mesh anew by itself.
@@ -44,38 +42,38 @@ fn mesh_of(surface: &Surface) -> Mesh {
     mesh
 }
 
-/// Writes the meshes of all that has moved.
-pub(super) fn redraw(
-    world: Res<'_, MetachronWorld>,
-    meshes: Option<ResMut<'_, Assets<Mesh>>>,
-    mut drawn: Query<'_, '_, (Entity, &Follows, &mut SurfaceMesh)>,
-    mut commands: Commands<'_, '_>,
-) {
-    let Some(mut meshes) = meshes else { return };
-    let frame = world.frame();
-    for (entity, follows, mut of) in &mut drawn {
-        let object = follows.0;
-        let Ok(state) = frame.state(object) else { continue };
+impl SurfaceMesh {
+    /// Writes the mesh if the object has moved; the mesh where it is a new one.
+    pub(super) fn redraw(
+        &mut self,
+        frame: &Frame,
+        object: Object,
+        into: &mut ResMut<'_, Assets<Mesh>>,
+    ) -> Option<Mesh3d> {
+        let state = frame.state(object).ok()?;
         let now = Drawn { object, state: state.moment() };
-        let is_still = matches!(state.body, Body::Rigid(_)) || (state.at_rest && of.drawn == Some(now));
-        if is_still && of.drawn.is_some_and(|before| before.object == object) {
-            continue;
+        let is_same = |before: Drawn| match state.body {
+            Body::Rigid(_) => before.object == object,
+            _ => before == now && state.at_rest,
+        };
+        if self.drawn.is_some_and(is_same) {
+            return None;
         }
-        let Some(surface) = surface(&world, &frame, object) else { continue };
-        of.drawn = Some(now);
-        if let Some(mut mesh) = of.handle.as_ref().and_then(|handle| meshes.get_mut(handle)) {
+        let surface = surface(frame, object)?;
+        self.drawn = Some(now);
+        if let Some(mut mesh) = self.handle.as_ref().and_then(|handle| into.get_mut(handle)) {
             write(&mut mesh, &surface);
-            continue;
+            return None;
         }
-        let handle = meshes.add(mesh_of(&surface));
-        commands.entity(entity).insert(Mesh3d(handle.clone()));
-        of.handle = Some(handle);
+        let handle = into.add(mesh_of(&surface));
+        self.handle = Some(handle.clone());
+        Some(Mesh3d(handle))
     }
 }
 
 /// The surface of an object in the axes in which it is drawn; `None` for what has no shape.
-fn surface(world: &MetachronWorld, frame: &Frame, object: Object) -> Option<Surface> {
-    let shape = world.agents().of(object.id())?.form()?;
+fn surface(frame: &Frame, object: Object) -> Option<Surface> {
+    let shape = frame.world().agents().of(object.id())?.form()?;
     let body = match frame.body(object).ok()? {
         Body::Rigid(_) => Body::Rigid(RigidState::default()),
         Body::Tool(tool) => Body::Tool(ToolState { tip: DVec3::ZERO, rotation: DQuat::IDENTITY, ..tool }),

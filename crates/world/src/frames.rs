@@ -27,6 +27,12 @@ impl Frame {
         Self { world, time, states }
     }
 
+    /// The world.
+    #[must_use]
+    pub const fn world(&self) -> &World {
+        &self.world
+    }
+
     /// The moment.
     #[must_use]
     pub const fn time(&self) -> SimTime {
