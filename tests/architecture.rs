@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates, and the crates of this workspace that each may depend on.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("agents/core", &[]),
     ("agents/geometry", &["core"]),
     ("agents/contact", &["core", "geometry"]),
@@ -14,6 +14,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ("crates/world", &["core", "geometry", "contact", "models", "runtime"]),
     ("crates/scene", &["core", "geometry", "contact", "models", "world"]),
     ("crates/export", &["core", "geometry", "runtime", "world"]),
+    ("crates/bevy", &["core", "runtime", "world", "export"]),
     ("crates/import", &["geometry"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry"]),
@@ -27,11 +28,12 @@ const ARROWS: [(&str, &[&str]); 15] = [
 ];
 
 /// Text on the right must not stand in the code of the folder on the left.
-const ABSENT: [(&str, &[&str]); 7] = [
+const ABSENT: [(&str, &[&str]); 8] = [
     ("agents", &["std::time", "std::thread", "std::fs", "std::net", "wgpu", "egui"]),
     ("crates/runtime", &["std::fs::", "wgpu", "egui"]),
     ("crates/world", &["toml::", "std::fs", "std::thread", "wgpu", "egui"]),
     ("crates/scene", &["std::thread", "wgpu", "egui"]),
+    ("crates/bevy", &["std::fs", "std::thread", "wgpu", "winit"]),
     ("crates/import", &["std::fs", "std::thread", "wgpu", "egui"]),
     ("crates/render", &["egui", "winit", "std::thread"]),
     ("crates/session", &["egui", "std::thread::spawn"]),

@@ -215,6 +215,51 @@ impl Body {
         }
     }
 
+    /// Leads it on by its velocities for `ahead_s` seconds; below zero, back. No force acts meanwhile, and a tool does not turn.
+    pub fn lead(&mut self, ahead_s: f64) {
+        let move_on = |positions: &mut [DVec3], velocities: &[DVec3]| {
+            positions.iter_mut().zip(velocities).for_each(|(position, velocity)| *position += *velocity * ahead_s);
+        };
+        match self {
+            Self::Nothing => {}
+            Self::Curve(curve) => move_on(&mut curve.positions, &curve.velocities),
+            Self::Rigid(rigid) => {
+                rigid.position += rigid.velocity * ahead_s;
+                rigid.rotation = DQuat::from_scaled_axis(rigid.spin * ahead_s) * rigid.rotation;
+            }
+            Self::Tool(tool) => tool.tip += tool.velocity * ahead_s,
+            Self::Soft(soft) => move_on(&mut soft.positions, &soft.velocities),
+        }
+    }
+
+    /// The material point nearest to a place, metres: of a curve the nearest of its axis, of a soft body its nearest vertex, of a rigid body or
+    /// a tool the place itself, which moves with it. `None` where there is no matter.
+    #[must_use]
+    pub fn anchor_near(&self, place_m: DVec3) -> Option<Anchor> {
+        let nearest = |count: usize, distance2: &dyn Fn(usize) -> f64| {
+            (0..count).min_by(|a, b| distance2(*a).total_cmp(&distance2(*b)))
+        };
+        match self {
+            Self::Nothing => None,
+            Self::Rigid(rigid) => Some(Anchor::Local(rigid.rotation.inverse() * (place_m - rigid.position))),
+            Self::Tool(tool) => Some(Anchor::Local(tool.rotation.inverse() * (place_m - tool.tip))),
+            Self::Soft(soft) => {
+                let vertex = nearest(soft.positions.len(), &|k| soft.positions[k].distance_squared(place_m))?;
+                Some(Anchor::Vertex(vertex as u32))
+            }
+            Self::Curve(curve) => {
+                let share = |k: usize| {
+                    let (from, along) = (curve.positions[k], curve.positions[k + 1] - curve.positions[k]);
+                    ((place_m - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+                };
+                let foot = |k: usize| curve.positions[k].lerp(curve.positions[k + 1], share(k));
+                let segments = curve.positions.len().saturating_sub(1);
+                let k = nearest(segments, &|k| foot(k).distance_squared(place_m))?;
+                Some(Anchor::Arc(curve.arc_m[k] + (curve.arc_m[k + 1] - curve.arc_m[k]) * share(k)))
+            }
+        }
+    }
+
     /// Whether every number is finite. A body that is not finite is never published.
     #[must_use]
     pub fn is_finite(&self) -> bool {
@@ -257,5 +302,51 @@ impl Body {
             Self::Curve(curve) => curve,
             _ => unreachable!("made a curve above"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bent() -> CurveState {
+        CurveState {
+            arc_m: vec![0.0, 1.0, 3.0],
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 2.0, 0.0)],
+            velocities: vec![DVec3::ZERO, DVec3::Z, DVec3::Z],
+            ..CurveState::default()
+        }
+    }
+
+    fn turning() -> RigidState {
+        RigidState { position: DVec3::X, velocity: DVec3::Y, spin: DVec3::Z, ..RigidState::default() }
+    }
+
+    #[test]
+    fn a_body_goes_on_as_it_moves() {
+        let mut body = Body::Rigid(turning());
+        body.lead(0.5);
+        let Body::Rigid(led) = body else { panic!("{body:?}") };
+        assert_eq!(led.position, DVec3::new(1.0, 0.5, 0.0));
+        // half a second at 1 rad/s
+        assert!((led.rotation * DVec3::X).distance(DVec3::new(0.5_f64.cos(), 0.5_f64.sin(), 0.0)) < 1e-15);
+        let mut body = Body::Curve(bent());
+        body.lead(0.5);
+        assert_eq!(body.curve_mut().positions, [DVec3::ZERO, DVec3::new(1.0, 0.0, 0.5), DVec3::new(1.0, 2.0, 0.5)]);
+    }
+
+    #[test]
+    fn the_nearest_material_point_is_where_it_is_seen() {
+        let place = DVec3::new(1.2, 0.5, 0.0);
+        // a quarter of the second segment, which is 2 m long
+        assert_eq!(Body::Curve(bent()).anchor_near(place), Some(Anchor::Arc(1.5)));
+        let rigid = Body::Rigid(RigidState { rotation: DQuat::from_rotation_z(0.7), ..turning() });
+        let found = rigid.point(rigid.anchor_near(place).unwrap()).unwrap();
+        assert!(found.0.distance(place) < 1e-15);
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
+        let soft = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; 3], positions });
+        assert_eq!(soft.anchor_near(place), Some(Anchor::Vertex(1)));
+        assert_eq!(Body::Nothing.anchor_near(place), None);
+        assert_eq!(Body::Curve(CurveState::default()).anchor_near(place), None);
     }
 }

@@ -46,9 +46,13 @@ impl Surface {
         surface
     }
 
-    /// The surface of a body whose shape is not rigid; that of a rigid one is its [`LocalMesh`], moved.
-    pub(super) fn of(shape: &ShapeKind, body: &Body) -> Self {
+    /// The surface of a body of this shape; no triangles where the two are not of one kind.
+    #[must_use]
+    pub fn of(shape: &ShapeKind, body: &Body) -> Self {
         match (shape, body) {
+            (ShapeKind::Solid(solid), Body::Rigid(state)) => {
+                Self::moved(&LocalMesh::of(&solid.solid, solid.com_local), state)
+            }
             (ShapeKind::Chain, Body::Curve(curve)) => Self::tube(curve),
             (ShapeKind::Surface(skin), Body::Soft(state)) if skin.triangles.is_empty() => Self::rope(skin, state),
             (ShapeKind::Surface(skin), Body::Soft(state)) => Self::skin(skin, state),

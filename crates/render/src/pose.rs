@@ -28,25 +28,7 @@ pub fn between(before: &Snapshot, newest: &Snapshot, time: SimTime, into: &mut B
 pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
     let age_s = time.secs_after(newest.moment()).clamp(0.0, BEYOND_MAX_S);
     copy(&newest.body, into);
-    match into {
-        Body::Nothing => {}
-        Body::Curve(curve) => {
-            for (position, velocity) in curve.positions.iter_mut().zip(&curve.velocities) {
-                *position += *velocity * age_s;
-            }
-        }
-        Body::Rigid(rigid) => {
-            rigid.position += rigid.velocity * age_s;
-            rigid.rotation = DQuat::from_scaled_axis(rigid.spin * age_s) * rigid.rotation;
-        }
-        Body::Tool(tool) => tool.tip += tool.velocity * age_s,
-        Body::Soft(soft) => {
-            soft.positions
-                .iter_mut()
-                .zip(&soft.velocities)
-                .for_each(|(position, velocity)| *position += *velocity * age_s);
-        }
-    }
+    into.lead(age_s);
     let ahead = (age_s * 1e9) as u64;
     SimTime::from_nanos(newest.moment().as_nanos() + ahead)
 }

@@ -5,7 +5,7 @@
 use super::object::Object;
 use super::world::{World, WorldError};
 use glam::DVec3;
-use metachron_core::{Anchor, SimTime, Snapshot};
+use metachron_core::{Anchor, Body, SimTime, Snapshot};
 use metachron_runtime::TimelineCommand;
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,6 +25,12 @@ impl Frame {
     pub(super) fn now(world: World) -> Self {
         let (time, states) = (world.time(), world.agents().iter().map(|agent| agent.latest()).collect());
         Self { world, time, states }
+    }
+
+    /// The world.
+    #[must_use]
+    pub const fn world(&self) -> &World {
+        &self.world
     }
 
     /// The moment.
@@ -49,8 +55,23 @@ impl Frame {
     pub fn point(&self, object: Object, anchor: Anchor) -> Result<DVec3, WorldError> {
         let state = self.state(object)?;
         let (position, velocity) = state.body.point(anchor).ok_or_else(|| self.world.no_point(object, anchor))?;
-        let ahead_s = if state.at_rest { 0.0 } else { self.time.secs_after(state.moment()) };
-        Ok(position + velocity * ahead_s.clamp(-AHEAD_MAX_S, AHEAD_MAX_S))
+        Ok(position + velocity * self.ahead_s(state))
+    }
+
+    /// The matter of an object at the frame's moment.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`].
+    pub fn body(&self, object: Object) -> Result<Body, WorldError> {
+        let state = self.state(object)?;
+        let mut body = state.body.clone();
+        body.lead(self.ahead_s(state));
+        Ok(body)
+    }
+
+    /// How long a state is led on, seconds.
+    fn ahead_s(&self, state: &Snapshot) -> f64 {
+        if state.at_rest { 0.0 } else { self.time.secs_after(state.moment()).clamp(-AHEAD_MAX_S, AHEAD_MAX_S) }
     }
 }
 
