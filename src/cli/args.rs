@@ -211,6 +211,8 @@ impl OutputArgs {
 pub enum StyleWord {
     /// Draw every edge
     Wireframe,
+    /// Contact points, and forces as arrows
+    Forces,
     /// Colour by (ε, n): hue for n, stripes for ε
     Resolution,
     /// Colour by the age of what is shown

@@ -189,6 +189,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
 pub(super) fn style(words: &[StyleWord]) -> Style {
     words.iter().fold(Style::default(), |style, word| match word {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
+        StyleWord::Forces => Style { forces: true, ..style },
         StyleWord::Resolution => Style { colouring: Colouring::Resolution, ..style },
         StyleWord::Age => Style { colouring: Colouring::Age, ..style },
         StyleWord::Detail => Style { colouring: Colouring::Detail, ..style },

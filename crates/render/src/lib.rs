@@ -27,6 +27,7 @@ mod compose;
 #[cfg(feature = "gpu")]
 mod draw;
 mod environment;
+mod forces;
 #[cfg(feature = "gpu")]
 mod image_metrics;
 mod impostor_fit;
@@ -34,6 +35,7 @@ mod instances;
 mod level;
 mod light_volume;
 mod lod_transition;
+mod membership;
 #[cfg(feature = "gpu")]
 pub mod offscreen;
 mod pick;
@@ -56,8 +58,10 @@ pub use compose::Hand;
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use environment::{Environment, EnvironmentLight};
 #[cfg(feature = "gpu")]
+pub use forces::ToolForce;
 pub use image_metrics::{psnr_db, ssim};
 pub use level::{Level, Shading};
+pub use membership::History;
 #[cfg(feature = "gpu")]
 pub use offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
 pub use pick::Hit;

@@ -108,11 +108,7 @@ fn error_governor(
 
 /// All drawable objects: agents, then scenery, then the proxies of groups.
 pub fn scene_view(scene: &Scene) -> SceneView {
-    let agents = scene.agents.iter().map(|member| Actor {
-        id: member.id,
-        form: form(&member.spec),
-        appearance: appearance(&member.appearance),
-    });
+    let agents = scene.agents.iter().map(actor);
     let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
         let form = Form::Scenery(it.model.clone(), it.at);
         Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
@@ -137,6 +133,11 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         }
     }
     scene_view
+}
+
+/// How an agent is drawn.
+pub fn actor(member: &Member) -> Actor {
+    Actor { id: member.id, form: form(&member.spec), appearance: appearance(&member.appearance) }
 }
 
 const fn environment(kind: EnvironmentKind) -> Environment {

@@ -61,6 +61,6 @@ pub use integrator_cost::solve_prices;
 pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 pub use parameter_sweep::{Played, Point, apply, method_of, play_points, setting_of};
 pub use reference_run::{PairError, ReferenceComparison, compare_with_reference};
-pub use session::{Finished, Session};
+pub use session::{Finished, REWIND_BYTES, RewindStatus, Session};
 pub use step_response::{After, Pushes, median, push};
 pub use trace::Trace;

@@ -33,6 +33,7 @@ mod events;
 mod frames;
 mod initial_overlap;
 mod initial_shape;
+mod joined;
 pub mod kinds;
 mod log;
 mod object;

@@ -90,7 +90,7 @@ impl World {
 
     /// From now on its run does what `recording` says.
     fn follow(&self, recording: Recording, until: Option<SimTime>) {
-        let Shared { gravity, surroundings, identity, log, .. } = &*self.shared;
+        let Shared { gravity, surroundings, identity, joined, log, .. } = &*self.shared;
         let mut state = self.state();
         let State::Running(run) = &*state else { return };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
@@ -106,6 +106,7 @@ impl World {
             gravity: *gravity,
             surroundings: Arc::clone(surroundings),
             identity: identity.clone(),
+            joined: Arc::clone(joined),
         }));
     }
 

@@ -6,6 +6,7 @@
 use super::assemble;
 use super::builder::{Part, member};
 use super::checkpoint::{Checkpoint, SceneIdentity};
+use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::Log;
 use super::recording::{Entry, Recording};
@@ -31,6 +32,7 @@ pub(super) struct Player {
     pub gravity: DVec3,
     pub surroundings: Arc<ClusterScene>,
     pub identity: SceneIdentity,
+    pub joined: Arc<Joined>,
 }
 
 impl Player {
@@ -94,6 +96,7 @@ impl Player {
         let member = member(id, name, part, self.gravity).map_err(|error| error.to_string())?;
         let spawn = assemble::lone(&member, &self.surroundings, ExecutorKind::Lockstep);
         let spawn = spawn.map_err(|error| error.to_string())?;
+        self.joined.push(member);
         self.run.add(spawn).map(drop).map_err(|error| error.to_string())
     }
 

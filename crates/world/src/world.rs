@@ -10,10 +10,12 @@ use super::builder::{Part, SceneBuildError, member};
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
+use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::{Log, logged};
 use super::object::{Object, WorldTag};
 use super::recording::{Entry, added};
+use super::scene::Member;
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
@@ -131,6 +133,9 @@ pub(super) struct Shared {
     tag: WorldTag,
     state: Mutex<State>,
     agents: Agents,
+    /// How many agents the scene has, and those that joined since, in the order of their numbers.
+    of_scene: usize,
+    pub joined: Arc<Joined>,
     /// Gravity, m/s²: that of objects that join it.
     pub gravity: DVec3,
     /// The static solids and joints.
@@ -218,6 +223,8 @@ impl World {
             tag,
             state,
             agents,
+            of_scene: scene.agents.len(),
+            joined: Arc::default(),
             gravity,
             surroundings,
             instruments,
@@ -442,7 +449,9 @@ impl World {
         let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        let joined = run.add(spawn)?.id();
+        // who sees the agent can ask for its member
+        self.shared.joined.push(member);
+        let joined = run.add(spawn).inspect_err(|_| self.shared.joined.pop())?.id();
         match entry {
             Some(entry) => log.note(|| entry),
             None => log.note_begun(),
@@ -520,6 +529,19 @@ impl World {
     #[must_use]
     pub fn agents(&self) -> &Agents {
         &self.shared.agents
+    }
+
+    /// How many agents its scene has; those of higher numbers joined it since ([`World::joined`]).
+    #[must_use]
+    pub fn agents_of_scene(&self) -> usize {
+        self.shared.of_scene
+    }
+
+    /// What an agent that joined since the start was built from, as a scene has it of its own; `None` of agents of the scene.
+    #[must_use]
+    pub fn joined(&self, id: AgentId) -> Option<Member> {
+        let at = (id.0 as usize).checked_sub(self.shared.of_scene)?;
+        self.shared.joined.get(at)
     }
 
     /// Wall time since the start; virtual in lockstep.

@@ -19,6 +19,9 @@ const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 /// Tooltip of the tuning button.
 const TUNE: &str = "Tune the gains: a few seconds of frames at many resolutions, then a search in the background; the best gains are applied";
 
+/// Tooltip of contact forces.
+const FORCES: &str = "A ball at each contact; an arrow along its normal as long as the force (orange), friction (blue), and what a tool feels (red)";
+
 /// Draws the panel.
 pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut DrawingOptions) -> Vec<Action> {
     let mut actions = Vec::new();
@@ -205,6 +208,8 @@ fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
         if ui.checkbox(&mut looks.details, "Shade by detail").changed() && looks.details {
             (looks.colours, looks.ages) = (false, false);
         }
+        ui.end_row();
+        ui.checkbox(&mut looks.forces, "Contact forces").on_hover_text(FORCES);
         ui.end_row();
     });
     value(ui, "Triangles", &text::count(status.triangles), "In the last picture");
