@@ -258,7 +258,7 @@ pub(super) fn level(levels: &[Level], number: usize) -> Level {
 pub(super) fn tint(style: Style, at: Level, age_s: f64) -> [u8; 4] {
     let with = |[r, g, b]: [u8; 3], share: u8| [r, g, b, share];
     match style.colouring {
-        Colouring::Material => [0; 4],
+        Colouring::Material | Colouring::Depth => [0; 4],
         Colouring::Resolution => with(resolution_colour(at.resolution), 220),
         Colouring::Detail => with(detail_colour(at.detail), 235),
         Colouring::Age => with(age_colour(age_s), 190),

@@ -25,6 +25,8 @@ mod benchmark;
 mod bounds_tree;
 mod compose;
 #[cfg(feature = "gpu")]
+mod depth_image;
+#[cfg(feature = "gpu")]
 mod draw;
 mod environment;
 mod forces;
@@ -55,10 +57,12 @@ mod visibility;
 pub use benchmark::{Drawn, benchmark, benchmark_left};
 pub use compose::Hand;
 #[cfg(feature = "gpu")]
+pub use depth_image::DepthImage;
+#[cfg(feature = "gpu")]
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use environment::{Environment, EnvironmentLight};
-#[cfg(feature = "gpu")]
 pub use forces::ToolForce;
+#[cfg(feature = "gpu")]
 pub use image_metrics::{psnr_db, ssim};
 pub use level::{Level, Shading};
 pub use membership::History;

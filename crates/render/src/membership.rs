@@ -72,3 +72,44 @@ impl Track {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene_view::{Appearance, Form, Material, States};
+    use super::super::{Camera, Ray, Size};
+    use super::*;
+    use glam::{DQuat, DVec3};
+    use metachron_core::{RigidState, SimTime};
+    use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, Solid, generate};
+
+    #[test]
+    fn a_newcomer_stands_before_the_scenery_and_is_picked_until_it_leaves() {
+        let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
+        let model = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Sphere, 0, 20)).unwrap()));
+        let at = Placement { position: 5.0 * DVec3::Y, rotation: DQuat::IDENTITY, scale: 1.0 };
+        let ball = |id| Actor { id: AgentId(id), form: Form::Solid(Solid::Ball { radius_m: 0.1 }), appearance };
+        let still = Actor { id: AgentId(1), form: Form::Scenery(model, at), appearance };
+        let mut view = SceneView::new(vec![ball(0), still], vec![]);
+        let camera = Camera::looking(-3.0 * DVec3::Y, DVec3::ZERO, 0.8);
+        let size = Size { width: 100, height: 100 };
+        view.survey(&camera, size);
+        view.join(ball(1));
+        let state = |x: f64| {
+            let body = Body::Rigid(RigidState { position: x * DVec3::X, ..RigidState::default() });
+            Arc::new(Snapshot { body, ..Snapshot::default() })
+        };
+        view.set_snapshot(AgentId(0), &state(-0.5), true);
+        view.set_snapshot(AgentId(1), &state(0.5), true);
+        let seen = |view: &mut SceneView| {
+            view.pose(SimTime::ZERO, States::Latest);
+            view.survey(&camera, size);
+            view.seen().iter().map(|seen| (seen.id.0, seen.visible)).collect::<Vec<_>>()
+        };
+        assert_eq!(seen(&mut view), [(0, true), (1, true), (2, true)]);
+        let ray = Ray { origin: DVec3::new(0.5, -3.0, 0.0), direction: DVec3::Y };
+        assert_eq!(view.pick(ray).map(|hit| hit.object), Some(AgentId(1)));
+        view.leave(AgentId(1));
+        assert_eq!(seen(&mut view), [(0, true), (1, false), (2, true)]);
+        assert_eq!(view.pick(ray), None);
+    }
+}

@@ -24,6 +24,8 @@ pub enum Colouring {
     Age,
     /// The fraction of its detail that an object is drawn with, from white (its coarsest) to nearly black (its finest), as in (FS93, fig. 8).
     Detail,
+    /// The distance along the view, in greys: white is at the eye, middle grey as far as the camera's target, black nothing.
+    Depth,
 }
 
 /// Drawing options of a picture.

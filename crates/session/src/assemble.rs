@@ -388,11 +388,11 @@ pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
     Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
 }
 
-/// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
-pub fn camera(scene: &Scene, scene_view: &SceneView, seconds: f64) -> Camera {
-    match &scene.camera {
-        Some(camera) => {
-            let view = camera.view_at(seconds);
+/// A camera of the scene `seconds` after the start; if the scene has none of that number, a camera in front that sees everything.
+pub fn camera(scene: &Scene, at: usize, scene_view: &SceneView, seconds: f64) -> Camera {
+    match scene.cameras.get(at) {
+        Some(named) => {
+            let view = named.camera.view_at(seconds);
             Camera::looking(view.eye_m, view.look_at_m, view.fov_deg.to_radians())
         }
         None => overview(scene_view),

@@ -4,6 +4,7 @@
 //! Never here: windows, files, arguments.
 
 mod ahead;
+mod cameras;
 mod choose;
 mod gather;
 mod limit;
@@ -64,6 +65,8 @@ pub struct Session {
     trace: Option<Trace>,
     /// Moments that can be shown again, if any are kept.
     rewind: Option<Rewind>,
+    /// Which of the scene's cameras is used.
+    camera: usize,
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
@@ -175,6 +178,7 @@ impl Session {
             couplings: Couplings::default(),
             trace: None,
             rewind: None,
+            camera: 0,
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
@@ -333,18 +337,6 @@ impl Session {
     #[must_use]
     pub fn levels(&self) -> &[Level] {
         &self.levels
-    }
-
-    /// The scene's own camera now.
-    #[must_use]
-    pub fn scene_camera(&self) -> Camera {
-        self.camera_at(self.sim_now().as_secs_f64())
-    }
-
-    /// The scene's own camera so many seconds after the start.
-    #[must_use]
-    pub fn camera_at(&self, seconds: f64) -> Camera {
-        assemble::camera(&self.scene, &self.scene_view, seconds)
     }
 
     /// Waits until the wall time `until`, while the agents run.

@@ -70,6 +70,8 @@ pub struct DrawingOptions {
     pub ages: bool,
     /// Shade objects by their detail; not together with the other two.
     pub details: bool,
+    /// Show distances along the view; not together with the other three.
+    pub depths: bool,
     /// Draw the edges of triangles.
     pub wireframe: bool,
     /// Draw contact points and forces.
@@ -77,11 +79,23 @@ pub struct DrawingOptions {
 }
 
 impl DrawingOptions {
+    /// These, but of the meanings of colours the one that `wanted` has in addition.
+    fn plain_or(self, wanted: Self) -> Self {
+        Self {
+            colours: wanted.colours && !self.colours,
+            ages: wanted.ages && !self.ages,
+            details: wanted.details && !self.details,
+            depths: wanted.depths && !self.depths,
+            ..wanted
+        }
+    }
+
     fn style(self) -> Style {
         let colouring = match self {
             Self { colours: true, .. } => Colouring::Resolution,
             Self { ages: true, .. } => Colouring::Age,
             Self { details: true, .. } => Colouring::Detail,
+            Self { depths: true, .. } => Colouring::Depth,
             _ => Colouring::Material,
         };
         Style { colouring, wireframe: self.wireframe, forces: self.forces }
@@ -255,6 +269,9 @@ impl Viewer {
         Panel::right("side").default_size(318.0).size_range(280.0..=460.0).frame(frame(14, 6)).show(ui, |ui| {
             actions.extend(side::show(ui, status, &self.history, &mut self.layout.looks));
         });
+        if actions.iter().any(|action| matches!(action, Action::Camera(_))) {
+            self.hand.follow_scene();
+        }
     }
 
     fn overlays(&mut self, ui: &Ui, simulation: &dyn Simulation, commands: &mut Vec<Command>) {
@@ -342,15 +359,19 @@ impl Viewer {
             Command::RealTime => actions.push(Action::Speed(1.0)),
             Command::Frame => self.frame_object(simulation, status.selected),
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
-            Command::SceneCamera => self.hand.follow_scene(),
-            Command::Free => self.close_or_deselect(simulation, actions),
-            Command::Colours => {
-                *looks = DrawingOptions { colours: !looks.colours, ages: false, details: false, ..*looks }
+            Command::SceneCamera => {
+                if self.hand.follows_scene() && status.cameras.len() > 1 {
+                    actions.push(Action::Camera((status.camera + 1) % status.cameras.len()));
+                }
+                self.hand.follow_scene();
             }
+            Command::Free => self.close_or_deselect(simulation, actions),
+            Command::Colours => *looks = looks.plain_or(DrawingOptions { colours: !looks.colours, ..*looks }),
+            Command::Depths => *looks = looks.plain_or(DrawingOptions { depths: !looks.depths, ..*looks }),
             Command::Forces => looks.forces = !looks.forces,
             Command::Lanes => self.layout.lanes = !self.layout.lanes,
             Command::Wireframe => looks.wireframe = !looks.wireframe,
-            Command::Ages => *looks = DrawingOptions { ages: !looks.ages, colours: false, details: false, ..*looks },
+            Command::Ages => *looks = looks.plain_or(DrawingOptions { ages: !looks.ages, ..*looks }),
             Command::HideUi => self.layout.panels = !self.layout.panels,
             Command::Timeline => self.layout.timeline = !self.layout.timeline,
             Command::Theme => requests.theme = true,

@@ -32,6 +32,7 @@ pub(super) fn initial_status(session: &Session) -> Status {
         executor: scene.executor.name().to_owned(),
         policies: PolicyKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
         laws,
+        cameras: session.camera_names().map(str::to_owned).collect(),
         running: true,
         speed: 1.0,
         agents: scene.agents.iter().map(row).collect(),

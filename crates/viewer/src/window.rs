@@ -311,6 +311,10 @@ impl Simulation for WindowSimulation<'_> {
                 let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
                 self.drive(TimelineCommand::Step(frame));
             }
+            Action::Camera(number) => {
+                self.session.use_camera(number);
+                self.status.camera = self.session.camera_number();
+            }
             Action::Look(look) => self.look(look),
             Action::Reset => self.reset(),
             Action::Reload => self.reload(),

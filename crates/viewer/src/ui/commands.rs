@@ -40,6 +40,8 @@ pub enum Command {
     Wireframe,
     /// Colour by age.
     Ages,
+    /// Show distances along the view.
+    Depths,
     /// Draw contact forces.
     Forces,
     /// Show or hide the lanes of turns.
@@ -103,7 +105,7 @@ const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static
 }
 
 /// Every key binding of the window.
-pub const SHORTCUTS: [Shortcut; 28] = [
+pub const SHORTCUTS: [Shortcut; 29] = [
     row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
     row(Command::Step, &[key(Key::ArrowRight)], "Step one frame, or to the next moment", Group::Time),
     row(Command::Back, &[key(Key::ArrowLeft)], "Step back", Group::Time),
@@ -116,11 +118,12 @@ pub const SHORTCUTS: [Shortcut; 28] = [
     row(Command::Quit, &[ctrl(Key::Q)], "Quit", Group::Time),
     row(Command::Frame, &[key(Key::F)], "Frame the selected object, or all", Group::Camera),
     row(Command::Track, &[key(Key::T)], "Track the selected object", Group::Camera),
-    row(Command::SceneCamera, &[key(Key::V)], "View of the scene's camera", Group::Camera),
+    row(Command::SceneCamera, &[key(Key::V)], "View of the scene's camera, then of the next", Group::Camera),
     row(Command::Free, &[key(Key::Escape)], "Close, deselect, free camera", Group::Camera),
     row(Command::Colours, &[key(Key::C)], "Colour by resolution", Group::Picture),
     row(Command::Wireframe, &[key(Key::W)], "Wireframe", Group::Picture),
     row(Command::Ages, &[key(Key::A)], "Colour by age", Group::Picture),
+    row(Command::Depths, &[key(Key::Z)], "Depth", Group::Picture),
     row(Command::Forces, &[key(Key::N)], "Contact forces", Group::Picture),
     row(Command::Lanes, &[key(Key::L)], "Lanes of turns", Group::Picture),
     row(Command::HideUi, &[key(Key::H)], "Hide the panels", Group::Picture),

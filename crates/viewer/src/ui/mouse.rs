@@ -85,6 +85,12 @@ impl Hand {
         self.own.unwrap_or_else(|| simulation.scene_camera())
     }
 
+    /// Whether the scene's own camera is in use.
+    #[must_use]
+    pub const fn follows_scene(&self) -> bool {
+        self.own.is_none()
+    }
+
     /// Switches to the scene's own camera.
     pub fn follow_scene(&mut self) {
         (self.own, self.track) = (None, false);

@@ -62,6 +62,8 @@ pub enum Action {
     Pause,
     /// Pause and advance by one frame.
     SingleStep,
+    /// Use the camera of the scene with this number in [`Status::cameras`].
+    Camera(usize),
     /// Look at a moment of the past, or return from it.
     Look(Look),
     /// Restart the scene from its initial state.
@@ -259,6 +261,10 @@ pub struct Status {
     pub held: Option<HandStatus>,
     /// One row for each agent, in the scene's order.
     pub agents: Vec<AgentRow>,
+    /// The names of the scene's cameras.
+    pub cameras: Vec<String>,
+    /// The number of the one that is used.
+    pub camera: usize,
     /// What contact forces are drawn with; `None` where they are not.
     pub forces: Option<Forces>,
     /// The couplings between agents at present.
