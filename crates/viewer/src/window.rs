@@ -294,6 +294,20 @@ impl<'a> WindowSimulation<'a> {
     }
 }
 
+/// Whether an action changes what the run will do, other than when.
+const fn acts(action: &Action) -> bool {
+    !matches!(
+        action,
+        Action::Look(_)
+            | Action::Run
+            | Action::Pause
+            | Action::SingleStep
+            | Action::Speed(_)
+            | Action::Select(_)
+            | Action::Camera(_)
+    )
+}
+
 /// Frames stored in a run of this plan: all if it ends by itself.
 const fn frames_kept(plan: &WindowPlan) -> usize {
     if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
@@ -303,6 +317,9 @@ impl Simulation for WindowSimulation<'_> {
     fn apply(&mut self, action: Action) {
         if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
             self.stop_tuning();
+        }
+        if acts(&action) {
+            self.session.branch_off();
         }
         match action {
             Action::Run => self.drive(TimelineCommand::Run),

@@ -273,11 +273,19 @@ impl Session {
         self.look_at_moment(at)?;
         // once more without the pause: what a paused frame loop has done since is undone
         self.put_back(at)?;
-        if let Some(rewind) = &mut self.rewind {
-            rewind.shown = None;
+        self.branch_off();
+        Ok(true)
+    }
+
+    /// Makes the moment where the run stands the present, so that something can be done there: what was kept after it is given up. Nothing where
+    /// the run does not stand in the past.
+    pub fn branch_off(&mut self) {
+        let stands = self.is_put_back();
+        if let Some(rewind) = self.rewind.as_mut().filter(|_| stands)
+            && let Some(at) = rewind.shown.take()
+        {
             rewind.cut_after(rewind.moments[at].time);
         }
-        Ok(true)
     }
 
     /// Whether the run stands where it is looked at.

@@ -20,6 +20,8 @@ pub const BYTES_MAX: usize = 32 << 20;
 /// Height of a lane, points, and width of the names.
 const ROW: f32 = 18.0;
 const NAMES: f32 = 132.0;
+/// Room for the scroll bar, points.
+const BAR: f32 = 14.0;
 
 /// The turns of an agent in a tenth of a second.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +34,8 @@ struct Cell {
     eps_m: f32,
     /// By how much its time was put off meanwhile.
     waited_s: f32,
-    leader: AgentId,
+    /// The leader of its cluster; `None` of an agent that is alone.
+    leader: Option<AgentId>,
     kind: Kind,
 }
 
@@ -106,7 +109,7 @@ impl Cell {
             dt_s: row.dt_s as f32,
             eps_m: row.simulation.map_or(f32::NAN, |resolution| resolution.eps_m as f32),
             waited_s: waited_s as f32,
-            leader: row.leader.unwrap_or(row.id),
+            leader: row.leader,
             kind: match row.state {
                 AgentState::Running => Kind::Steps,
                 AgentState::Resting => Kind::Rests,
@@ -129,16 +132,15 @@ impl Cell {
         self.kind == Kind::Steps && self.late_s > self.dt_s
     }
 
-    fn color(&self, id: AgentId, palette: &Palette) -> Color32 {
+    fn color(&self, palette: &Palette) -> Color32 {
         match self.kind {
             Kind::Parked => palette.bad,
             Kind::Rests | Kind::Gone => palette.weak.gamma_multiply(0.5),
-            Kind::Steps if self.leader == id => palette.good,
-            Kind::Steps => cluster_color(self.leader),
+            Kind::Steps => self.leader.map_or(palette.good, cluster_color),
         }
     }
 
-    fn text(&self, name: &str, sim_s: f64, leader: &str) -> String {
+    fn text(&self, name: &str, sim_s: f64, leader: Option<&str>) -> String {
         let what = match self.kind {
             Kind::Steps => format!("{:.0} of {:.0} Hz", self.rate_hz, self.wanted_hz),
             Kind::Rests => "at rest".to_owned(),
@@ -146,8 +148,9 @@ impl Cell {
             Kind::Gone => "gone".to_owned(),
         };
         let eps = if self.eps_m.is_nan() { "–".to_owned() } else { text::metres(self.eps_m.into()) };
+        let cluster = leader.map_or_else(|| "alone".to_owned(), |leader| format!("cluster of {leader}"));
         format!(
-            "{name} at {sim_s:.2} s\n{what}\nlate {}\ndt {}\nε {eps}\nwaited {}\ncluster of {leader}",
+            "{name} at {sim_s:.2} s\n{what}\nlate {}\ndt {}\nε {eps}\nwaited {}\n{cluster}",
             text::seconds(self.late_s.into()),
             text::seconds(self.dt_s.into()),
             text::seconds(self.waited_s.into()),
@@ -193,8 +196,9 @@ fn lane(ui: &mut Ui, status: &Status, lanes: &Lanes, at: usize) -> egui::Respons
     let color = if selected { palette.text } else { palette.weak };
     let clip = ui.painter().with_clip_rect(names.intersect(ui.clip_rect()));
     clip.text(names.left_center() + vec2(6.0, 0.0), Align2::LEFT_CENTER, &row.name, FontId::proportional(12.0), color);
-    let cells = rect.with_min_x(names.right()).shrink2(vec2(4.0, 2.0));
-    ui.painter().add(Shape::mesh(cells_mesh(lanes, (at, row.id), cells, &palette)));
+    // the scroll bar lies over the right end
+    let cells = Rect::from_x_y_ranges(names.right()..=rect.right() - BAR, rect.y_range().shrink(2.0));
+    ui.painter().add(Shape::mesh(cells_mesh(lanes, at, cells, &palette)));
     let width = cells.width() / CELLS as f32;
     let column = |x: f32| {
         let from = cells.right() - width * lanes.columns.len() as f32;
@@ -202,12 +206,12 @@ fn lane(ui: &mut Ui, status: &Status, lanes: &Lanes, at: usize) -> egui::Respons
     };
     let hovered = response.hover_pos().and_then(|pos| lanes.cell(column(pos.x)?, at));
     let Some((sim_s, cell)) = hovered else { return response };
-    let leader = status.agents.get(cell.leader.0 as usize).map_or("–", |row| &row.name);
+    let leader = cell.leader.and_then(|leader| status.agents.get(leader.0 as usize)).map(|row| row.name.as_str());
     response.on_hover_text(cell.text(&row.name, sim_s, leader))
 }
 
 /// The cells of a lane, the newest at the right: as high as the rate; a dark red foot where late, an amber cap where time was put off.
-fn cells_mesh(lanes: &Lanes, (at, id): (usize, AgentId), rect: Rect, palette: &Palette) -> Mesh {
+fn cells_mesh(lanes: &Lanes, at: usize, rect: Rect, palette: &Palette) -> Mesh {
     let mut mesh = Mesh::default();
     let width = rect.width() / CELLS as f32;
     for (back, column) in lanes.columns.iter().rev().enumerate() {
@@ -217,7 +221,7 @@ fn cells_mesh(lanes: &Lanes, (at, id): (usize, AgentId), rect: Rect, palette: &P
             let y = |share: f32| rect.bottom() - share * rect.height();
             Rect::from_min_max(pos2(right - width, y(high)), pos2(right, y(low)))
         };
-        mesh.add_colored_rect(part(0.0, cell.share()), cell.color(id, palette));
+        mesh.add_colored_rect(part(0.0, cell.share()), cell.color(palette));
         if cell.is_late() {
             mesh.add_colored_rect(part(0.0, 0.25), palette.bad);
         }

@@ -39,7 +39,7 @@ impl WindowSimulation<'_> {
         self.went_on
     }
 
-    /// Looks at a moment. In lockstep the run stands there.
+    /// Looks at a moment. In lockstep the run stands there, also at the newest, until the user lets it run.
     pub(super) fn look(&mut self, look: Look) {
         let outcome = match look {
             Look::At(time) => self.session.look_at(time),
@@ -47,7 +47,7 @@ impl WindowSimulation<'_> {
             Look::Forward => self.session.look_beside(false),
             Look::Live => self.session.look_live(),
         };
-        if self.session.is_virtual() && self.session.rewind().is_some() {
+        if !self.session.world().timeline().runs_at(self.session.now()) {
             self.running = false;
         }
         self.take_moment(outcome);

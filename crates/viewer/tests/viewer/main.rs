@@ -399,7 +399,7 @@ fn lanes_of_a_thousand_agents_are_laid_out_as_far_as_they_fit_and_tell_of_turns(
     let lanes = harness.query_all_by_label_contains("Lane of box ").count();
     assert!((2..40).contains(&lanes), "{lanes} lanes were laid out");
     let lane = harness.get_by_label("Lane of box 1").rect();
-    harness.hover_at(lane.right_center() - egui::vec2(6.0, 0.0));
+    harness.hover_at(lane.right_center() - egui::vec2(18.0, 0.0));
     harness.run_steps(60);
     let told = harness.query_by_label_contains("120 of 240 Hz").expect("a tooltip");
     let told = told.accesskit_node().label().or(told.accesskit_node().value()).unwrap_or_default();
@@ -416,7 +416,7 @@ fn forces_depths_and_cameras_are_chosen_by_key_and_by_label() {
     let mut harness = window_of(simulation);
     press(&mut harness, Key::N);
     assert!(last_view(&harness).style.forces);
-    harness.get_by_label("Contact forces").click();
+    harness.get_by_label("Contact forces").click_accesskit();
     asked(&mut harness);
     assert!(!last_view(&harness).style.forces);
     press(&mut harness, Key::Z);
